@@ -1,7 +1,7 @@
 """Formulas in a line of text: where the line may break, and where it must not.
 
-Entry points: `in_line(mathml, label)`, of which `breakable` and `contained` are the steps;
-`glue(html)`, which is done piece by piece by `cut`, `tight` and `held`.
+Entry points: `in_line(mathml, label)`, of which `breakable` and `contained` are the steps, for a
+formula by itself; `glue(html)` for a whole page.
 
 A browser takes a `math` element for one unbreakable box that the line may break on either side of.
 So
@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape, unescape
 
 from coursebuild.core.text.patterns import pattern
@@ -37,8 +37,7 @@ _WHOLE = pattern(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.D
 _ANNOTATION = pattern(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = pattern(r"<[^>]*>")
 _PIECE = pattern(r"<math>.*?</math>", re.DOTALL)
-_OPENINGS = "([“‘\"'"
-_OPENING = frozenset(_OPENINGS)
+_OPENING = frozenset("([“‘\"'")
 _HOLD, _LOOSE = '<span class="held">', "</span>"
 _TOUCHING = pattern(
     r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
@@ -53,12 +52,6 @@ _LAST = pattern(
     r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
 )
 _END = pattern(r"</math>(?=\s)")
-_FIRST_INSIDE = pattern(rf">(?:<semantics>)?(?:<mrow>)*+<mo(?=>(?:{_SIGN})</mo>)")
-_LAST_INSIDE = pattern(
-    rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?:</mrow>)*+"""
-    r"""(?:<annotation\b[^<]*</annotation></semantics>)?\Z)"""
-)
-_AFTER = pattern(r"""(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
 
 
@@ -191,61 +184,3 @@ def _held(before: str, formula: str, after: str) -> str:
 
 def _hold(html: str) -> str:
     return f"{_HOLD}{html}{_LOOSE}"
-
-
-# --- piece by piece
-
-
-def cut(html: str) -> tuple[list[str], list[str]] | None:
-    """The texts around the formulas of a page, and what each formula is after `<math`, to its end.
-
-    `None` where formulas do not stand one after the other, each with its own end.
-    """
-    *pieces, last = html.split("</math>")
-    texts, inside = list[str](), list[str]()
-    for piece in pieces:
-        text, _, formula = piece.partition("<math")
-        if formula[:1] not in (">", " ") or "<math" in formula:
-            return None
-        texts.append(text)
-        inside.append(formula)
-    return None if "<math" in last else ([*texts, last], inside)
-
-
-def tight(inside: str, *, before: bool, after: bool) -> str:
-    """A formula, without `<math` and its end, beside spaces of the text: see 4."""
-    if before and (first := _FIRST_INSIDE.match(inside)):
-        inside = f'{first[0]} lspace="0em"{inside[first.end() :]}'
-    if (
-        after
-        and (start := inside.rfind("<mo")) >= 0
-        and (last := _LAST_INSIDE.match(inside, start))
-    ):
-        inside = f'{inside[: last.end()]} rspace="0em"{inside[last.end() :]}'
-    return inside
-
-
-def kept_together(texts: Sequence[str], inside: Sequence[str]) -> list[str]:
-    """The texts with what holds formulas together with what stands beside them: see 3."""
-    texts = list(texts)
-    last = -1
-    for first in range(len(inside)):
-        if first <= last or inside[first][0] != ">":
-            continue
-        last = first
-        while texts[last + 1] == "" and last + 1 < len(inside) and inside[last + 1][0] == ">":
-            last += 1
-        following = texts[last + 1]
-        touching = _AFTER.match(following)
-        after = touching.end() if touching is not None else 0
-        before = len(texts[first].rstrip(_OPENINGS))
-        opened = before < len(texts[first])
-        if opened:
-            texts[first] = f"{texts[first][:before]}{_HOLD}{texts[first][before:]}"
-            if first < last:
-                texts[first + 1] += _LOOSE
-        if after and (first < last or not opened):
-            texts[last] += _HOLD
-        if after or (opened and first == last):
-            texts[last + 1] = f"{following[:after]}{_LOOSE}{following[after:]}"
-    return texts

@@ -5,8 +5,7 @@ lessons of a level with what they need from elsewhere; `drawings(graph, words)`,
 wide and for narrow screens.
 
 A drawing is never the only place that says it: the page lists the same lessons with their titles.
-Arrows that say no more than a longer way does are left out, and so are nodes that are too many. It
-is written in the HTML that is read fast (`styles.is_plain`).
+Arrows that say no more than a longer way does are left out, and so are nodes that are too many.
 """
 
 from __future__ import annotations

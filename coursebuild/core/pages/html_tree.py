@@ -1,6 +1,7 @@
 """HTML as a tree, read as a browser reads it, whatever an author wrote.
 
-Entry points: `parse_html`, and `to_html` and `to_xml`, which write a tree.
+Entry points: `parse_html`, and `to_html` and `to_xml`, which write a tree; `elements_with`, which
+finds elements by their attributes.
 
 The parser is Lexbor: it puts in what HTML lets a writer leave out, and mends what is misplaced.
 Comments are left out.
@@ -8,7 +9,7 @@ Comments are left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from typing import TypeAlias
 
@@ -70,12 +71,24 @@ HtmlContent: TypeAlias = HtmlElement | str
 
 def parse_html(html: str) -> list[HtmlContent]:
     """What stands in the body of a page with this HTML."""
-    # The parser takes UTF-8. Half a surrogate pair has no form there.
-    page = LexborHTMLParser(f"<!DOCTYPE html><body>{html}".encode("utf-8", "replace").decode())
+    page = _parsed(html)
     root = HtmlElement("body")
     if page.body is not None:
         _read(page.body, root, _DEEPEST)
     return root.children
+
+
+def elements_with(
+    html: str, attributes: Iterable[str]
+) -> Iterator[tuple[str, Mapping[str, str | None]]]:
+    """Names and attributes of the elements that have any of some attributes."""
+    for node in _parsed(html).css(",".join(f"[{name}]" for name in attributes)):
+        yield node.tag or "", node.attributes
+
+
+def _parsed(html: str) -> LexborHTMLParser:
+    # The parser takes UTF-8. Half a surrogate pair has no form there.
+    return LexborHTMLParser(f"<!DOCTYPE html><body>{html}".encode("utf-8", "replace").decode())
 
 
 def _read(parent: LexborNode, into: HtmlElement, levels: int) -> None:

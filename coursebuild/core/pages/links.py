@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping
-from html import unescape
 from html.parser import HTMLParser
 from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
@@ -24,8 +23,8 @@ from msgspec import Struct
 from coursebuild.core.model import linked_lines
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.html_tree import elements_with
 from coursebuild.core.text.diagnostics import nearest
-from coursebuild.core.text.patterns import pattern
 
 _ADDRESSES = {
     "a": ("href",),
@@ -45,6 +44,9 @@ _ADDRESSES = {
     "video": ("src", "poster"),
 }
 """Attributes that hold addresses, by element."""
+
+_NOTED = ("id", "name", *sorted({name for names in _ADDRESSES.values() for name in names}))
+"""Attributes that may hold an id or an address."""
 
 _ORIGIN = "https://site.invalid"
 """Stands for wherever the site is served from."""
@@ -87,8 +89,6 @@ class _Base(Struct, frozen=True):
     """The address of its root, with `_ORIGIN` for the host."""
     own: str | None
     """The host, where it is known."""
-    plain: bool
-    """Whether nothing in the root has to be resolved."""
 
     @staticmethod
     @functools.lru_cache(maxsize=8)
@@ -96,7 +96,7 @@ class _Base(Struct, frozen=True):
         base = urlsplit(base_url)
         own = f"{base.scheme}://{base.netloc}" if base.netloc else None
         folder = f"{base.path.rstrip('/')}/"
-        return _Base(f"{_ORIGIN}{folder}", own, _STEPS.fullmatch(folder, 1) is not None)
+        return _Base(f"{_ORIGIN}{folder}", own)
 
 
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
@@ -119,8 +119,14 @@ def _is_page(path: str) -> bool:
 
 def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
     """The ids in the text of a page, and the addresses in it."""
-    page = _quickly_read(html) or _read(html)
-    return page.ids, frozenset(address.url for address in page.addresses)
+    ids: set[str] = set()
+    addresses: set[str] = set()
+    for tag, attributes in elements_with(html, _NOTED):
+        for name, value in attributes.items():
+            named, urls = attribute_targets(tag, name, value or "")
+            ids.update(named)
+            addresses.update(urls)
+    return frozenset(ids), frozenset(addresses)
 
 
 def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[Reference]:
@@ -128,9 +134,6 @@ def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[
     base = _Base.of(base_url)
     found: set[Reference] = set()
     for url in addresses:
-        if _PLAIN_ANCHOR.fullmatch(url):
-            found.add((path, unquote(url[1:])))
-            continue
         target = _target(path, url, base)
         if target is not None:
             found.add(target if isinstance(target, tuple) else ("", target))
@@ -180,40 +183,8 @@ def _is_number(text: str) -> bool:
     return text.isdecimal() and text.isascii() and text[0] != "0" and len(text) < 10
 
 
-_STEP = r"[A-Za-z0-9_~@,+-][A-Za-z0-9_.~@,+-]*+"
-_STEPS = pattern(rf"(?:{_STEP}/)*+(?:{_STEP})?")
-_PLAIN_URL = pattern(rf"((?:\.\./)*+)((?:{_STEP}/)*+{_STEP})(?:#([A-Za-z0-9_.~@,+:%-]*+))?")
-"""An address as nearly all are: nothing is encoded before its anchor, and every step leads
-somewhere."""
-_PLAIN_ANCHOR = pattern("#[!-~]*+")
-
-
-@functools.lru_cache(maxsize=8)
-def _folders(path: str) -> tuple[str, ...]:
-    """The folder of a plain path, and those around it, to the root; none of any other path."""
-    steps = path.split("/")[:-1] if _STEPS.fullmatch(path) else None
-    if steps is None:
-        return ()
-    return tuple("".join(f"{step}/" for step in steps[:end]) for end in range(len(steps), -1, -1))
-
-
-def plain_target(path: str, url: str) -> tuple[str, str] | None:
-    """Where an address on a page leads, if both are written as nearly all are; else `None`.
-
-    The site path, and the anchor as it is written: empty where there is none.
-    """
-    plain = _PLAIN_URL.fullmatch(url)
-    if plain is None:
-        return None
-    up, folders = plain.end(1) // 3, _folders(path)
-    return (folders[up] + plain[2], plain[3] or "") if up < len(folders) else None
-
-
 def _target(path: str, url: str, base: _Base) -> Reference | str | None:
     """The file and the anchor of an address; why it has none; `None` where it leads elsewhere."""
-    plain = plain_target(path, url) if base.plain else None
-    if plain is not None:
-        return plain[0], unquote(plain[1])
     try:
         parts = urlsplit(urljoin(base.root + urls.encode(path), url.strip()))
     except ValueError:
@@ -293,26 +264,4 @@ def _read(html: str) -> _Page:
                 named, urls = attribute_targets(tag, name, value)
                 ids.update(named)
                 addresses += (_Address(url, line) for url in urls)
-    return _Page(frozenset(ids), tuple(addresses))
-
-
-_TAGS = pattern(r"""(?:[^<]++|</|<[a-z][a-z0-9]*+(?:>|(?:\s[\w:-]++(?:="[^"<>]*+")?)*+\s*/?>))*+""")
-_WITH_ATTRIBUTES = pattern(r"<([a-z][a-z0-9]*)(\s[^<>]+)>")
-_ATTRIBUTE = pattern(r"""\s([\w:-]+)="([^"<>]*)\"""")
-_RAW_TEXT = pattern(r"<(?:script|style|textarea|title|plaintext|xmp|iframe|noembed|noframes)\b")
-
-
-def _quickly_read(html: str) -> _Page | None:
-    """The same as `_read` but for the lines, where all tags are written as we write them."""
-    if not _TAGS.fullmatch(html) or _RAW_TEXT.search(html):
-        return None
-    ids: set[str] = set()
-    addresses: list[_Address] = []
-    for tag, attributes in _WITH_ATTRIBUTES.findall(html):
-        if tag not in _ADDRESSES and ' id="' not in attributes:
-            continue
-        for name, value in _ATTRIBUTE.findall(attributes):
-            named, urls = attribute_targets(tag, name, unescape(value))
-            ids.update(named)
-            addresses += (_Address(url, 0) for url in urls)
     return _Page(frozenset(ids), tuple(addresses))

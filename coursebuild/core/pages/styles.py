@@ -27,12 +27,6 @@ _PIECE = pattern(
 """A comment, an element of raw text, or a tag: nothing that only looks like an attribute is taken
 for one."""
 
-_PLAIN = pattern(
-    r"(?:[^<]++|</"
-    r"|<(?!(?:script|style|textarea|title)\b)[a-z][a-z0-9]*+"
-    r"""(?: (?!style[ />])[a-z0-9_:-]++(?:="[^"<>]*+")?)*+ ?/?>)*+"""
-)
-"""HTML as we and Temml write it: there, what looks like a style in a tag is one."""
 _OTHERS = pattern(
     r"""(?:[^<]++|<(?![a-z]|!--)"""
     r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
@@ -44,18 +38,8 @@ _OTHERS = pattern(
 _ATTRIBUTE = pattern(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
 
-def is_plain(html: str) -> bool:
-    """Whether all tags are written as we and Temml write them; what `hoist` gives is so as well."""
-    return _PLAIN.fullmatch(html) is not None
-
-
-def hoist(html: str, *, plain: bool | None = None) -> tuple[str, frozenset[str]]:
-    """The page with classes in place of `style` attributes, and what they stand for.
-
-    `plain`: what `is_plain` says, where that is known.
-    """
-    if is_plain(html) if plain is None else plain:
-        return _hoist_plain(html)
+def hoist(html: str) -> tuple[str, frozenset[str]]:
+    """The page with classes in place of `style` attributes, and what they stand for."""
     found: set[str] = set()
     parts: list[str] = []
     at = 0
@@ -73,28 +57,6 @@ def hoist(html: str, *, plain: bool | None = None) -> tuple[str, frozenset[str]]
             parts += (html[at:end], tag)
             at = piece.end()
     return "".join(parts), frozenset(found)
-
-
-def _hoist_plain(html: str) -> tuple[str, frozenset[str]]:
-    """The same, where the page is as `_PLAIN` says."""
-    found: set[str] = set()
-    parts: list[str] = []
-    at = 0
-    style = html.find(' style="')
-    while style >= 0:
-        start, end = html.rfind("<", at, style), html.find(">", style)
-        if end < 0:  # what seems to be a tag has no end, nor does anything after it
-            break
-        if start < 0 or html.find(">", start, style) >= 0:  # it stands in a text
-            style = html.find(' style="', style + 1)
-            continue
-        tag, declaration = _without_style(html[start + 1 : end])
-        if declaration:
-            found.add(declaration)
-        parts += (html[at:start], tag)
-        at = end + 1
-        style = html.find(' style="', at)
-    return "".join((*parts, html[at:])), frozenset(found)
 
 
 @functools.lru_cache(maxsize=4096)

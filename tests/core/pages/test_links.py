@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import BrokenLink, check_links
 from coursebuild.core.pages.links import (
-    _Base,
-    _quickly_read,
     _read,
-    _target,
     all_lead_somewhere,
     ids_and_addresses,
     references,
@@ -122,19 +118,10 @@ SOUND = [
 
 
 @given(st.lists(st.sampled_from(TAGS), max_size=8))
-def test_a_page_read_quickly_gives_what_a_parser_reads(parts: list[str]) -> None:
-    """Where it can be read quickly at all."""
+def test_ids_and_addresses_are_those_that_the_check_reads(parts: list[str]) -> None:
     html = "\n".join(parts)
-    quick, slow = _quickly_read(html), _read(html)
-    if quick is not None:
-        assert quick.ids == slow.ids
-        assert [a.url for a in quick.addresses] == [a.url for a in slow.addresses]
-
-
-def test_tags_as_templates_write_them_are_read_quickly() -> None:
-    assert _quickly_read("\n".join(TAGS[:11])) is not None
-    for tag in TAGS[11:]:
-        assert _quickly_read(f"<p>{tag}</p>") is None or tag == "&"
+    page = _read(html)
+    assert ids_and_addresses(html) == (page.ids, {address.url for address in page.addresses})
 
 
 @given(st.lists(st.sampled_from([*TAGS, *SOUND]), max_size=6))
@@ -154,26 +141,3 @@ def test_references_to_files_that_are_no_pages_lead_somewhere() -> None:
     sound = {("a.html", ""), ("a.html", "top"), ("a.html", "id"), ("a.svg", "x")}
     assert all_lead_somewhere(sound, files, {"a.html": {"id"}})
     assert not all_lead_somewhere({("a.html", "x")}, files, {"a.html": {"id"}})
-
-
-STEPS = st.sampled_from(
-    [
-        *("a", "b.html", "..", ".", "", "~x", "a,b", "x+y", "é", "a b", "%41", "a:b", "-", "a@b"),
-        *("1.2-x.html", "#", "#eq:1", "#a%20", "?q", "//h", ";p", "http:", "\n"),
-    ]
-)
-BASES = (
-    *("", "https://h.org", "https://h.org/", "https://h.org/c/d/", "https://h.org/c//d", "/x/y"),
-    *("https://h.org/c/../d", "h", "https://h.org/é/", "https://h.org/a;b", "https://h.org/a.b/.c"),
-)
-
-
-@given(
-    st.lists(STEPS, min_size=1, max_size=4).map("/".join),
-    st.tuples(st.lists(STEPS, max_size=5).map("/".join), STEPS).map("".join)
-    | st.text("a./#?:b-", max_size=9),
-    st.sampled_from(BASES),
-)
-def test_plain_addresses_lead_where_all_others_would(path: str, url: str, base_url: str) -> None:
-    base = _Base.of(base_url)
-    assert _target(path, url, base) == _target(path, url, replace(base, plain=False))
