@@ -30,12 +30,15 @@ from msgspec import Struct
 from coursebuild.core.model import Course, Document, FeatureBlock
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.rules import RULES, Rule
 
 if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.exports.plain import Plain
+    from coursebuild.core.pages.library import Library
     from coursebuild.core.pages.search.sections import SectionReader
+    from coursebuild.core.pages.tools import Tools
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
 
@@ -66,11 +69,56 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """Gives the search what can be found of the block."""
 
 
+class PageKind(Struct, frozen=True, kw_only=True):
+    """A page that a feature adds to the site, at `NAME/index.html`.
+
+    The interface texts `NAME.title` and `NAME.description` are its title and what it is about.
+    """
+
+    name: str
+    values: Callable[[Library], Mapping[str, object]]
+    """All that the page shows of the course: it is drawn again where this is another."""
+    draw: Callable[[Tools, Mapping[str, Any]], Markup] | None = None
+    """What stands below the page's title. Without it the template `NAME.html` has the page."""
+    exists: Callable[[Library], bool] = lambda library: True
+    """Whether a course has the page."""
+    order: int = 100
+    """Its place among such pages in the foot of every page, the lowest first."""
+    indexed: bool = True
+    """Whether it is found by searches, and has a copy in Markdown."""
+    form: bool = False
+    """Whether it has a form that asks for a page of the site."""
+
+    @property
+    def path(self) -> str:
+        """Its site path."""
+        return f"{self.name}/index.html"
+
+
+class PagePart(Struct, frozen=True, kw_only=True):
+    """What a script brings to life in the pages that have it."""
+
+    mark: str
+    """A piece of HTML by which these pages are known, as `data-tabs`; no other part has it."""
+    code: str = ""
+    """The script, run when the page is parsed."""
+    bundled: str = ""
+    """The name of a script of coursebuild itself, in the place of `code`."""
+    late: bool = False
+    """Whether the script of every page loads it, when a reader comes near."""
+    kinds: tuple[str, ...] = ()
+    """Kinds of pages that have it, where not all do that have the mark."""
+    texts: tuple[str, ...] = ()
+    """Keys of interface texts that the script asks for, or beginnings of such, which end in a dot.
+    """
+
+
 class Feature(Struct, frozen=True, kw_only=True):
-    """What a lesson can hold, with all that belongs to it. Everything but the name is optional."""
+    """What a lesson can hold or a site can offer. Everything but the name is optional."""
 
     name: str
     fences: tuple[FenceKind[Any], ...] = ()
+    pages: tuple[PageKind, ...] = ()
     rules: tuple[Rule, ...] = ()
     """Mistakes that it can name, in addition to the catalogue (`coursebuild.core.text.rules`)."""
     check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
@@ -83,17 +131,13 @@ class Feature(Struct, frozen=True, kw_only=True):
     """Interface texts by language, as TOML; those in English (`en`) stand for missing ones."""
     style: str = ""
     """CSS that every page of the site gets."""
-    mark: str = ""
-    """A piece of HTML by which a page is known that the feature's script belongs to, as
-    `data-tabs`; without it there is no script."""
-    script: str = ""
-    """The script, run when the page is parsed. A feature of coursebuild itself has its own in the
-    bundle (`site/js/NAME.js`), and the page's script loads it when a reader comes near."""
-    script_texts: tuple[str, ...] = ()
-    """Keys of interface texts that the script asks for, or beginnings of such, which end in a dot.
-    """
+    parts: tuple[PagePart, ...] = ()
 
 
+CORE_PAGES = ("home", "level", "lesson", "stub", "model", "page", "notfound")
+"""The kinds of pages that every site has."""
+_FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
+"""Folders of every site."""
 CORE_FENCES = ("bench", "lab", "mjcf", "python", "text")
 """The kinds of fences that the core reads."""
 
@@ -104,6 +148,8 @@ _INSTALLED_BY = {
     "tabs": "`plugins/tabs` of coursebuild",
 }
 """What has to be installed for fences that a course written for coursebuild may have."""
+
+_PAGE_NAME = pattern("[a-z][a-z0-9-]*")
 
 _of_course: tuple[Feature, ...] = ()
 _digest = ""
@@ -120,8 +166,8 @@ def use_course_features(found: Iterable[Feature], digest: str) -> None:
     for name in _rules_of(_of_course):
         RULES.pop(name, None)
     _of_course, _digest = _sorted(found), digest
-    _by_fence.cache_clear()
-    _by_block.cache_clear()
+    for known in (_by_fence, _by_block, page_kinds):
+        known.cache_clear()
 
 
 def features_digest() -> str:
@@ -142,7 +188,14 @@ def clash(added: Feature, known: Iterable[Feature]) -> str:
         return f"its check would see no `{unseen[0].name}`, whose block has no `summary`"
     read = {*CORE_FENCES, *(kind.name for feature in known for kind in feature.fences)}
     twice = [kind.name for kind in added.fences if kind.name in read]
-    return f"the fence `{twice[0]}` is read already" if twice else ""
+    if twice:
+        return f"the fence `{twice[0]}` is read already"
+    pages = {*CORE_PAGES, *_FOLDERS, *(kind.name for feature in known for kind in feature.pages)}
+    twice = [kind.name for kind in added.pages if kind.name in pages]
+    if twice:
+        return f"there is a page `{twice[0]}` already"
+    odd = [kind.name for kind in added.pages if not _PAGE_NAME.fullmatch(kind.name)]
+    return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`" if odd else ""
 
 
 def fence_kind(name: str) -> FenceKind[Any] | None:
@@ -165,9 +218,16 @@ def missing_package(name: str) -> str:
     return "" if name in _by_fence() else _INSTALLED_BY.get(name, "")
 
 
-def is_loaded_late(name: str) -> bool:
-    """Whether the page's script loads the script of a feature, and not the page itself."""
-    return any(feature.name == name and not feature.script for feature in features())
+@functools.cache
+def page_kinds() -> tuple[PageKind, ...]:
+    """The pages that features add, in the order in which they are named."""
+    kinds = (kind for feature in features() for kind in feature.pages)
+    return tuple(sorted(kinds, key=lambda kind: (kind.order, kind.name)))
+
+
+def page_kind(name: str) -> PageKind | None:
+    """The page of a name that a feature adds."""
+    return next((kind for kind in page_kinds() if kind.name == name), None)
 
 
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:

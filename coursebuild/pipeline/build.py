@@ -42,7 +42,6 @@ _FOLLOWING = (
     "coursebuild.core.scripts.bound_numbers",
     "coursebuild.pipeline.site",
     "coursebuild.core.pages.exports.files",
-    "coursebuild.core.pages.reader",
     "coursebuild.core.pages.search.files",
 )
 """What is needed when the course was read."""

@@ -30,8 +30,7 @@ from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.frame import Frames, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import has
-from coursebuild.core.pages.own_pages import own_pages
-from coursebuild.core.pages.page_list import PageEntry, page_list
+from coursebuild.core.pages.page_list import PageEntry, own_pages, page_list, page_title
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.pages.search.files import IndexEntry
 from coursebuild.core.pages.shared import PageFacts
@@ -222,7 +221,7 @@ class Pages:
             course.repository,
             course.licence,
             tuple((page.id, page.title, page.menu) for page in course.pages),
-            own_pages(self._library),
+            tuple((p.path, page_title(self._library, p)) for p in own_pages(self._library)),
             results.engine,
             results.python,
             names,

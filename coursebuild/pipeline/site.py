@@ -34,8 +34,7 @@ from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.offline import file_list, offline_files
 from coursebuild.core.pages.page_list import PageEntry
-from coursebuild.core.pages.search.files import SearchFiles
-from coursebuild.core.pages.search.page_inputs import search_words
+from coursebuild.core.pages.search.files import SearchFiles, search_words
 from coursebuild.core.pages.shared import PageFacts, common_characters
 from coursebuild.core.run.packages import distributions, library_files
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
@@ -194,7 +193,7 @@ class SiteMaker:
     def _search(self, pages: Pages) -> Iterator[SiteFile]:
         files = SearchFiles(
             pages.searched,
-            search_words(self.library),
+            search_words(self.library.words),
             lambda path: pages.found_by(path)[0],
             lambda path: pages.found_by(path)[1],
             _Cells(self.store),

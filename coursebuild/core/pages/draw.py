@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from coursebuild.core.features import page_kind
 from coursebuild.core.model import Document, Paragraph, plain_text
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.article import article, contents
@@ -41,6 +42,9 @@ def draw_whole(
         values["article"] = article(page, document)
         if inputs.kind == "page":
             description = _first_sentences(document)
+    kind = page_kind(inputs.kind)
+    if kind is not None and kind.draw is not None:
+        values |= {"title": inputs.title, "content": kind.draw(tools, values)}
     draft = Draft(
         inputs.path,
         inputs.kind,

@@ -17,13 +17,13 @@ from collections.abc import Mapping
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.core.features import features, is_loaded_late
+from coursebuild.core.features import PagePart, features, page_kind
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.draft import Draft as Draft
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.own_pages import own_pages
+from coursebuild.core.pages.page_list import own_pages, page_title
 from coursebuild.core.text.patterns import pattern
 
 PAGE_WORDS = (
@@ -43,17 +43,8 @@ PAGE_WORDS = (
 """Interface texts that the page's script shows."""
 
 _LAB_KEYS = ("lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")
-_PARTS = {
-    "labs": ("data-script=", ("lab.live.", "overlay.", *_LAB_KEYS)),
-    "offline": ("data-keep", ("offline.live.",)),
-    "map": ("data-mark", ("progress.map.",)),
-    "lesson": ('data-progress="lesson"', ("progress.lesson.", "progress.trouble.")),
-    "progress": ('data-progress="overall"', ("progress.live.", "progress.trouble.")),
-    "review": ('data-progress="review"', ("review.live.", "quiz.live.", "progress.trouble.")),
-}
-"""What not every page has and the page's script brings to life: a mark by which it is known in a
-body, and the interface texts that it needs; of some, the beginnings of their keys. Features have
-more of them (`known_parts`)."""
+_LABS = PagePart(mark="data-script=", texts=("lab.live.", "overlay.", *_LAB_KEYS))
+"""Which the core has itself; features have more parts."""
 
 
 class Names(Struct, frozen=True):
@@ -65,22 +56,16 @@ class Names(Struct, frozen=True):
     icon: str
     credits: str
     touch_icon: str
-    offline_script: str
-    """Of the page about what is kept."""
-    reader_script: str
-    """Of the pages about the reader's progress."""
-    map_script: str
-    """Of pages that list lessons."""
     search_script: str
     """Loaded when a reader opens the search."""
-    feature_scripts: tuple[tuple[str, str], ...] = ()
-    """Of features that have one, by the feature's name."""
+    scripts: tuple[tuple[str, str], ...] = ()
+    """Of the parts of pages, by the mark of each (`PagePart`)."""
 
     def paths(self) -> frozenset[str]:
         """The site paths alone."""
         named = (getattr(self, field) for field in self.__struct_fields__)
         single = (path for path in named if isinstance(path, str))
-        return frozenset((*single, *(path for _, path in self.feature_scripts)))
+        return frozenset((*single, *(path for _, path in self.scripts)))
 
 
 def policy(json_ld: str, *, form: bool = False) -> str:
@@ -121,21 +106,26 @@ def place_of(library: Library, path: str) -> urls.Place:
 
 def frame(library: Library, draft: Draft, names: Names) -> str:
     """The finished text of a page."""
-    before, after = frame_around(library, draft, names, parts_of(draft.body))
+    before, after = frame_around(library, draft, names, parts_of(draft.body, draft.kind))
     return before + visible(draft.body) + after
 
 
 _HERE = Markup("<!--here-->")
 
 
-def known_parts() -> dict[str, tuple[str, tuple[str, ...]]]:
-    """What the page's scripts bring to life: its mark and its interface texts, by name."""
-    return _PARTS | {f.name: (f.mark, f.script_texts) for f in features() if f.mark}
+def known_parts() -> dict[str, PagePart]:
+    """What scripts bring to life, by its mark."""
+    parts = (_LABS, *(part for feature in features() for part in feature.parts))
+    return {part.mark: part for part in parts}
 
 
-def parts_of(body: str) -> tuple[str, ...]:
-    """Which parts with scripts of their own a page's body has: `labs`, `quiz`."""
-    return tuple(part for part, (mark, _) in known_parts().items() if mark in body)
+def parts_of(body: str, kind: str) -> tuple[str, ...]:
+    """The marks of the parts with scripts that a page of a kind has: `data-quiz=`."""
+    return tuple(
+        mark
+        for mark, part in known_parts().items()
+        if mark in body and (not part.kinds or kind in part.kinds)
+    )
 
 
 def frame_around(
@@ -155,9 +145,9 @@ def _cut(html: str) -> tuple[str, str]:
 
 def _own_values(library: Library, draft: Draft) -> dict[str, object]:
     """What the frame of one page shows, and none of another."""
-    course = library.course
+    course, known = library.course, page_kind(draft.kind)
     return {
-        "policy": policy(draft.json_ld, form=draft.kind == "search"),
+        "policy": policy(draft.json_ld, form=known is not None and known.form),
         "head_title": meta.head_title(course, draft.title, draft.kind),
         "description": draft.description,
         "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
@@ -185,15 +175,10 @@ def _shared_values(
         "style": place.href(names.style),
         "theme_script": place.href(names.theme_script),
         "script": place.href(names.script),
-        "feature_scripts": tuple(
-            (name, place.href(path), is_loaded_late(name))
-            for name, path in names.feature_scripts
-            if name in parts
-        ),
+        "part_scripts": _part_scripts(place, names, parts),
         "search_script": place.href(names.search_script),
         "manifest": place.href(urls.MANIFEST),
         "touch_icon": place.href(names.touch_icon),
-        "own_script": place.href(own) if (own := _own_script(draft, names)) else "",
         "home": place.href(urls.HOME),
         "credits": place.href(names.credits),
         "menu": _navigation(library, place, menu=True),
@@ -206,17 +191,16 @@ def _shared_values(
     }
 
 
-def _own_script(draft: Draft, names: Names) -> str:
-    """The script that only pages of this kind have; empty where there is none."""
-    match draft.kind:
-        case "offline":
-            return names.offline_script
-        case "progress" | "review":
-            return names.reader_script
-        case "home" | "level":
-            return names.map_script
-        case _:
-            return ""
+def _part_scripts(
+    place: urls.Place, names: Names, parts: tuple[str, ...]
+) -> tuple[tuple[str, str], ...]:
+    """The addresses of the scripts of parts, each after its name where it is loaded late."""
+    known, found = known_parts(), dict[str, str]()
+    for mark, path in names.scripts:
+        if mark in parts:
+            part = known[mark]
+            found[place.href(path)] = part.bundled.removesuffix(".js") if part.late else ""
+    return tuple((name, href) for href, name in found.items())
 
 
 _ALIKE = ("lesson", "stub", "level", "model")
@@ -279,7 +263,7 @@ def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
     """Keys of the texts that the page carries for its scripts."""
     keys = library.words.keys
     known = known_parts()
-    needed = [key for part in parts for key in known[part][1]]
+    needed = [key for part in parts for key in known[part].texts]
     begun = tuple(key for key in needed if key.endswith("."))
     found = sorted(key for key in keys if begun and key.startswith(begun))
     return (*PAGE_WORDS, *found, *(key for key in needed if key in keys))
@@ -295,6 +279,6 @@ def _navigation(library: Library, place: urls.Place, *, menu: bool) -> tuple[Nav
 def _own_navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
     """Links to what the site adds to the pages of the course."""
     return tuple(
-        NavLink(place.href(own.path), own.title, own.path == place.path)
-        for own in own_pages(library)
+        NavLink(place.href(kind.path), page_title(library, kind), kind.path == place.path)
+        for kind in own_pages(library)
     )

@@ -1,8 +1,7 @@
 """What makes the site an application that works without a network.
 
 Entry points: `offline_files(course, assets)`: the manifest, its icons and the service worker;
-`file_list(names)`: the list of all files by which the worker knows what there is; `offline_inputs`,
-the page that says what is kept, which is also shown where a page is not.
+`file_list(names)`: the list of all files by which the worker knows what there is.
 
 1. The worker is the same text in every build of the same tool: what changes with a course stands in
    the list. So an edit of a page changes that page and its line in the list.
@@ -26,8 +25,6 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, hashed_name, page_script
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.frame import Names
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageInputs
 
 PAPER = "#fcfbf8"
 """The ground of a page in light colours, as in the style sheet."""
@@ -154,20 +151,6 @@ def _is_lasting(file: FileFacts) -> bool:
     """Whether the name holds the content's hash."""
     digits = file.path.rpartition(".")[0].rpartition(".")[2]
     return file.path.startswith("assets/") and digits == file.digest[:8]
-
-
-# ---------------------------------------------------------------------------------- the page
-
-
-def offline_inputs(library: Library) -> PageInputs:
-    """What that page shows; it is complete without a script."""
-    place = urls.Place(urls.OFFLINE)
-    words = library.words
-    values = {"home": place.href(urls.HOME)}
-    title, description = words("offline.title"), words("offline.description")
-    return PageInputs(
-        place.path, "offline", title, description, "offline.html", values, indexed=False
-    )
 
 
 def facts_of(files: Iterable[OutputFile]) -> Iterator[FileFacts]:

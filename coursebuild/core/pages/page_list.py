@@ -1,6 +1,7 @@
 """Every page of a site, in order: the one place that says which there are.
 
-Entry point: `page_list(library)`.
+Entry points: `page_list(library)`; `own_pages(library)`, those of features, as the foot of each
+page names them.
 
 An entry may be asked with another library of the same course: while a course is edited its
 documents change, and its pages stay as long as the course map does.
@@ -12,6 +13,7 @@ from collections.abc import Callable, Iterator
 
 from msgspec import Struct
 
+from coursebuild.core.features import PageKind, page_kind, page_kinds
 from coursebuild.core.model import Document
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.draft import Draft
@@ -25,18 +27,26 @@ class PageEntry(Struct, frozen=True):
 
     path: str
     """Its site path."""
-    id: str
+    kind: str
+    """One of `CORE_PAGES`, or the name of a `PageKind`."""
+    id: str = ""
     """Of the level, lesson, model or page that it shows; empty where there is one page of its
     kind."""
-    kind: PageKind
 
     def inputs(self, library: Library) -> PageInputs:
         """What it shows; summaries of documents are enough."""
-        return self.kind.inputs(library, self.id)
+        kind = page_kind(self.kind)
+        return _course_inputs(self, library) if kind is None else _added_inputs(kind, library)
 
     def document(self, library: Library) -> Document | None:
         """The document that it shows, if any."""
-        return self.kind.document(library, self.id)
+        match self.kind:
+            case "lesson":
+                return library.lessons[self.id].document
+            case "page":
+                return library.pages[self.id].document
+            case _:
+                return None
 
     def draft(
         self,
@@ -52,137 +62,66 @@ class PageEntry(Struct, frozen=True):
         return draw(self.inputs(library), shown, tools or library.tools)
 
 
-class PageKind(Struct, frozen=True):
-    """How the pages of a kind are made, each from the id of what it shows."""
-
-    inputs: Callable[[Library, str], PageInputs]
-    document: Callable[[Library, str], Document | None] = lambda library, id: None
-
-
-# What makes inputs is imported when there are some to make: after an edit these are few.
-
-
-def _lesson_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages import lesson
-
-    entry = library.lessons[id]
-    if entry.document is None:
-        return lesson.stub_inputs(library, entry)
-    return lesson.lesson_inputs(library, entry, entry.document)
-
-
-def _page_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.pages import page_inputs
-
-    page = library.pages[id]
-    assert page.document is not None, "a page without a document is not in the list"
-    return page_inputs(library, page, page.document)
-
-
-def _model_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.pages import model_inputs
-
-    model = next(model for model in library.course.models if model.name == id)
-    return model_inputs(library, model)
-
-
-def _level_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.pages import level_inputs
-
-    return level_inputs(library, library.levels[id])
-
-
-def _home_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.pages import home_inputs
-
-    return home_inputs(library)
-
-
-def _glossary_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.lookup.glossary import glossary_inputs
-
-    return glossary_inputs(library)
-
-
-def _symbols_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.lookup.symbol_index import symbols_inputs
-
-    return symbols_inputs(library)
-
-
-def _numerics_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.numerics import numerics_inputs
-
-    return numerics_inputs(library)
-
-
-def _progress_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.reader import progress_inputs
-
-    return progress_inputs(library)
-
-
-def _review_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.reader import review_inputs
-
-    return review_inputs(library)
-
-
-def _offline_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.offline import offline_inputs
-
-    return offline_inputs(library)
-
-
-def _search_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.search.page_inputs import search_inputs
-
-    return search_inputs(library)
-
-
-def _not_found_inputs(library: Library, id: str) -> PageInputs:
-    from coursebuild.core.pages.pages import not_found_inputs
-
-    return not_found_inputs(library)
-
-
-_HOME = PageKind(_home_inputs)
-_LEVEL = PageKind(_level_inputs)
-_LESSON = PageKind(_lesson_inputs, lambda library, id: library.lessons[id].document)
-_MODEL = PageKind(_model_inputs)
-_GLOSSARY = PageKind(_glossary_inputs)
-_SYMBOLS = PageKind(_symbols_inputs)
-_NUMERICS = PageKind(_numerics_inputs)
-_PAGE = PageKind(_page_inputs, lambda library, id: library.pages[id].document)
-_PROGRESS = PageKind(_progress_inputs)
-_REVIEW = PageKind(_review_inputs)
-_OFFLINE = PageKind(_offline_inputs)
-_SEARCH = PageKind(_search_inputs)
-_NOT_FOUND = PageKind(_not_found_inputs)
-
-
 def page_list(library: Library) -> Iterator[PageEntry]:
     """The pages of the site of a course."""
     course = library.course
-    yield PageEntry(urls.HOME, "", _HOME)
+    yield PageEntry(urls.HOME, "home")
     for level in course.levels:
-        yield PageEntry(urls.level_path(level), level.id, _LEVEL)
-    for entry in library.order:
-        yield PageEntry(urls.lesson_path(entry), entry.id, _LESSON)
+        yield PageEntry(urls.level_path(level), "level", level.id)
+    for lesson in library.order:
+        yield PageEntry(urls.lesson_path(lesson), "lesson", lesson.id)
     for model in course.models:
-        yield PageEntry(urls.model_page_path(model.name), model.name, _MODEL)
-    if library.references.terms:
-        yield PageEntry(urls.GLOSSARY, "", _GLOSSARY)
-    if library.references.has_symbols:
-        yield PageEntry(urls.SYMBOLS, "", _SYMBOLS)
-    if library.reports.cases:
-        yield PageEntry(urls.NUMERICS, "", _NUMERICS)
+        yield PageEntry(urls.model_page_path(model.name), "model", model.name)
+    for kind in own_pages(library):
+        yield PageEntry(kind.path, kind.name)
     for page in course.pages:
         if page.document is not None:
-            yield PageEntry(urls.page_path(page), page.id, _PAGE)
-    yield PageEntry(urls.PROGRESS, "", _PROGRESS)
-    if library.asked:
-        yield PageEntry(urls.REVIEW, "", _REVIEW)
-    yield PageEntry(urls.OFFLINE, "", _OFFLINE)
-    yield PageEntry(urls.SEARCH, "", _SEARCH)
-    yield PageEntry(urls.NOT_FOUND, "", _NOT_FOUND)
+            yield PageEntry(urls.page_path(page), "page", page.id)
+    yield PageEntry(urls.NOT_FOUND, "notfound")
+
+
+def own_pages(library: Library) -> tuple[PageKind, ...]:
+    """The pages that features add to this course, in their order."""
+    return tuple(kind for kind in page_kinds() if kind.exists(library))
+
+
+def page_title(library: Library, kind: PageKind) -> str:
+    """The title of a page that a feature adds."""
+    key = f"{kind.name}.title"
+    return library.words(key) if library.words.has(key) else kind.name.capitalize()
+
+
+def _added_inputs(kind: PageKind, library: Library) -> PageInputs:
+    key = f"{kind.name}.description"
+    description = library.words(key) if library.words.has(key) else ""
+    title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
+    values = {"home": home, **kind.values(library)}
+    template = "added.html" if kind.draw is not None else f"{kind.name}.html"
+    return PageInputs(
+        kind.path, kind.name, title, description, template, values, indexed=kind.indexed
+    )
+
+
+def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
+    # Imported when there are inputs to make: after an edit these are few.
+    from coursebuild.core.pages import lesson, pages
+
+    match entry.kind:
+        case "home":
+            return pages.home_inputs(library)
+        case "level":
+            return pages.level_inputs(library, library.levels[entry.id])
+        case "lesson":
+            found = library.lessons[entry.id]
+            if found.document is None:
+                return lesson.stub_inputs(library, found)
+            return lesson.lesson_inputs(library, found, found.document)
+        case "model":
+            model = next(model for model in library.course.models if model.name == entry.id)
+            return pages.model_inputs(library, model)
+        case "page":
+            page = library.pages[entry.id]
+            assert page.document is not None, "a page without a document is not in the list"
+            return pages.page_inputs(library, page, page.document)
+        case _:
+            return pages.not_found_inputs(library)

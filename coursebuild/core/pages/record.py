@@ -49,7 +49,7 @@ def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
     made = postprocess_html(str(draft.body))
     found = PageRecord(
         draft=replace(draft, body=Markup()),
-        parts=parts_of(made.html),
+        parts=parts_of(made.html, draft.kind),
         text="".join(sorted(made.text.union(draft.title) - fonts.BASE)),
         mathematics="".join(sorted(made.mathematics)),
         declarations=tuple(sorted(made.declarations)),

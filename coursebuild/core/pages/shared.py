@@ -10,6 +10,7 @@ only where it brings a character or a style that no page has, or takes the last 
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable
 from html import unescape
@@ -18,7 +19,7 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.features import Feature, features
+from coursebuild.core.features import Feature, PagePart, features
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
@@ -105,14 +106,23 @@ def shared_files(
         files.append(OutputFile(name, data))
         return name
 
+    @functools.cache
     def script(name: str) -> str:
-        return publish(name, page_script(assets.file(SCRIPTS[name])))
+        return publish(name, page_script(assets.file(SCRIPTS.get(name, f"js/{name}"))))
+
+    def own_script(feature: Feature, part: PagePart) -> str:
+        return publish(f"{feature.name}.js", page_script(part.code.encode()))
 
     jobs = needed_fonts(assets, facts)
     fonts_made = [(job, publish(f"fonts/{job.face.file}", subset(job))) for job in jobs]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
     own = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
-    scripts = ((f.name, feature_script(f, assets)) for f in features() if f.mark)
+    scripts = [
+        (part.mark, script(part.bundled) if part.bundled else own_script(feature, part))
+        for feature in features()
+        for part in feature.parts
+        if part.bundled or part.code
+    ]
     names = Names(
         style=publish("site.css", rules.encode() + assets.file("css/site.css") + own.encode()),
         theme_script=script("theme.js"),
@@ -120,18 +130,10 @@ def shared_files(
         icon=publish("icon.svg", assets.template("icon.svg").encode()),
         credits=publish("licences.txt", _licences(assets)),
         touch_icon=publish("icon-touch.png", assets.file("icons/icon-touch.png")),
-        offline_script=script("offline.js"),
-        map_script=script("map.js"),
-        reader_script=script("reader.js"),
         search_script=script("search.js"),
-        feature_scripts=tuple((n, publish(f"{n}.js", page_script(code))) for n, code in scripts),
+        scripts=tuple(scripts),
     )
     return tuple(files), names
-
-
-def feature_script(feature: Feature, assets: Assets) -> bytes:
-    """The script of a feature: its own, or that of the same name in the bundle."""
-    return feature.script.encode() or assets.file(f"js/{feature.name}.js")
 
 
 def _licences(assets: Assets) -> bytes:

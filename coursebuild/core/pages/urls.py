@@ -17,6 +17,7 @@ from urllib.parse import quote, urlsplit
 
 from msgspec import Struct
 
+from coursebuild.core.features import page_kinds
 from coursebuild.core.model import Course, Lesson, Level, Page
 from coursebuild.core.text.patterns import pattern
 
@@ -57,14 +58,10 @@ def notebook_path(lesson: Lesson) -> str:
     return f"lessons/{lesson.id}-{lesson.slug}.ipynb"
 
 
-_WITHOUT_MARKDOWN = frozenset((NOT_FOUND, SEARCH, PROGRESS, REVIEW, OFFLINE))
-"""Pages that say nothing but what a script fills in."""
-
-
 def markdown_path(page: str) -> str | None:
     """`lessons/4.2-mass-and-inertia.md`: a page as Markdown; `None` where there is no such file."""
-    if page in _WITHOUT_MARKDOWN:
-        return None
+    if page == NOT_FOUND or any(page == kind.path for kind in page_kinds() if not kind.indexed):
+        return None  # which say nothing but what a script fills in
     return f"{page.removesuffix('.html')}.md"
 
 

@@ -4,7 +4,7 @@ A `quiz` fence holds JSON (`schema`). `parse` makes a `Quiz` of it (`model`), `c
 with the course and with what scripts printed, `page`, `markdown` and `search` show it.
 """
 
-from coursebuild.core.features import Feature, FenceKind
+from coursebuild.core.features import Feature, FenceKind, PagePart
 from coursebuild.features.quiz.checks import check_output_lines, check_quizzes
 from coursebuild.features.quiz.markdown import quiz_markdown
 from coursebuild.features.quiz.model import Quiz
@@ -27,7 +27,6 @@ FEATURE = Feature(
     ),
     check=check_quizzes,
     check_runs=check_output_lines,
-    mark="data-quiz=",
-    script_texts=("quiz.live.",),
+    parts=(PagePart(mark="data-quiz=", bundled="quiz.js", late=True, texts=("quiz.live.",)),),
     schemas={"quiz": (QuizFile, "A quiz fence")},
 )

@@ -12,7 +12,7 @@ from pathlib import Path
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, FenceKind
+from coursebuild.core.features import Feature, FenceKind, PagePart
 from coursebuild.core.model import Block, FeatureBlock
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.exports.plain import Plain
@@ -94,6 +94,10 @@ FEATURE = Feature(
     ),
     rules=(Rule("tabs", "error", "A block of tabs cannot be read."),),
     style=Path(__file__).with_name("tabs.css").read_text(encoding="utf-8"),
-    mark="data-tabs",
-    script=Path(__file__).with_name("tabs.js").read_text(encoding="utf-8"),
+    parts=(
+        PagePart(
+            mark="data-tabs",
+            code=Path(__file__).with_name("tabs.js").read_text(encoding="utf-8"),
+        ),
+    ),
 )

@@ -18,11 +18,8 @@ NAMES = Names(
     icon="assets/i.svg",
     credits="assets/c.txt",
     touch_icon="assets/i.png",
-    offline_script="assets/o.js",
-    reader_script="assets/r.js",
-    map_script="assets/m.js",
     search_script="assets/f.js",
-    feature_scripts=(("quiz", "assets/q.js"),),
+    scripts=(("data-quiz=", "assets/q.js"),),
 )
 HOSTILE = 'a "b" <c> & \x07 d\'s \ue000title\ue001 — é'
 
@@ -53,7 +50,7 @@ def test_a_frame_put_together_from_pieces_is_that_of_the_template(
     course = replace(made.course, base_url=base_url, title=title)
     library = Library.of(course, made.results, made.assets)
     frames = Frames(library, NAMES)
-    for parts in ((), ("labs",), ("labs", "quiz"), ()):
+    for parts in ((), ("data-script=",), ("data-script=", "data-quiz="), ()):
         for draft in drafts():
             expected = frame_around(library, draft, NAMES, parts)
             assert frames.around(draft, parts) == expected, draft

@@ -9,11 +9,9 @@ import pytest
 from coursebuild.core.model import Document
 from coursebuild.core.pages.lesson import lesson_inputs, stub_inputs
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.offline import offline_inputs
-from coursebuild.core.pages.pages import home_inputs, level_inputs, model_inputs, not_found_inputs
-from coursebuild.core.pages.reader import progress_inputs
+from coursebuild.core.pages.page_list import page_list
+from coursebuild.core.pages.pages import level_inputs, model_inputs
 from coursebuild.core.pages.search.page import page_text, searched, terms
-from coursebuild.core.pages.search.page_inputs import search_inputs
 from coursebuild.core.pages.search.sections import drawn_sections
 from coursebuild.core.pages.search.values import PageText, Section, SectionPiece
 from support.rendered_course import Make
@@ -115,9 +113,9 @@ def test_a_quiz_gives_no_answer_away(make: Make) -> None:
 def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
     made = make("Text.")
     library = Library.of(made.course, made.results, made.assets)
-    left_out = (home_inputs, not_found_inputs, search_inputs, offline_inputs, progress_inputs)
-    for inputs in left_out:
-        assert page_text(inputs(library), None, "<p>Text</p>") is None, inputs
+    inputs = {page.kind: page.inputs(library) for page in page_list(library)}
+    for kind in ("home", "notfound", "search", "offline", "progress"):
+        assert page_text(inputs[kind], None, "<p>Text</p>") is None, kind
     stub = page_text(stub_inputs(library, library.lessons["1.2"]), None, "<p>Other</p>")
     assert stub == PageText(
         "Later", "1.2", (Section("", "", 0, (SectionPiece("text", "Comes later."),)),)

@@ -46,8 +46,9 @@ def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Asset
     made = ("callout.", "overlay.", "status.", "code.docstring", "code.imports", "theme.")
     made += ("lab.live.", "measured.reference_", "numerics.case_")
     text = "".join(text for path, text in assets.templates if path.endswith(".html"))
-    modules = (ROOT / "coursebuild" / "core" / "pages").rglob("*.py")
-    text += "".join(path.read_text() for path in sorted(modules))
+    for folder in ("core/pages", "features"):
+        modules = sorted((ROOT / "coursebuild" / folder).rglob("*.py"))
+        text += "".join(path.read_text() for path in modules)
     scripts = "".join(p.read_text() for p in sorted((ROOT / "site" / "js").rglob("*.js")))
     words = strings_for(assets.templates, "en")
     known = {re.sub(r"\.(one|other)$", "", key) for key in words.keys}

@@ -23,6 +23,7 @@ from coursebuild.core.pages.compressed import COPIES, copy_of
 from coursebuild.core.pages.search import index
 from coursebuild.core.pages.search.index import IndexPlan, Numbers
 from coursebuild.core.pages.search.page import call
+from coursebuild.core.pages.strings import Strings
 
 FOLDER = "assets/search"
 _QUALITY = 5
@@ -143,6 +144,14 @@ class SearchFiles:
             found = index.sort_terms(plan, pages)
             self._shelf.put(key, b"\0".join(found))
         return found
+
+
+_LIVE = "search.live."
+
+
+def search_words(words: Strings) -> dict[str, str]:
+    """Texts of the interface that a page carries only with its search, by the end of their key."""
+    return {key.removeprefix(_LIVE): text for key, text in words.entries if key.startswith(_LIVE)}
 
 
 def _copied(path: str, key: str, make: Callable[[], bytes]) -> Iterator[CachedFile]:

@@ -12,9 +12,8 @@ from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.search.files import IndexEntry, SearchFiles
+from coursebuild.core.pages.search.files import IndexEntry, SearchFiles, search_words
 from coursebuild.core.pages.search.page import searched
-from coursebuild.core.pages.search.page_inputs import search_words
 from coursebuild.core.pages.search.values import Searched
 
 
@@ -36,7 +35,7 @@ def search_files(
             entries.append(IndexEntry(draft.path, draft.kind, draft.title, by.name, by.digest))
     files = SearchFiles(
         entries,
-        search_words(library),
+        search_words(library.words),
         lambda path: found[path].text,
         lambda path: found[path].terms,
         _Memory(),

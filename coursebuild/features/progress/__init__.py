@@ -1,7 +1,5 @@
 """The pages that are about the reader: what is read and answered, and what to go over again.
 
-Entry points: `progress_inputs`, `review_inputs`, what each shows.
-
 Nothing of a reader is known here. The pages list the lessons with their questions, say what is kept
 and where, and hold places that the page's script fills from the reader's own browser.
 """
@@ -10,11 +8,11 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, owners
 from coursebuild.core.pages.owners import owner_path
-from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.pages import level_view
 from coursebuild.core.pages.quiz_index import count
 
@@ -35,34 +33,21 @@ class Asking(Struct, frozen=True):
     questions: int
 
 
-def progress_inputs(library: Library) -> PageInputs:
+def progress_values(library: Library) -> dict[str, object]:
     """What the page of the reader's progress shows: all lessons, by level."""
-    place, words = urls.Place(urls.PROGRESS), library.words
-    values = {
-        "home": place.href(urls.HOME),
+    place = urls.Place(urls.PROGRESS)
+    return {
         "levels": tuple(level_view(library, place, level) for level in library.course.levels),
         "pages": tuple(one for one in _asking(library, place) if not one.id),
         "review": place.href(urls.REVIEW) if library.asked else "",
         "name": KEPT_AS + library.course.key,
     }
-    title, description = words("progress.title"), words("progress.description")
-    return PageInputs(
-        place.path, "progress", title, description, "progress.html", values, indexed=False
-    )
 
 
-def review_inputs(library: Library) -> PageInputs:
+def review_values(library: Library) -> dict[str, object]:
     """What the page of the review shows: where questions are, and when missed ones come back."""
-    place, words = urls.Place(urls.REVIEW), library.words
-    values = {
-        "home": place.href(urls.HOME),
-        "pages": _asking(library, place),
-        "progress": place.href(urls.PROGRESS),
-    }
-    title, description = words("review.title"), words("review.description")
-    return PageInputs(
-        place.path, "review", title, description, "review.html", values, indexed=False
-    )
+    place = urls.Place(urls.REVIEW)
+    return {"pages": _asking(library, place), "progress": place.href(urls.PROGRESS)}
 
 
 def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:
@@ -75,3 +60,35 @@ def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:
             href = place.href(owner_path(owner))
             found.append(Asking(id, owner.title, href, text, count(text)))
     return tuple(found)
+
+
+_TROUBLE = "progress.trouble."
+FEATURE = Feature(
+    name="progress",
+    pages=(
+        PageKind(name="progress", values=progress_values, order=50, indexed=False),
+        PageKind(
+            name="review",
+            values=review_values,
+            exists=lambda library: bool(library.asked),
+            order=60,
+            indexed=False,
+        ),
+    ),
+    parts=(
+        PagePart(
+            mark="data-mark", kinds=("home", "level"), bundled="map.js", texts=("progress.map.",)
+        ),
+        PagePart(mark='data-progress="lesson"', texts=("progress.lesson.", _TROUBLE)),
+        PagePart(
+            mark='data-progress="overall"',
+            bundled="reader.js",
+            texts=("progress.live.", "progress.map.", _TROUBLE),
+        ),
+        PagePart(
+            mark='data-progress="review"',
+            bundled="reader.js",
+            texts=("review.live.", "quiz.live.", _TROUBLE),
+        ),
+    ),
+)

@@ -1,6 +1,6 @@
 """The index of symbols: what the letters in the formulas of the course stand for, and where.
 
-Entry point: `symbols_inputs`.
+Entry point: `symbols_values`.
 
 Symbols whose meaning a lesson declares come first; the others are listed with their places.
 """
@@ -15,7 +15,6 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.lookup.references import CourseSymbol
 from coursebuild.core.pages.lookup.symbols import sort_key
 from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, owner_link, owner_links
-from coursebuild.core.pages.page_inputs import PageInputs
 
 
 class MeaningView(Struct, frozen=True):
@@ -37,21 +36,18 @@ class SymbolView(Struct, frozen=True):
     others: OwnerLinks
 
 
-def symbols_inputs(library: Library) -> PageInputs:
+def symbols_values(library: Library) -> dict[str, object]:
     """What the index shows."""
     place = urls.Place(urls.SYMBOLS)
     rows = [
         _view(library, place, row)
         for row in sorted(library.references.symbols, key=lambda row: sort_key(row.symbol))
     ]
-    values = {
-        "home": place.href(urls.HOME),
+    return {
         "declared": tuple(row for row in rows if row.meanings),
         "undeclared": tuple(row for row in rows if not row.meanings),
         "glossary": place.href(urls.GLOSSARY) if library.references.terms else "",
     }
-    title, description = library.words("symbols.title"), library.words("symbols.description")
-    return PageInputs(place.path, "symbols", title, description, "symbols.html", values)
 
 
 def _view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:

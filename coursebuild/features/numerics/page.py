@@ -1,6 +1,6 @@
-"""The page of the hard cases: what was measured on MuJoCo, beside what theory says.
+"""What the page of the hard cases shows.
 
-Entry point: `numerics_sheet(library)`. There is such a page where hard cases are recorded.
+Entry point: `numerics_values(library)`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from coursebuild.core.pages.figures import (
     sentence,
 )
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.scenarios import ORDERS, largest
 from coursebuild.core.pages.strings import Strings
 from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
@@ -70,23 +69,18 @@ class CaseGroup(Struct, frozen=True):
     cases: tuple[CaseView, ...]
 
 
-def numerics_inputs(library: Library) -> PageInputs:
+def numerics_values(library: Library) -> dict[str, object]:
     """What the page of the hard cases shows."""
     words, place = library.words, urls.Place(urls.NUMERICS)
     cases = library.reports.cases
     numbers = sorted({one.case for one in cases})
     groups = tuple(_group(words, n, [one for one in cases if one.case == n]) for n in numbers)
-    values = {
-        "home": place.href(urls.HOME),
+    return {
         "groups": groups,
         "engine": ", ".join(sorted({one.engine for one in cases})),
         "file": place.href(urls.file_path(STABILITY_PATH)),
         "command": again("stability", "--record"),
     }
-    title = words("numerics.title")
-    return PageInputs(
-        place.path, "numerics", title, words("numerics.description"), "numerics.html", values
-    )
 
 
 def _group(words: Strings, number: int, cases: Sequence[CaseReport]) -> CaseGroup:

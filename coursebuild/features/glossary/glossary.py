@@ -1,6 +1,6 @@
 """The glossary: every term of the course, the sentence that defines it, and where it is used.
 
-Entry point: `glossary_inputs`.
+Entry point: `glossary_values`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.lookup.references import GlossaryTerm
 from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, owner_link, owner_links
-from coursebuild.core.pages.page_inputs import PageInputs
 
 
 class PieceView(Struct, frozen=True):
@@ -42,7 +41,7 @@ class LetterView(Struct, frozen=True):
     terms: tuple[TermView, ...]
 
 
-def glossary_inputs(library: Library) -> PageInputs:
+def glossary_values(library: Library) -> dict[str, object]:
     """What the glossary shows."""
     place = urls.Place(urls.GLOSSARY)
     terms = sorted(library.references.terms.values(), key=lambda t: sort_key(t.term.name))
@@ -51,13 +50,10 @@ def glossary_inputs(library: Library) -> PageInputs:
         LetterView(letter, tuple(_view(library, place, term) for term in group))
         for letter, group in groups
     )
-    values = {
-        "home": place.href(urls.HOME),
+    return {
         "letters": letters,
         "symbols": place.href(urls.SYMBOLS) if library.references.has_symbols else "",
     }
-    title, description = library.words("glossary.title"), library.words("glossary.description")
-    return PageInputs(place.path, "glossary", title, description, "glossary.html", values)
 
 
 def _view(library: Library, place: urls.Place, found: GlossaryTerm) -> TermView:

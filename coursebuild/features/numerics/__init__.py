@@ -1,0 +1,19 @@
+"""The page of the hard cases: what was measured on MuJoCo, beside what theory says.
+
+There is such a page where hard cases are recorded.
+"""
+
+from coursebuild.core.features import Feature, PageKind
+from coursebuild.features.numerics.page import numerics_values
+
+FEATURE = Feature(
+    name="numerics",
+    pages=(
+        PageKind(
+            name="numerics",
+            values=numerics_values,
+            exists=lambda library: bool(library.reports.cases),
+            order=40,
+        ),
+    ),
+)
