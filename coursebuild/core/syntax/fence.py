@@ -64,9 +64,9 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     assert token.map is not None
     info_at = token.start + len(token.markup)
     info = trimmed(locate(base, [SourceSlice(token.info, info_at)]))
-    closed = token.lines == token.map[1] - token.map[0] - 2
+    closed = len(token.rows) == token.map[1] - token.map[0] - 2
     body = locate(base, token.rows)
-    if not token.lines:
+    if not token.rows:
         body = Excerpt(base.source, "", ((0, base.offset(info_at + len(token.info) + 1)),))
     elif not body.text.endswith("\n"):
         body = Excerpt(base.source, body.text + "\n", body.pieces)

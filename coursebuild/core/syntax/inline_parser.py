@@ -1,17 +1,18 @@
-"""The inline parser: markdown-it's rules, chosen by the first character of a piece of text.
+"""The inline parser: markdown-it's rules, and those for formulas, footnotes, terms, bound numbers.
 
-Entry point: `Inlines`. Its rules are markdown-it's own, with those for formulas, footnotes, terms
-and bound numbers. Tokens get their places in the text; runs of more than `MAX_RUN` emphasis marks
-are text.
+Entry point: `inline_tokens`. Rules are chosen by the first character of what stands next; tokens
+get their places in the text.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import cast
 
 from markdown_it import MarkdownIt
 from markdown_it.helpers import parseLinkLabel
 from markdown_it.parser_inline import ParserInline
+from markdown_it.ruler import Ruler
 from markdown_it.rules_inline import (
     StateInline,
     autolink,
@@ -24,6 +25,7 @@ from markdown_it.rules_inline import (
     link,
     newline,
     strikethrough,
+    text,
 )
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
@@ -36,24 +38,29 @@ from coursebuild.core.text.patterns import pattern
 MAX_NESTING = 20
 """Brackets inside each other that may still become links and images."""
 MAX_RUN = 200
-"""Emphasis marks in a row."""
+"""Emphasis marks in a row; a longer run is text."""
 
 InlineRule = Callable[[StateInline, bool], bool]
 
 
+def inline_tokens(src: str, env: EnvType) -> list[PositionedToken]:
+    """The inline tokens of a block's content; `env` comes from `Definitions.environment`."""
+    return cast(list[PositionedToken], _MARKDOWN.inline.parse(src, _MARKDOWN, env, []))
+
+
 def _emphasis(state: StateInline, silent: bool) -> bool:
-    """Emphasis marks; an absurd run of them is text."""
+    """Emphasis marks and two tildes; an absurd run, or another number of tildes, is text."""
     start, mark = state.pos, state.src[state.pos]
-    if state.src.startswith(mark * MAX_RUN, start):
-        end = start
-        while end < state.posMax and state.src[end] == mark:
-            end += 1
-        if not silent:
-            state.append_pending(state.src[start:end])
-        state.pos = end
-        return True
-    rule = strikethrough.tokenize if mark == "~" else emphasis.tokenize
-    return rule(state, silent)
+    end = start
+    while end < state.posMax and state.src[end] == mark:
+        end += 1
+    if end - start < MAX_RUN if mark != "~" else end - start == 2:
+        rule = strikethrough.tokenize if mark == "~" else emphasis.tokenize
+        return rule(state, silent)
+    if not silent:
+        state.append_pending(state.src[start:end])
+    state.pos = end
+    return True
 
 
 _BRACE = pattern(r"\{\s*([A-Za-z]{2,20})")
@@ -139,12 +146,7 @@ def _link(state: StateInline, silent: bool) -> bool:
     return rule(state, silent)
 
 
-_STOP = pattern(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
-"""A `!` is nothing without a bracket. One set of characters at the beginning is searched for many
-times as fast as several choices."""
-
-
-_INLINE: dict[str, tuple[InlineRule, ...]] = {
+_RULES: dict[str, tuple[InlineRule, ...]] = {
     "\n": (newline,),
     "\\": (escape,),
     "`": (_code_span,),
@@ -152,71 +154,36 @@ _INLINE: dict[str, tuple[InlineRule, ...]] = {
     "_": (_emphasis,),
     "~": (_emphasis,),
     "[": (_term, _link, _footnote_reference),
-    "]": (),
     "!": (_link,),
     "<": (autolink, html_inline),
     "&": (entity,),
     "$": (math_inline,),
 }
+_STOP = pattern(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
+"""Where text ends; a `!` is nothing without a bracket."""
 
 
-class Inlines(ParserInline):
-    """The inline parser."""
+def _by_character(state: StateInline, silent: bool) -> bool:
+    """The first rule of the next character that takes it; its tokens get their places."""
+    at, before = state.pos, len(state.tokens)
+    for rule in _RULES.get(state.src[at], ()):
+        if rule(state, silent):
+            if len(state.tokens) > before:
+                _place(state, before, at)
+            return True
+    return False
 
-    def tokenize(self, state: StateInline) -> None:
-        """Add the tokens up to `state.posMax`; links call it again for their text."""
-        assert isinstance(state, InlineState)
-        src, end, tokens = state.src, state.posMax, state.tokens
-        state.mark = state.pos
-        while (pos := state.pos) < end:
-            stop = _STOP.search(src, pos, end)
-            if stop is None:
-                state.append_pending(src[pos:end])
-                state.pos = end
-                break
-            at = stop.start()
-            if at > pos:
-                state.append_pending(src[pos:at])
-                state.pos = at
-            before = len(tokens)
-            for rule in _INLINE[src[at]] if state.level < MAX_NESTING else ():
-                if rule(state, False):
-                    if len(tokens) > before:
-                        _place_inline(state, before, at)
-                    break
-            else:
-                state.append_pending(src[at])
-                state.pos = at + 1
-        text = state.pending
-        if text:
-            state.push_text(text)
 
-    def skipToken(self, state: StateInline) -> None:  # noqa: N802
-        """Move past one token without making it."""
-        assert isinstance(state, InlineState)
-        pos = state.pos
-        if pos in state.cache:
-            state.pos = state.cache[pos]
-            return
-        if state.level >= MAX_NESTING:
-            state.pos = state.posMax
-        else:
-            self._skip(state)
-        state.cache[pos] = state.pos
+class _Inlines(ParserInline):
+    """markdown-it's inline parser with the rules above."""
 
-    def _skip(self, state: StateInline) -> None:
-        stop = _STOP.search(state.src, state.pos, state.posMax)
-        at = state.posMax if stop is None else stop.start()
-        if at > state.pos:
-            state.pos = at
-            return
-        for rule in _INLINE[state.src[at]]:
-            state.level += 1
-            found = rule(state, True)
-            state.level -= 1
-            if found:
-                return
-        state.pos = at + 1
+    def __init__(self) -> None:
+        super().__init__()
+        self.ruler = Ruler()
+        self.ruler.push("text", text)
+        self.ruler.push("by character", _by_character)
+        self.ruler2.disable("fragments_join")
+        self.terminator_re = _STOP
 
     def parse(self, src: str, md: MarkdownIt, env: EnvType, tokens: list[Token]) -> list[Token]:
         """Add the tokens of a whole text."""
@@ -225,13 +192,13 @@ class Inlines(ParserInline):
         if state.delimiters or any(state.tokens_meta):  # there are marks to be paired
             for rule in self.ruler2.getRules(""):
                 rule(state)
-            _order_lone_tildes(state.tokens)
         tokens.extend(state.tokens)
         return tokens
 
 
-def _place_inline(state: InlineState, before: int, at: int) -> None:
+def _place(state: StateInline, before: int, at: int) -> None:
     """Say how far the tokens reach that a rule made from position `at` on."""
+    assert isinstance(state, InlineState)
     tokens, after = state.tokens, state.pos
     cursor = at
     for token in tokens[before:]:
@@ -254,25 +221,12 @@ def _place_inline(state: InlineState, before: int, at: int) -> None:
     state.mark = after
 
 
-def _order_lone_tildes(tokens: Sequence[Token]) -> None:
-    """Give places to the tilde that markdown-it moves behind a closing tag.
+def _configured() -> MarkdownIt:
+    md = MarkdownIt("zero", {"html": True, "maxNesting": MAX_NESTING})
+    md.inline = _Inlines()
+    # Links with dangerous schemes stay links, so that they can be reported.
+    md.validateLink = lambda url: True  # type: ignore[method-assign]
+    return md
 
-    Of `~~a~~~` it makes the first tilde of the closing run text, and the two after it the tag.
-    """
-    for i, token in enumerate(tokens):
-        if (
-            token.type != "text"
-            or token.content != "~"
-            or i == 0
-            or tokens[i - 1].type != "s_close"
-        ):
-            continue
-        first = i
-        while first > 0 and tokens[first - 1].type == "s_close":
-            first -= 1
-        moved = [t for t in tokens[first : i + 1] if isinstance(t, PositionedToken)]
-        cursor = min(t.start for t in moved)
-        for t in moved:
-            width = t.end - t.start
-            t.start, t.end = cursor, cursor + width
-            cursor += width
+
+_MARKDOWN = _configured()

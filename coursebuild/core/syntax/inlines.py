@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import re
 
+from markdown_it.common.utils import normalizeReference
 from markdown_it.helpers import parseLinkDestination
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
@@ -38,10 +39,10 @@ from coursebuild.core.model import (
     plain_text,
 )
 from coursebuild.core.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
-from coursebuild.core.syntax.block_parser import Definitions
 from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.syntax.html import Balance, tags
-from coursebuild.core.syntax.markdown import definition_label, inline_tokens
+from coursebuild.core.syntax.inline_parser import inline_tokens
+from coursebuild.core.syntax.markdown import Definitions
 from coursebuild.core.syntax.mention import TextPiece, may_mention, plain, with_mentions
 from coursebuild.core.syntax.session import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken, locate
@@ -255,7 +256,7 @@ class _Pass:
         label = text[start + 1 : label_end]
         if end > label_end + 3:
             label = text[label_end + 2 : end - 1]
-        definition = self.reader.definitions.links.get(definition_label(label))
+        definition = self.reader.definitions.links.get(normalizeReference(label))
         if definition is None or not definition.rows:
             return self.content.span(start, end)
         rows = locate(definition.base, definition.rows)

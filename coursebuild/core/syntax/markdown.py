@@ -1,35 +1,56 @@
-"""The one configured markdown-it parser.
+"""The block parser: markdown-it's rules, and those for footnotes and formulas.
 
-Entry points: `block_tokens` (a text into block tokens) and `inline_tokens` (a block's content into
-inline tokens).
+Entry point: `block_tokens`. CommonMark with tables, task lists, footnotes and formulas. Besides
+what markdown-it does:
 
-CommonMark with tables, strikethrough, task lists, footnotes and formulas. Links with dangerous
-schemes stay links here, so that they can be reported instead of turning into text.
+1. The first token of a block gets its place, and the rows that its content was cut from.
+2. Link definitions keep the rows that hold them.
+3. What is nested deeper than `MAX_NESTING` becomes paragraphs: nothing is lost, nothing overflows.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import cast
 
 from markdown_it import MarkdownIt
-from markdown_it.common.utils import normalizeReference
+from markdown_it.common.utils import MD_TRIM_CHARS
+from markdown_it.parser_block import ParserBlock
+from markdown_it.ruler import Ruler
+from markdown_it.rules_block import StateBlock, paragraph, reference
 from markdown_it.utils import EnvType
+from mdit_py_plugins.footnote.index import footnote_def
+from msgspec import Struct, field
 
-from coursebuild.core.syntax.block_parser import MAX_NESTING, Definitions, block_parser
-from coursebuild.core.syntax.inline_parser import Inlines
-from coursebuild.core.syntax.spans import BlockState, PositionedToken
+from coursebuild.core.syntax.math import math_block
+from coursebuild.core.syntax.spans import BlockState, PositionedToken, SourceSlice
 from coursebuild.core.text.source import Excerpt
 
+MAX_NESTING = 60
+"""Containers inside each other; a list with its item counts as two."""
 
-def _configured() -> MarkdownIt:
-    md = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
-    md.block, md.inline = block_parser(), Inlines()
-    md.inline.ruler2.disable("fragments_join")
-    md.validateLink = lambda url: True  # type: ignore[method-assign]
-    return md
+BlockRule = Callable[[StateBlock, int, int, bool], bool]
 
 
-_MARKDOWN = _configured()
+class Definition(Struct):
+    """A link definition as markdown-it keeps it, with the rows of `base` that hold it."""
+
+    href: str
+    title: str
+    base: Excerpt
+    rows: list[SourceSlice]
+
+
+class Definitions(Struct):
+    """The link definitions of a text, by normalised label."""
+
+    links: dict[str, Definition] = field(default_factory=dict)
+
+    def environment(self) -> EnvType:
+        """The environment that markdown-it's rules read."""
+        return {
+            "references": {k: {"href": d.href, "title": d.title} for k, d in self.links.items()}
+        }
 
 
 def block_tokens(base: Excerpt, definitions: Definitions) -> list[PositionedToken]:
@@ -43,12 +64,106 @@ def block_tokens(base: Excerpt, definitions: Definitions) -> list[PositionedToke
     return cast(list[PositionedToken], state.tokens)
 
 
-def inline_tokens(text: str, env: EnvType) -> list[PositionedToken]:
-    """The inline tokens of a block's content; `env` comes from `Definitions.environment`."""
-    tokens = _MARKDOWN.inline.parse(text, _MARKDOWN, env, [])
-    return cast(list[PositionedToken], tokens)
+def _footnote_definition(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """`[^label]: …`, whose opening token gets a place like any other."""
+    before = len(state.tokens)
+    if not footnote_def(state, start, end, silent):
+        return False
+    if not silent:
+        for i in (before, -1):
+            plain = state.tokens[i]
+            placed = PositionedToken(plain.type, plain.tag, plain.nesting, level=plain.level)
+            placed.map, placed.content = plain.map, str(plain.meta.get("label", ""))
+            state.tokens[i] = placed
+    return True
 
 
-def definition_label(text: str) -> str:
-    """The form of a link label under which its definition is kept."""
-    return normalizeReference(text)
+def _located_reference(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """A link definition; the rows that hold it are kept with it."""
+    known = state.env.setdefault("references", {})
+    count = len(known)
+    if not reference(state, start, end, silent):
+        return False
+    if not silent and len(known) > count:
+        label = next(reversed(known))
+        rows = []
+        for line in range(start, state.line):
+            at = state.bMarks[line] + state.tShift[line]
+            rows.append(SourceSlice(state.src[at : state.eMarks[line]] + "\n", at))
+        definitions: Definitions = state.env["definitions"]
+        definitions.links[label] = Definition(
+            known[label]["href"], known[label]["title"], state.env["base"], rows
+        )
+    return True
+
+
+def _too_deep(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """A paragraph, where containers nest deeper than anybody writes them."""
+    return not silent and state.level >= MAX_NESTING and paragraph(state, start, end, False)
+
+
+def _placed(rule: BlockRule) -> BlockRule:
+    """A rule whose tokens get their places."""
+
+    def run(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+        assert isinstance(state, BlockState)
+        before, begin = len(state.tokens), state.bMarks[start] + state.tShift[start]
+        found = rule(state, start, end, silent)
+        if found and len(state.tokens) > before:
+            _place(state, before, begin)
+        return found
+
+    return run
+
+
+def _place(state: BlockState, before: int, begin: int) -> None:
+    """Say where the block with its first token at `before` stands, while the state still knows."""
+    opened = state.tokens[before]
+    assert isinstance(opened, PositionedToken)
+    last = state.line - 1
+    first = opened.map[0] if opened.map else last
+    while last > first and state.isEmpty(last):
+        last -= 1
+    opened.start, opened.end = begin, state.eMarks[last]
+    if opened.type in ("fence", "code_block", "html_block", "paragraph_open"):
+        opened.rows = state.rows
+    elif opened.type == "heading_open":
+        opened.rows = _atx_row(state, begin) if opened.markup[0] == "#" else state.rows
+    elif opened.type == "table_open":
+        for token in state.tokens[before:]:
+            if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
+                row = token.map[0]
+                token.start = state.bMarks[row] + state.tShift[row]
+                token.end = state.eMarks[row]
+
+
+def _atx_row(state: BlockState, begin: int) -> list[SourceSlice]:
+    """The row that a `#` heading's content is; its rule trims it by itself."""
+    content = state.tokens[-2].content
+    at = state.skipCharsStr(begin, "#")
+    while content and state.src[at] in MD_TRIM_CHARS:
+        at += 1
+    return [SourceSlice(content, at)]
+
+
+def _configured() -> MarkdownIt:
+    """The parser: markdown-it's rules and ours, each with the blocks that it may interrupt."""
+    md = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
+    md.block = ParserBlock()
+    rules = {known.name: (known.fn, known.alt) for known in md.block.ruler.__rules__}
+    interrupts = ["paragraph", "reference", "blockquote"]
+    rules["reference"] = (_located_reference, [])
+    ours: dict[str, tuple[BlockRule, list[str]]] = {
+        "too deep": (_too_deep, []),
+        "math": (math_block, [*interrupts, "list"]),
+        "footnote": (_footnote_definition, interrupts),
+    }
+    md.block.ruler = Ruler()
+    for name, (rule, alt) in (ours | rules).items():
+        md.block.ruler.push(name, _placed(rule), {"alt": alt})
+    # Links with dangerous schemes stay links, so that they can be reported.
+    md.validateLink = lambda url: True  # type: ignore[method-assign]
+    return md
+
+
+_MARKDOWN = _configured()

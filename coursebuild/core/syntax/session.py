@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from coursebuild.core.syntax.block_parser import Definitions
 from coursebuild.core.syntax.footnotes import FootnoteList
 from coursebuild.core.syntax.headings import Anchors
+from coursebuild.core.syntax.markdown import Definitions
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Source
 

@@ -45,9 +45,7 @@ class PositionedToken(Token):
     start: int = -1
     end: int = -1
     rows: Sequence[SourceSlice] = ()
-    """What a block's content was made of."""
-    lines: int = 0
-    """How many lines these are."""
+    """What a block's content was made of, a row a line."""
 
 
 class BlockState(StateBlock):
@@ -56,8 +54,6 @@ class BlockState(StateBlock):
     def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
         super().__init__(src, md, env, [])
         self.rows: Sequence[SourceSlice] = ()
-        self.count = 0
-        """How many lines the rows are."""
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
         """Add a token; that of an item of a list, which has no rule of its own, gets its place."""
@@ -73,20 +69,10 @@ class BlockState(StateBlock):
 
     def getLines(self, begin: int, end: int, indent: int, keepLastLF: bool) -> str:  # noqa: N802
         """The lines from `begin` to `end` without `indent` columns of their indentation."""
-        self.count = max(end - begin, 0)
-        self.rows = rows = self._rows(begin, end, indent, keepLastLF)
-        return rows[0].text if len(rows) == 1 else "".join([row.text for row in rows])
-
-    def _rows(self, begin: int, end: int, indent: int, line_end: bool) -> Sequence[SourceSlice]:
-        if indent <= 0 and begin < end:
-            # What stands together in the text is one row.
-            starts, ends = self.bMarks, self.eMarks
-            if end - begin == 1 or starts[begin + 1 : end] == [
-                at + 1 for at in ends[begin : end - 1]
-            ]:
-                first = starts[begin]
-                return (SourceSlice(self.src[first : ends[end - 1] + line_end], first),)
-        return [self._row(line, indent, line_end or line + 1 < end) for line in range(begin, end)]
+        self.rows = rows = [
+            self._row(line, indent, keepLastLF or line + 1 < end) for line in range(begin, end)
+        ]
+        return "".join([row.text for row in rows])
 
     def _row(self, line: int, indent: int, line_end: bool) -> SourceSlice:
         src, first = self.src, self.bMarks[line]
@@ -151,6 +137,7 @@ class InlineState(StateInline):
             self._prev_delimiters.append(self.delimiters)
             self.delimiters = []
             meta = {"delimiters": self.delimiters}
+            self.mark = self.pos
         self.pendingLevel = self.level
         self.tokens.append(token)
         self.tokens_meta.append(meta)

@@ -36,7 +36,6 @@ from coursebuild.core.model import (
     plain_text,
 )
 from coursebuild.core.syntax.attributes import Braces, read_label
-from coursebuild.core.syntax.block_parser import Definitions
 from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import read_fence
@@ -44,7 +43,7 @@ from coursebuild.core.syntax.footnotes import Written
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
 from coursebuild.core.syntax.html import Balance, html_flow, tags
 from coursebuild.core.syntax.inlines import InlineReader
-from coursebuild.core.syntax.markdown import block_tokens
+from coursebuild.core.syntax.markdown import Definitions, block_tokens
 from coursebuild.core.syntax.recording import (
     is_caption,
     near_caption,

