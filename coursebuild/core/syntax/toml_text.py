@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from bisect import bisect_right
 from typing import TypeAlias
 
 import tree_sitter
@@ -29,12 +28,7 @@ from coursebuild.core.syntax.nodes import (
     ObjectNode,
     StringNode,
 )
-from coursebuild.core.syntax.toml_mistakes import (
-    double_backslash,
-    mistake_of,
-    nesting_mistake,
-    place_of,
-)
+from coursebuild.core.syntax.toml_mistakes import double_backslash, mistake_of, place_of
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Source
@@ -59,13 +53,10 @@ def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode
         assert isinstance(root, ObjectNode)
         return Parsed(root, tuple(reader.diagnostics))
     except RecursionError:
-        mistake = nesting_mistake(body.text)
+        wrong = diagnose(rule, body.span(0, 0), "tables, arrays or keys nest too deep")
     except ValueError as error:
-        if repeated := _repeated_key(body, str(error)):
-            return Parsed(None, (repeated,))
-        mistake = mistake_of(body.text, str(error))
-    span = body.span(mistake.start, mistake.end)
-    return Parsed(None, (diagnose(rule, span, mistake.message, help=mistake.help),))
+        wrong = _repeated_key(body, str(error)) or mistake_of(body, str(error), rule)
+    return Parsed(None, (wrong,))
 
 
 def _body(source: Source) -> Excerpt:
@@ -82,30 +73,19 @@ def _repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
     """The diagnostic for a key or table that is given twice, if that is what `tomllib` says."""
     if not message.startswith(("Cannot", "Duplicate")):
         return None
-    at = place_of(body.text, message)
-    end = body.text.find("\n", at)
+    end = body.text.find("\n", place_of(body.text, message))
     reader = _Reader(body.slice(0, end if end >= 0 else len(body.text)))
     if reader.root.has_error:
         return None
-    try:
-        reader.document(at)
-    except _RepeatedError as error:
-        notes = (Note("the first one is here", error.first.span),)
-        words = f"`{error.key.value}` is given twice"
-        return diagnose("field-repeated", error.key.span, words, notes=notes)
-    return None
+    reader.document()
+    if reader.known is None:
+        return None
+    key, first = reader.known
+    notes = (Note("the first one is here", first.span),)
+    return diagnose("field-repeated", key.span, f"`{key.value}` is given twice", notes=notes)
 
 
-class _RepeatedError(Exception):
-    """A key that stands already."""
-
-    def __init__(self, key: StringNode, first: StringNode) -> None:
-        super().__init__(key.value)
-        self.key = key
-        self.first = first
-
-
-class _Table(Struct):
+class _TableParts(Struct):
     """A table to which more may be added."""
 
     start: int
@@ -114,136 +94,107 @@ class _Table(Struct):
     members: dict[str, tuple[StringNode, _Item]] = field(default_factory=dict)
 
 
-class _Tables(Struct):
+class _TableList(Struct):
     """The tables that share a `[[header]]`."""
 
     start: int
     end: int
     mark_end: int
-    items: list[_Table]
+    items: list[_TableParts]
 
 
-_Item: TypeAlias = _Table | _Tables | Node
+_Item: TypeAlias = _TableParts | _TableList | Node
 
 
 def _node(body: Excerpt, item: _Item) -> Node:
     """A table, when nothing can be added any more."""
-    if isinstance(item, _Table):
+    if isinstance(item, _TableParts):
         members = tuple(Member(key, _node(body, inner)) for key, inner in item.members.values())
         return ObjectNode(body, item.start, item.end, *item.mark, members)
-    if isinstance(item, _Tables):
+    if isinstance(item, _TableList):
         items = tuple(_node(body, table) for table in item.items)
         return ArrayNode(body, item.start, item.end, item.mark_end, items)
     return item
 
 
 class _Reader:
-    """Makes nodes of the syntax tree of a text that is TOML."""
+    """Makes nodes of the syntax tree of a text that is TOML but for keys that are repeated."""
 
     def __init__(self, body: Excerpt) -> None:
         self.body = body
         self.text = body.text
-        encoded = body.text.encode("utf-8", "surrogatepass")
-        self.root = tree_sitter.Parser(_LANGUAGE).parse(encoded).root_node
-        # tree-sitter counts bytes; these are the characters of more than one, where they end.
-        self.wide_ends: list[int] = []
-        self.surplus = [0]
-        for match in _WIDE.finditer(body.text):
-            self.surplus.append(
-                self.surplus[-1] + len(match[0].encode("utf-8", "surrogatepass")) - 1
-            )
-            self.wide_ends.append(match.end() + self.surplus[-1])
+        # Only strings and comments have other characters; with one byte for each, a byte of the
+        # tree is a character of the text.
+        plain = _WIDE.sub("x", body.text).encode()
+        self.root = tree_sitter.Parser(_LANGUAGE).parse(plain).root_node
+        self.known: tuple[StringNode, StringNode] | None = None
+        """The last key of the last statement that stood before, and where it stands first."""
         self.diagnostics: list[Diagnostic] = []
 
-    def document(self, wrong: int | None = None) -> _Table:
-        """The whole text. Raises `_RepeatedError` for the statement that ends at `wrong`."""
-        root = _Table(0, len(self.text), (0, 0))
+    def document(self) -> _TableParts:
+        """The whole text."""
+        root = _TableParts(0, len(self.text), (0, 0))
         for statement in self.root.named_children:
             if statement.type == "pair":
-                self.pair(root, statement, wrong)
+                self.pair(root, statement)
             elif statement.type != "comment":
-                self.table(root, statement, wrong)
+                self.table(root, statement)
         return root
-
-    def offset(self, byte: int) -> int:
-        """The character that begins at a byte."""
-        return byte - self.surplus[bisect_right(self.wide_ends, byte)]
-
-    def span(self, node: tree_sitter.Node) -> tuple[int, int]:
-        return self.offset(node.start_byte), self.offset(node.end_byte)
 
     # ------------------------------------------------------------------------------- statements
 
-    def table(self, root: _Table, statement: tree_sitter.Node, wrong: int | None) -> None:
+    def table(self, root: _TableParts, statement: tree_sitter.Node) -> None:
         """`[name]` or `[[name]]` and the pairs below it."""
         _, name, closing, *rest = statement.children
         pairs = [child for child in rest if child.type == "pair"]
-        lowest = pairs[-1].named_children[1] if pairs else closing
-        start, end = self.offset(statement.start_byte), self.offset(lowest.end_byte)
-        mark = (start, self.offset(closing.end_byte))
-        keys = self.keys(name)
-        if wrong is not None and start < wrong <= mark[1]:
-            self.blame(root, keys)
-        *outer, last = keys
+        start, end = statement.start_byte, closing.end_byte
+        mark = (start, end)
+        if pairs:
+            end = pairs[-1].named_children[1].end_byte
+        self.known = None
+        *outer, last = self.keys(name)
         parent = self.inner(root, outer, end)
-        known = parent.members.get(last.value)
-        table = _Table(start, end, mark)
+        table = _TableParts(start, end, mark)
+        first, item = parent.members.setdefault(last.value, (last, table))
+        if first is not last:
+            self.known = (last, first)
         if statement.type == "table_array_element":
-            if known is None:
-                known = (last, _Tables(start, end, mark[1], []))
-                parent.members[last.value] = known
-            assert isinstance(known[1], _Tables)
-            known[1].items.append(table)
-            known[1].end = end
-        elif known is None:
-            parent.members[last.value] = (last, table)
-        else:  # a table inside it has a header above
+            if first is last:
+                item = _TableList(start, end, mark[1], [])
+                parent.members[last.value] = (last, item)
+            if isinstance(item, _TableList):
+                item.items.append(table)
+                item.end = end
+        elif first is not last:  # a table inside it has a header above
             table = self.inner(parent, [last], end)
             table.mark = mark
         for pair in pairs:
-            self.pair(table, pair, wrong)
+            self.pair(table, pair)
 
-    def pair(self, table: _Table, pair: tree_sitter.Node, wrong: int | None = None) -> None:
+    def pair(self, table: _TableParts, pair: tree_sitter.Node) -> None:
         """`key = value` in a table."""
         name, written = pair.named_children[:2]
-        keys = self.keys(name)
-        end = self.offset(written.end_byte)
+        self.known = None
         value = self.value(written)
-        if wrong == end:
-            self.blame(table, keys)
-        *outer, last = keys
-        table = self.inner(table, outer, end)
-        if last.value in table.members:
-            raise _RepeatedError(last, table.members[last.value][0])
-        table.members[last.value] = (last, value)
+        *outer, last = self.keys(name)
+        table = self.inner(table, outer, written.end_byte)
+        first, _ = table.members.setdefault(last.value, (last, value))
+        if first is not last:
+            self.known = (last, first)
 
-    def inner(self, table: _Table, keys: list[StringNode], end: int) -> _Table:
+    def inner(self, table: _TableParts, keys: list[StringNode], end: int) -> _TableParts:
         """The table to which keys lead, made where it is missing; it reaches to `end`."""
         for key in keys:
-            new = _Table(key.start, key.end, (key.start, key.end))
+            new = _TableParts(key.start, key.end, (key.start, key.end))
             first, item = table.members.setdefault(key.value, (key, new))
-            if isinstance(item, _Tables):
+            if first is not key:
+                self.known = (key, first)
+            if isinstance(item, _TableList):
                 item.end = max(item.end, end)
                 item = item.items[-1]
-            if not isinstance(item, _Table):
-                raise _RepeatedError(key, first)
-            item.end = max(item.end, end)
-            table = item
+            table = item if isinstance(item, _TableParts) else new
+            table.end = max(table.end, end)
         return table
-
-    def blame(self, table: _Table, keys: list[StringNode]) -> None:
-        """Raise for the last of the keys that is known already."""
-        found: _RepeatedError | None = None
-        item: _Item = table
-        for key in keys:
-            if isinstance(item, _Tables):
-                item = item.items[-1]
-            if not isinstance(item, _Table) or key.value not in item.members:
-                break
-            first, item = item.members[key.value]
-            found = _RepeatedError(key, first)
-        if found is not None:
-            raise found
 
     # ------------------------------------------------------------------------------------ values
 
@@ -258,11 +209,11 @@ class _Reader:
     def key(self, node: tree_sitter.Node) -> StringNode:
         if node.type == "quoted_key":
             return self.string(node)
-        start, end = self.span(node)
+        start, end = node.byte_range
         return StringNode(self.body, start, end, self.text[start:end], ((0, start),))
 
     def value(self, node: tree_sitter.Node) -> Node:
-        start, end = self.span(node)
+        start, end = node.byte_range
         match node.type:
             case "string":
                 return self.string(node)
@@ -271,7 +222,7 @@ class _Reader:
                 items = tuple(self.value(child) for child in inner)
                 return ArrayNode(self.body, start, end, start + 1, items)
             case "inline_table":
-                table = _Table(start, end, (start, start + 1))
+                table = _TableParts(start, end, (start, start + 1))
                 for pair in node.named_children:
                     self.pair(table, pair)
                 return _node(self.body, table)
@@ -284,7 +235,7 @@ class _Reader:
                 return DateNode(self.body, start, end)
 
     def string(self, node: tree_sitter.Node) -> StringNode:
-        start, end = self.span(node)
+        start, end = node.byte_range
         quote = self.text[start]
         width = 3 if end - start >= 6 and self.text.startswith(quote * 3, start) else 1
         content = (start + width, end - width)

