@@ -14,6 +14,7 @@ the same: file names may not tell them apart.
 
 from __future__ import annotations
 
+import graphlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -30,11 +31,17 @@ from coursebuild.core.syntax.course_settings import (
 )
 from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.prerequisites import check_prerequisites
 from coursebuild.core.syntax.relations import repeated
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.wording import TOML, short
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Note,
+    Parsed,
+    diagnose,
+    did_you_mean,
+    sort_diagnostics,
+)
 from coursebuild.core.text.source import Source, Span
 
 Structs = Mapping[ObjectNode, Struct]
@@ -59,7 +66,7 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
     ]
     unusable = bool(found)
     found += _check_places(root, decoding.structs)
-    found += check_prerequisites(lessons, _ids(nodes))
+    found += _check_prerequisites(lessons, _ids(nodes))
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(found))
     course = _course(source, root, decoding.value, decoding.structs, levels)
@@ -228,3 +235,53 @@ def _path_problem(path: str) -> str:
     if not path.endswith(".md"):
         return "is no Markdown file: its name ends in `.md`"
     return ""
+
+
+# ---------------------------------------------------------------------------------- prerequisites
+
+
+def _check_prerequisites(lessons: list[Lesson], ids: Iterable[str]) -> Iterator[Diagnostic]:
+    """Unknown and repeated prerequisites, and lessons that require each other in a circle.
+
+    `ids` are those of all lessons, also of those with mistakes in other fields.
+    """
+    known = {lesson.id: lesson for lesson in reversed(lessons)}
+    names = {*known, *ids}
+    for lesson in lessons:
+        pairs = list(zip(lesson.prerequisites, lesson.prerequisite_spans, strict=True))
+        yield from repeated(pairs, "field-value", "the prerequisite `{}` is named twice")
+        for name, span in pairs:
+            if name not in names:
+                message = f"no lesson of the map has the id `{short(name)}`"
+                help = did_you_mean(name, names)
+                yield diagnose("prerequisite-unknown", span, message, help=help)
+    graph = {lesson.id: known[lesson.id].prerequisites for lesson in lessons}
+    while circle := _circle(graph):
+        yield _circle_diagnostic([known[name] for name in circle])
+        graph = {name: graph[name] for name in graph if name not in circle}
+
+
+def _circle(graph: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """Names that require each other in a circle, the first one of the map first; may be empty."""
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        circle: list[str] = error.args[1][:0:-1]
+        first = circle.index(next(name for name in graph if name in circle))
+        return circle[first:] + circle[:first]
+    return []
+
+
+def _circle_diagnostic(circle: list[Lesson]) -> Diagnostic:
+    places = []
+    for lesson, required in zip(circle, [*circle[1:], circle[0]], strict=True):
+        span = lesson.prerequisite_spans[lesson.prerequisites.index(required.id)]
+        places.append(Note(f"{lesson.id} requires {required.id} here", span))
+    span = places[0].span or circle[0].span
+    if len(circle) == 1:
+        message = f"lesson {circle[0].id} requires itself"
+        return diagnose("prerequisite-cycle", span, message, help="remove it")
+    names = " → ".join([*(lesson.id for lesson in circle), circle[0].id])
+    message = f"lessons require each other in a circle: {names}"
+    help = "remove one of these prerequisites"
+    return diagnose("prerequisite-cycle", span, message, help=help, notes=places[1:])

@@ -179,3 +179,21 @@ def test_everything_wrong_is_told_in_one_run_in_order() -> None:
         "21:6-9 field-value: `id` cannot be `A`",
         "22:9-11 field-value: `title` is empty",
     ]
+
+
+def test_a_circle_points_at_each_of_its_steps() -> None:
+    text = LEVEL + lesson("4.1", "4.3") + lesson("4.2", "4.1") + lesson("4.3", "4.2")
+    (found,) = parse(text).diagnostics
+    assert [(n.message, n.span and n.span.line) for n in found.notes] == [
+        ("4.3 requires 4.2 here", 23),
+        ("4.2 requires 4.1 here", 17),
+    ]
+
+
+def test_circles_of_other_lessons_are_reported_in_the_same_run() -> None:
+    pairs = [("4.1", "4.2"), ("4.2", "4.1"), ("4.3", "4.1"), ("4.4", "4.4")]
+    found = parse(LEVEL + "".join(lesson(*pair) for pair in pairs)).diagnostics
+    assert [d.message for d in found] == [
+        "lessons require each other in a circle: 4.1 → 4.2 → 4.1",
+        "lesson 4.4 requires itself",
+    ]
