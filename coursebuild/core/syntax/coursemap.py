@@ -30,8 +30,8 @@ from coursebuild.core.syntax.course_settings import (
     silences,
 )
 from coursebuild.core.syntax.decode import decode
+from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.relations import repeated
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.wording import TOML, short
 from coursebuild.core.text.diagnostics import (

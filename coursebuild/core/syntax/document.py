@@ -6,19 +6,33 @@ Entry point: `parse_document`. It never raises, whatever the text:
 2. `tree` reads the blocks and, with `inlines`, what is in them; fences of ours go to their own
    modules.
 3. Footnotes are read last, in the order of their numbers.
-4. What stands where it must not is found in the whole (`places`).
+4. What stands where it must not is found in the whole (`_misplaced`).
 """
 
 from __future__ import annotations
 
-from coursebuild.core.model import Document
-from coursebuild.core.syntax.places import misplaced
-from coursebuild.core.syntax.session import ParsingState
+from collections.abc import Iterator
+
+from coursebuild.core.model import (
+    Block,
+    Document,
+    Heading,
+    Math,
+    MathBlock,
+    Paragraph,
+    Term,
+    block_inlines,
+    document_blocks,
+    document_inlines,
+    walk_inlines,
+)
+from coursebuild.core.model.equations import blocks_elsewhere
+from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import whole
 from coursebuild.core.syntax.tree import TextReader
-from coursebuild.core.text.diagnostics import Parsed, diagnose, sort_diagnostics
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.patterns import pattern
-from coursebuild.core.text.source import Excerpt, Source
+from coursebuild.core.text.source import Excerpt, Source, Span
 
 _YAML = pattern(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
@@ -40,7 +54,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     blocks = reader.read()
     document = Document(source, blocks, session.notes.finish())
     session.end()
-    session.diagnostics += misplaced(document)
+    session.diagnostics += _misplaced(document)
     return Parsed(document, sort_diagnostics(session.diagnostics))
 
 
@@ -53,3 +67,57 @@ def _without_front_matter(text: Excerpt, session: ParsingState) -> Excerpt:
     help = "its title and all else about it stand in content/course.toml; begin with the text"
     session.report(diagnose("front-matter", text.span(0, 3), message, help=help))
     return text.slice(found.end())
+
+
+_MARKS = ("]{", "{#eq:")
+
+
+def _misplaced(document: Document) -> tuple[Diagnostic, ...]:
+    """Terms and labels that stand where a reader would not find them.
+
+    The glossary shows the sentence around a term, so it is defined in a paragraph. What stands in a
+    quiz, a lab or a heading is shown elsewhere too, so nothing can lead to it.
+    """
+    if not any(mark in document.source.text for mark in _MARKS):
+        return ()
+    elsewhere = blocks_elsewhere(document)
+    found = [*_taken(document)]
+    for block in document_blocks(document):
+        away = id(block) in elsewhere
+        for span in _terms(block) if away or not isinstance(block, Paragraph) else ():
+            message = "a term is not defined here"
+            help = "define it in a paragraph of the text, whose sentence the glossary can show"
+            found.append(diagnose("term-place", span, message, help=help))
+        for span in _labels(block) if away or isinstance(block, Heading) else ():
+            message = "a formula has no label here"
+            help = "label formulas of the text, but not those of quizzes, labs and headings"
+            found.append(diagnose("equation-label", span, message, help=help))
+    return tuple(found)
+
+
+def _taken(document: Document) -> Iterator[Diagnostic]:
+    """Headings whose explicit ids are those of terms."""
+    terms = {
+        inline.anchor: inline.span
+        for inline in document_inlines(document)
+        if isinstance(inline, Term)
+    }
+    for block in document_blocks(document):
+        if isinstance(block, Heading) and block.anchor in terms:
+            notes = [Note("it is that of this term", terms[block.anchor])]
+            message = f"the id `{block.anchor}` is already used"
+            yield diagnose("anchor-repeated", block.span, message, notes=notes)
+
+
+def _terms(block: Block) -> Iterator[Span]:
+    for inline in walk_inlines(block_inlines(block)):
+        if isinstance(inline, Term):
+            yield inline.span
+
+
+def _labels(block: Block) -> Iterator[Span]:
+    if isinstance(block, MathBlock) and block.label is not None:
+        yield block.label.span
+    for inline in walk_inlines(block_inlines(block)):
+        if isinstance(inline, Math) and inline.label is not None:
+            yield inline.label.span

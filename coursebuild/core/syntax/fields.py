@@ -1,6 +1,7 @@
-"""Types of fields that several declarations share.
+"""Types of fields that several declarations share, and checks of how fields hang together.
 
-Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`.
+Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`; `has_value`,
+`one_of`, `repeated`.
 
 What a type adds to its plain Python type stands in `Meta`: bounds and patterns, which the decoder
 and the JSON Schemas both read, and in `extra` two remarks for the decoder alone: `text` ("blocks"
@@ -10,9 +11,15 @@ should have been).
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, TypeAlias
 
-from msgspec import Meta
+from msgspec import Meta, Struct
+
+from coursebuild.core.syntax.nodes import NullNode, ObjectNode
+from coursebuild.core.syntax.wording import short
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, nearest
+from coursebuild.core.text.source import Span
 
 NOT_BLANK = r"\S"
 """The pattern of a text that must say something."""
@@ -41,3 +48,48 @@ Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
 Digits: TypeAlias = Annotated[int, Meta(ge=0, le=15)]
 """Decimal places."""
+
+
+def has_value(node: ObjectNode, name: str) -> bool:
+    """Whether a field is there and is not null."""
+    value = node.get(name)
+    return value is not None and not isinstance(value, NullNode)
+
+
+def one_of(
+    node: ObjectNode, type: type[Struct], names: tuple[str, ...], *, only: bool = True
+) -> Iterator[Diagnostic]:
+    """One of the fields is needed and, with `only`, no more than one is taken."""
+    there = [name for name in names if has_value(node, name)]
+    if not there and not _misspelt(node, type, names):
+        choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
+        yield diagnose("field-missing", node.mark, f"{choice} is missing")
+    if only:
+        for name in there[1:]:
+            first, second = node.member(there[0]), node.member(name)
+            if first is not None and second is not None:
+                yield diagnose(
+                    "field-value",
+                    second.key.span,
+                    f"`{there[0]}` and `{name}` exclude each other",
+                    help="leave one of them out",
+                    notes=(Note("the other one is here", first.key.span),),
+                )
+
+
+def _misspelt(node: ObjectNode, type: type[Struct], names: tuple[str, ...]) -> bool:
+    """Whether an unknown field was surely meant for one of the names: that is reported already."""
+    keys = (member.key.value for member in node.members)
+    return any(nearest(key, names) for key in keys if key not in type.__struct_fields__)
+
+
+def repeated(
+    named: Iterable[tuple[str | float, Span]], rule: str, message: str, *, help: str = ""
+) -> Iterator[Diagnostic]:
+    """Each name that stands there again; `{}` in the message is the name."""
+    first: dict[str | float, Span] = {}
+    for name, span in named:
+        if first.setdefault(name, span) is not span:
+            notes = (Note("the first one is here", first[name]),)
+            text = message.format(short(name) if isinstance(name, str) else f"{name:g}")
+            yield diagnose(rule, span, text, help=help, notes=notes)

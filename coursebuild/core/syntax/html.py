@@ -17,9 +17,8 @@ from html import unescape
 from typing import NamedTuple
 
 from coursebuild.core.model import HtmlFlow, Inline, Math, RawInline
+from coursebuild.core.syntax.links import TextPiece, check_raw_scheme, plain, with_mentions
 from coursebuild.core.syntax.math import find_formula
-from coursebuild.core.syntax.mention import TextPiece, plain, with_mentions
-from coursebuild.core.syntax.targets import check_raw_scheme
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span

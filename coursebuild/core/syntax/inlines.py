@@ -42,12 +42,18 @@ from coursebuild.core.syntax.attributes import Braces, folded, read_label, read_
 from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.syntax.html import Balance, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
+from coursebuild.core.syntax.links import (
+    TextPiece,
+    check_scheme,
+    classify,
+    may_mention,
+    plain,
+    with_mentions,
+)
 from coursebuild.core.syntax.markdown import Definitions
-from coursebuild.core.syntax.mention import TextPiece, may_mention, plain, with_mentions
-from coursebuild.core.syntax.session import ParsingState
+from coursebuild.core.syntax.math import unread_formula
+from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken, locate
-from coursebuild.core.syntax.targets import check_scheme, classify
-from coursebuild.core.syntax.unread_math import unread_formula
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span

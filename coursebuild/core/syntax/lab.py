@@ -38,8 +38,7 @@ from coursebuild.core.syntax.lab_schema import (
     Step,
 )
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
-from coursebuild.core.syntax.prose import Prose
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span

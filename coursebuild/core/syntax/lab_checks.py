@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
+from coursebuild.core.syntax.fields import one_of, repeated
 from coursebuild.core.syntax.lab_schema import Button, Expect, Plot, Select, SimLab, Slider
 from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.relations import one_of, repeated
 from coursebuild.core.syntax.wording import quoted
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 

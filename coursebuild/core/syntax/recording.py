@@ -13,7 +13,7 @@ from decimal import Decimal
 from coursebuild.core.model import Comparison, Inline, Mode, Recording, Table, plain_text
 from coursebuild.core.syntax.fence import Fence, is_ours
 from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
-from coursebuild.core.syntax.session import ParsingState
+from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span

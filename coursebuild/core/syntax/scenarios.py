@@ -2,7 +2,8 @@
 
 Entry point: `parse_declarations(source)`.
 
-1. The TOML is read into nodes, and these into the declared tables.
+1. The TOML is read into nodes, and these into the declared tables, from which the JSON Schema for
+   editors is made too.
 2. What no type can say is checked on every table whose own fields are right: that names differ,
    that a duration is a whole number of samples and a sample one of timesteps, that commands are of
    one length.
@@ -14,10 +15,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Literal
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from coursebuild.core.model.scenarios import (
+    VISIBLE,
+    VISIBLE_ANGLE,
     Bands,
     Declarations,
     DeclaredScenario,
@@ -26,10 +30,10 @@ from coursebuild.core.model.scenarios import (
     Visible,
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
+from coursebuild.core.syntax.course_schema import Slug
 from coursebuild.core.syntax.decode import decode
+from coursebuild.core.syntax.fields import Positive, Text, repeated
 from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode
-from coursebuild.core.syntax.relations import repeated
-from coursebuild.core.syntax.scenario_schema import BenchTable, KeepTable, ModelFile, ScenarioTable
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.wording import TOML, short
 from coursebuild.core.text.diagnostics import (
@@ -47,6 +51,107 @@ MOST_SAMPLES = 100_000
 """Looks at the state in a scenario."""
 _SLACK = 1e-9
 """Relative: decimal fractions are not exact."""
+
+
+# ------------------------------------------------------------------------------------------ tables
+
+BANDS = Bands()
+
+
+class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """From where on an error would be noticed, and what it may differ by."""
+
+    visible: Annotated[
+        Annotated[float, Meta(gt=0, le=1)], Meta(description="share of the model's extent")
+    ] = VISIBLE
+    visible_angle: Annotated[
+        Annotated[float, Meta(gt=0, le=180)], Meta(description="degrees, for attitudes and hinges")
+    ] = VISIBLE_ANGLE
+    band: Annotated[
+        Annotated[float, Meta(gt=0, le=1)],
+        Meta(description="share by which an error may differ from the recorded one"),
+    ] = BANDS.error
+    order_band: Annotated[
+        Annotated[float, Meta(gt=0, le=1)],
+        Meta(description="by how much a fitted order may differ from the recorded one"),
+    ] = BANDS.order
+
+
+class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """What happens to the model: where it begins, how long it takes, what is commanded."""
+
+    name: Annotated[Slug, Meta(description="by which reports call it")]
+    title: Annotated[Text | None, Meta(description="shown over its figures")] = None
+    keyframe: Annotated[
+        Annotated[int, Meta(ge=0)] | Text | None,
+        Meta(description="where it begins, by name or by number from 0"),
+    ] = None
+    qpos: Annotated[
+        tuple[float, ...], Meta(description="positions at the beginning, instead of the keyframe's")
+    ] = ()
+    qvel: Annotated[
+        tuple[float, ...],
+        Meta(description="velocities at the beginning, instead of the keyframe's"),
+    ] = ()
+    duration: Annotated[Positive | None, Meta(description="seconds")] = None
+    sample: Annotated[
+        Positive | None,
+        Meta(description="seconds from one look at the state to the next; timesteps divide it"),
+    ] = None
+    controls: Annotated[
+        tuple[tuple[float, ...], ...],
+        Meta(description="commands one after the other, each a number for every actuator"),
+    ] = ()
+    hold: Annotated[Positive | None, Meta(description="seconds for which each command holds")] = (
+        None
+    )
+    measure: Annotated[
+        Annotated[
+            str,
+            Meta(
+                pattern=r"^(body|site|sensor):\S.*$",
+                extra={"expects": "`body:NAME`, `site:NAME` or `sensor:NAME`"},
+            ),
+        ]
+        | None,
+        Meta(description="what is compared beside coordinates, as in `site:tip`"),
+    ] = None
+    reference: Annotated[
+        Annotated[
+            str,
+            Meta(
+                pattern=r"^(ode|self|closed:\S.*)$",
+                extra={"expects": "`ode`, `self` or `closed:CASE`"},
+            ),
+        ]
+        | None,
+        Meta(description="what errors are measured against, where not whichever fits"),
+    ] = None
+    conserved: Annotated[
+        tuple[Literal["energy", "angular-momentum"], ...] | None,
+        Meta(description="what does not change, where it cannot be told from the model"),
+    ] = None
+    timesteps: Annotated[
+        tuple[Positive, ...], Meta(description="seconds; instead of a ladder about the model's own")
+    ] = ()
+
+
+class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A finding of the scene diet that is wanted as it is."""
+
+    finding: Annotated[Text, Meta(description="as `coursebuild diet` names it")]
+    reason: Annotated[Text, Meta(description="why it stays")]
+
+
+class ModelFile(Struct, frozen=True, forbid_unknown_fields=True):
+    """What is measured on a model, and which findings of the diet are wanted."""
+
+    bench: BenchTable | None = None
+    scenario: tuple[ScenarioTable, ...] = ()
+    keep: tuple[KeepTable, ...] = ()
+
+
+# ----------------------------------------------------------------------------------------- reading
 
 
 def parse_declarations(source: Source) -> Parsed[Declarations | None]:

@@ -17,7 +17,7 @@ from msgspec import Struct
 from coursebuild.core.features import features
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.lab_schema import SimLab, Slider
-from coursebuild.core.syntax.scenario_schema import ModelFile
+from coursebuild.core.syntax.scenarios import ModelFile
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

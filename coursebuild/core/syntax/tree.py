@@ -39,11 +39,11 @@ from coursebuild.core.syntax.attributes import Braces, read_label
 from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import read_fence
-from coursebuild.core.syntax.footnotes import Written
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
 from coursebuild.core.syntax.html import Balance, html_flow, tags
 from coursebuild.core.syntax.inlines import InlineReader
 from coursebuild.core.syntax.markdown import Definitions, block_tokens
+from coursebuild.core.syntax.parsing_state import ParsingState, Written
 from coursebuild.core.syntax.recording import (
     is_caption,
     near_caption,
@@ -53,7 +53,6 @@ from coursebuild.core.syntax.recording import (
     record_fence,
     record_table,
 )
-from coursebuild.core.syntax.session import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, normalized, trimmed
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.text.diagnostics import Parsed, diagnose

@@ -19,12 +19,11 @@ from msgspec.structs import replace
 
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.info import parse_info, read_keys
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
-from coursebuild.core.syntax.prose import Prose
-from coursebuild.core.syntax.relations import repeated
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span

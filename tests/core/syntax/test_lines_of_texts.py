@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Block
-from coursebuild.core.syntax.session import ParsingState
+from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import normalized
 from coursebuild.core.syntax.tree import TextReader, Texts
 from coursebuild.core.text.source import Excerpt, Source
