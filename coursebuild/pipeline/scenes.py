@@ -19,7 +19,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.checks.scenarios import check_scenarios
+from coursebuild.core.checks.compiled import check_scenarios
 from coursebuild.core.files.read import CourseFiles, read_course
 from coursebuild.core.model import Declarations, MjcfModel, Visible
 from coursebuild.core.model.results import CompileResult, ModelFacts

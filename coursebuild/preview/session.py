@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 from msgspec.structs import replace
 
 from coursebuild.core.checks.course import check_document
-from coursebuild.core.checks.links import Places, places
+from coursebuild.core.checks.links import LinkTargets, link_targets
 from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, template_texts
@@ -95,7 +95,7 @@ class Session:
         self._models_of = PerDocument(named_models)
         self._static: dict[str, tuple[Diagnostic, ...]] = {}
         """What reading and checking found, by file."""
-        self._places: Places | None = None
+        self._targets: LinkTargets | None = None
         self._site_paths: dict[str, str] = {}
         """The site paths of lessons and pages, by the path of their file."""
         self._results = Results((), (), (), (), python_version(), engine_version())
@@ -190,8 +190,8 @@ class Session:
 
     def _check(self, document: Document) -> tuple[Diagnostic, ...]:
         """What is wrong in a document, given the others."""
-        assert self.course is not None and self._places is not None
-        return check_document(self.course, document, self._places)
+        assert self.course is not None and self._targets is not None
+        return check_document(self.course, document, self._targets)
 
     def take_others(self) -> None:
         """Take saves of other files."""
@@ -257,7 +257,7 @@ class Session:
             labs=self._placed_labs(course),
             models_of=self._models_of,
         )
-        self._places = places(course, library.scripts)
+        self._targets = link_targets(course)
         self._site_paths = {
             **{entry.path: urls.lesson_path(entry) for entry in course.lessons},
             **{page.path: urls.page_path(page) for page in course.pages},

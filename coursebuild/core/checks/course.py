@@ -5,46 +5,51 @@ Entry points: `check_course`; `check_document`, the same for one document.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.core.checks.benches import bench_findings
 from coursebuild.core.checks.labs import lab_findings
-from coursebuild.core.checks.lessons import lesson_findings
-from coursebuild.core.checks.links import (
-    Places,
-    defined_terms,
-    document_links,
-    places,
-    remembered_anchors,
-)
-from coursebuild.core.checks.terms import term_findings
+from coursebuild.core.checks.links import LinkTargets, document_links, link_targets
 from coursebuild.core.features import features
-from coursebuild.core.model import Course, Document, Script, document_blocks
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.model import (
+    Block,
+    Course,
+    Document,
+    Status,
+    Term,
+    block_inlines,
+    document_blocks,
+    is_blank,
+    walk_inlines,
+)
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
     """Lessons, links, mentions, labs, terms and features, checked against each other."""
-    scripts: dict[str, bool] = {}
-    terms: dict[str, Span] = {}
-    for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, Script):
-                scripts[block.path] = block.norun
-        for id, span in defined_terms(document).items():
-            terms.setdefault(id, span)
-    known = places(course, scripts, terms)
-    anchors_of = remembered_anchors()
-    found: list[Diagnostic] = []
-    for document in course.documents:
-        blocks = tuple(document_blocks(document))
-        found += lesson_findings(course, document, blocks)
-        found += document_links(course, document, known, anchors_of)
-        found += lab_findings(blocks, course)
-        found += bench_findings(blocks, course)
-        found += term_findings(blocks, known.terms)
-    return (*found, *feature_findings(course, course.documents))
+    targets, documents = link_targets(course), course.documents
+    found = [wrong for one in documents for wrong in _document_findings(course, one, targets)]
+    return (*found, *feature_findings(course, documents))
+
+
+def check_document(
+    course: Course, document: Document, targets: LinkTargets
+) -> tuple[Diagnostic, ...]:
+    """What `check_course` finds in one document, given what the rest of the course offers."""
+    own = _document_findings(course, document, targets)
+    return (*own, *feature_findings(course, (document,)))
+
+
+def _document_findings(
+    course: Course, document: Document, targets: LinkTargets
+) -> Iterator[Diagnostic]:
+    blocks = tuple(document_blocks(document))
+    yield from _lesson_findings(course, document, blocks)
+    yield from document_links(course, document, targets)
+    yield from lab_findings(blocks, course)
+    yield from bench_findings(blocks, course)
+    yield from _term_findings(blocks, targets.terms)
 
 
 def feature_findings(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
@@ -54,9 +59,41 @@ def feature_findings(course: Course, documents: Iterable[Document]) -> Iterator[
             yield from feature.check(course, documents)
 
 
-def check_document(course: Course, document: Document, known: Places) -> tuple[Diagnostic, ...]:
-    """What `check_course` finds in one document, given what the rest of the course offers."""
-    blocks = tuple(document_blocks(document))
-    whole = (*lesson_findings(course, document, blocks), *document_links(course, document, known))
-    own = (*bench_findings(blocks, course), *term_findings(blocks, known.terms))
-    return (*whole, *lab_findings(blocks, course), *own, *feature_findings(course, (document,)))
+def _lesson_findings(
+    course: Course, document: Document, blocks: Iterable[Block]
+) -> tuple[Diagnostic, ...]:
+    """A lesson that is said to be complete and shows nothing; `blocks` are the document's.
+
+    A draft says itself that there is more to come.
+    """
+    if not is_blank(blocks):
+        return ()
+    source = document.source
+    return tuple(
+        diagnose(
+            "lesson-empty",
+            source.span(0, 0),
+            f"lesson {lesson.id} is complete, and there is nothing to read in {source.path}",
+            help='write it, say `status = "draft"` in the map, '
+            'or say `status = "planned"` and remove the file',
+        )
+        for lesson in course.lessons
+        if lesson.document is document and lesson.status is Status.COMPLETE
+    )
+
+
+def _term_findings(blocks: Iterable[Block], known: Mapping[str, Span]) -> tuple[Diagnostic, ...]:
+    """Terms that are defined elsewhere as well; `known` says where each is defined first."""
+    found: list[Diagnostic] = []
+    for inline in walk_inlines(tuple(i for block in blocks for i in block_inlines(block))):
+        if not isinstance(inline, Term):
+            continue
+        first = known.get(inline.id)
+        if first is None or (first.path, first.start) == (inline.span.path, inline.span.start):
+            continue
+        message = f"the term `{inline.id}` is defined twice"
+        help = "leave one definition, and link to it from here: "
+        help += f'`[…](term:{inline.id})`; or name this one by `{{term="…"}}`'
+        notes = [Note("the first one is here", first)]
+        found.append(diagnose("term-repeated", inline.span, message, help=help, notes=notes))
+    return tuple(found)

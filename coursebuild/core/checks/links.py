@@ -1,6 +1,6 @@
 """Links and mentions of the sources: every one leads somewhere.
 
-Entry points: `places(course)`; `document_links`, for one document.
+Entry points: `link_targets(course)`; `document_links`, for one document.
 
 1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
    each document.
@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import TypeAlias, assert_never
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.checks.model_places import model_place
 from coursebuild.core.model import (
     Course,
     Document,
@@ -42,10 +41,12 @@ from coursebuild.core.model import (
     block_inlines,
     document_blocks,
     document_inlines,
+    document_scripts,
     line_anchor,
     linked_lines,
     listing_anchor,
     local_file,
+    model_anchors,
     output_anchor,
     resolve,
     walk_inlines,
@@ -55,7 +56,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
-AnchorsOf: TypeAlias = Callable[[Document], frozenset[str]]
 _Name: TypeAlias = (
     LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
 )
@@ -64,7 +64,7 @@ _HTML_ID = pattern(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
 _HTML_ANCHOR = pattern(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
 
 
-class Places(Struct, frozen=True):
+class LinkTargets(Struct, frozen=True):
     """Everything that a link may lead to."""
 
     lessons: Mapping[str, Document | None]
@@ -79,19 +79,16 @@ class Places(Struct, frozen=True):
     """Where each is defined, by its id; of two places the first."""
 
 
-def places(
-    course: Course,
-    scripts: Iterable[str] | None = None,
-    terms: Mapping[str, Span] | None = None,
-) -> Places:
-    """What the course offers as targets; `scripts` are their paths, where they are known.
-
-    So are `terms`: where each is defined.
-    """
-    if scripts is None:
-        blocks = (block for document in course.documents for block in document_blocks(document))
-        scripts = (block.path for block in blocks if isinstance(block, Script))
-    return Places(
+def link_targets(course: Course) -> LinkTargets:
+    """What the course offers as targets."""
+    scripts: set[str] = set()
+    terms: dict[str, Span] = {}
+    for document in course.documents:
+        scripts.update(script.path for script in document_scripts(document))
+        for inline in document_inlines(document):
+            if isinstance(inline, Term):
+                terms.setdefault(inline.id, inline.span)
+    return LinkTargets(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),
         {page.id: page.document for page in course.pages},
@@ -99,33 +96,23 @@ def places(
         {d.model: tuple(one.name for one in d.scenarios) for d in course.declarations},
         frozenset(scripts),
         frozenset(course.files),
-        _all_terms(course.documents) if terms is None else terms,
+        terms,
     )
-
-
-def _all_terms(documents: Iterable[Document]) -> dict[str, Span]:
-    found: dict[str, Span] = {}
-    for document in documents:
-        for id, span in defined_terms(document).items():
-            found.setdefault(id, span)
-    return found
-
-
-def defined_terms(document: Document) -> dict[str, Span]:
-    """The terms that a document defines, and where first."""
-    found: dict[str, Span] = {}
-    for inline in document_inlines(document):
-        if isinstance(inline, Term):
-            found.setdefault(inline.id, inline.span)
-    return found
 
 
 def anchors(document: Document) -> frozenset[str]:
     """The ids that a link may name in a document.
 
     Headings, quizzes, listings, outputs, formulas, terms, and ids written in raw HTML; of lines,
-    see `_is_line`.
+    see `_is_line`. Each lookup after the first finds what was kept with the document.
     """
+    known: frozenset[str] | None = document.__dict__.get("anchors")
+    if known is None:
+        known = document.__dict__["anchors"] = frozenset(_anchors(document))
+    return known
+
+
+def _anchors(document: Document) -> set[str]:
     outputs: dict[str, int] = {}
     lexicon = document.lexicon
     found = {*equation_ids(document)} if lexicon is None else {e.id for e in lexicon.equations}
@@ -146,7 +133,7 @@ def anchors(document: Document) -> frozenset[str]:
                 found.update(_HTML_ID.findall(inline.html))
             elif isinstance(inline, Term):
                 found.add(inline.anchor)
-    return frozenset(found)
+    return found
 
 
 def _is_line(anchor: str, document: Document) -> bool:
@@ -159,8 +146,8 @@ def _listing(anchor: str, document: Document) -> Script | None:
     """The script of a document of which an anchor names lines, whether it has them or not."""
     if (lines := linked_lines(anchor)) is None:
         return None
-    scripts = (block for block in document_blocks(document) if isinstance(block, Script))
     wanted = f"{lines[0]}.L{lines[1]}"
+    scripts = document_scripts(document)
     return next((s for s in scripts if line_anchor(s.path, lines[1]) == wanted), None)
 
 
@@ -168,44 +155,29 @@ def _length(script: Script) -> int:
     return script.code.text.rstrip("\n").count("\n") + 1
 
 
-def remembered_anchors() -> AnchorsOf:
-    """`anchors`, by the path of the document."""
-    known_anchors: dict[str, frozenset[str]] = {}
-
-    def anchors_of(document: Document) -> frozenset[str]:
-        path = document.source.path
-        if path not in known_anchors:
-            known_anchors[path] = anchors(document)
-        return known_anchors[path]
-
-    return anchors_of
-
-
-def document_links(
-    course: Course, document: Document, known: Places, anchors_of: AnchorsOf = anchors
-) -> Iterator[Diagnostic]:
+def document_links(course: Course, document: Document, known: LinkTargets) -> Iterator[Diagnostic]:
     """A diagnostic for each link, mention or image of a document that leads nowhere.
 
     `known` is what the course offers.
     """
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
-            yield from _check_html(block.span, document, anchors_of)
+            yield from _check_html(block.span, document)
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, Link):
                 target = resolve(inline.target, course, document.source.path)
-                yield from _check_link(inline, target, document, known, anchors_of)
+                yield from _check_link(inline, target, document, known)
             elif isinstance(inline, Image):
                 yield from _check_image(inline, document, known)
             elif isinstance(inline, RawInline):
-                yield from _check_html(inline.span, document, anchors_of)
+                yield from _check_html(inline.span, document)
 
 
-def _check_html(span: Span, document: Document, anchors_of: AnchorsOf) -> Iterator[Diagnostic]:
+def _check_html(span: Span, document: Document) -> Iterator[Diagnostic]:
     """Links of raw HTML to anchors of its own page."""
     for link in _HTML_ANCHOR.finditer(span.text):
         place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
-        yield from _anchor(place, link[1][1:], document, "this page", anchors_of)
+        yield from _anchor(place, link[1][1:], document, "this page")
 
 
 class _Named(Struct, frozen=True):
@@ -219,11 +191,11 @@ class _Named(Struct, frozen=True):
 
 
 def _check_link(
-    link: Link, target: Target, document: Document, known: Places, anchors_of: AnchorsOf
+    link: Link, target: Target, document: Document, known: LinkTargets
 ) -> Iterator[Diagnostic]:
     span = link.target_span
     if isinstance(target, UrlTarget):
-        yield from _check_url(span, target.url, document, known, anchors_of)
+        yield from _check_url(span, target.url, document, known)
         return
     named = _named(link, target, known)
     if named.name not in named.among:
@@ -231,16 +203,16 @@ def _check_link(
         yield diagnose(named.rule, span, named.missing, help=help)
     elif isinstance(target, ModelTarget):
         declared = known.scenarios.get(target.name, ())
-        yield from model_place(span, target.anchor, known.models[target.name], declared)
+        yield from _model_place(span, target.anchor, known.models[target.name], declared)
     elif isinstance(target, LessonTarget):
         to, where = known.lessons[target.id], f"lesson {target.id}"
-        yield from _anchor(span, target.anchor, to, where, anchors_of)
+        yield from _anchor(span, target.anchor, to, where)
     elif isinstance(target, PageTarget):
         to, where = known.pages[target.id], f"page `{target.id}`"
-        yield from _anchor(span, target.anchor, to, where, anchors_of)
+        yield from _anchor(span, target.anchor, to, where)
 
 
-def _named(link: Link, target: _Name, known: Places) -> _Named:
+def _named(link: Link, target: _Name, known: LinkTargets) -> _Named:
     map_lacks = (
         f"is {'mentioned' if link.mention else 'linked to'}, and the course map does not have it"
     )
@@ -263,7 +235,7 @@ def _named(link: Link, target: _Name, known: Places) -> _Named:
 
 
 def _anchor(
-    span: Span, anchor: str | None, document: Document | None, where: str, anchors_of: AnchorsOf
+    span: Span, anchor: str | None, document: Document | None, where: str
 ) -> Iterator[Diagnostic]:
     if not anchor:
         return
@@ -275,7 +247,7 @@ def _anchor(
             help="link to the lesson itself",
         )
         return
-    known = anchors_of(document)
+    known = anchors(document)
     name = unquote(anchor)
     if name in known or _is_line(name, document):
         return
@@ -289,7 +261,7 @@ def _anchor(
 
 
 def _check_url(
-    span: Span, url: str, document: Document, known: Places, anchors_of: AnchorsOf
+    span: Span, url: str, document: Document, known: LinkTargets
 ) -> Iterator[Diagnostic]:
     parts = urlsplit_or_none(url)
     if parts is None:
@@ -298,14 +270,14 @@ def _check_url(
     if parts.scheme or parts.netloc:
         return
     if not parts.path:
-        yield from _anchor(span, parts.fragment or None, document, "this page", anchors_of)
+        yield from _anchor(span, parts.fragment or None, document, "this page")
         return
     path = local_file(url, document.source.path)
     if path not in known.files:
         yield diagnose("link-file", span, f"no file `{path}`", help=_file_help(path, known))
 
 
-def _file_help(path: str, known: Places) -> str:
+def _file_help(path: str, known: LinkTargets) -> str:
     name = posixpath.basename(path)
     if name.endswith(".md"):
         return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
@@ -318,7 +290,7 @@ def _file_help(path: str, known: Places) -> str:
     )
 
 
-def _check_image(image: Image, document: Document, known: Places) -> Iterator[Diagnostic]:
+def _check_image(image: Image, document: Document, known: LinkTargets) -> Iterator[Diagnostic]:
     parts = urlsplit_or_none(image.url)
     if parts is None or parts.scheme or parts.netloc:
         yield diagnose(
@@ -341,3 +313,29 @@ def urlsplit_or_none(url: str) -> SplitResult | None:
         return urlsplit(url)
     except ValueError:
         return None
+
+
+def _model_place(
+    span: Span, anchor: str | None, model: MjcfModel, scenarios: Collection[str]
+) -> Iterator[Diagnostic]:
+    """What is wrong with an anchor behind `model:NAME`, if anything.
+
+    The ids are those that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
+    declares have one: of others nobody knows before they are measured.
+    """
+    if not anchor:
+        return
+    name, path = unquote(anchor), model.source.path
+    known = {*model_anchors(scenarios), listing_anchor(path)}
+    if name in known:
+        return
+    lines = linked_lines(name)
+    if lines is None or line_anchor(path, lines[1]) != f"{lines[0]}.L{lines[1]}":
+        help = did_you_mean(name, known)
+    else:
+        last = model.source.text.rstrip().count("\n") + 1
+        if lines[2] <= last:
+            return
+        help = f"the last line of `{path}` is {last}"
+    message = f"the page of the model `{model.name}` has no anchor `#{anchor}`"
+    yield diagnose("link-anchor", span, message, help=help)

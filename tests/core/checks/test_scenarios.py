@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.checks.scenarios import check_scenarios
+from coursebuild.core.checks.compiled import check_scenarios
 from support.made_courses import facts, make_course, said, told
 
 MODEL = facts(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.checks.course import check_course, check_document
-from coursebuild.core.checks.links import places
+from coursebuild.core.checks.links import link_targets
 from coursebuild.core.model import Course, Document
 from support.made_courses import make_course, told
 
@@ -64,7 +64,7 @@ def test_one_document_is_checked_as_in_the_whole_course() -> None:
     one_by_one = [
         line
         for document in course.documents
-        for line in told(check_document(course, document, places(course)))
+        for line in told(check_document(course, document, link_targets(course)))
     ]
     assert sorted(one_by_one) == sorted(told(check_course(course)))
     assert len(one_by_one) == 8
