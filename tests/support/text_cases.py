@@ -1,0 +1,42 @@
+"""Fixtures of texts that are wrong: each line of an input is one text, as a string of Python.
+
+Entry point: `check_texts`. In the expected part stands below each text what its author is told.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from coursebuild.core.text.diagnostics import Diagnostic
+from support.fixture_cases import read_cases, rewrite
+from support.positioned_nodes import shown
+
+FOLDER = Path(__file__).parents[1] / "fixtures" / "texts"
+
+Reader = Callable[[str], tuple[object, tuple[Diagnostic, ...]]]
+"""From a text to what is made of it all the same, if anything, and what its author is told."""
+
+
+def check_texts(name: str, read: Reader, *, rewriting: bool) -> None:
+    path = FOLDER / f"{name}.md"
+    cases = read_cases(path)
+    found = [replace(case, expected=_told(case.input, read)) for case in cases]
+    if rewriting:
+        rewrite(path, found)
+        return
+    for case, now in zip(cases, found, strict=True):
+        assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
+
+
+def _told(texts: str, read: Reader) -> str:
+    lines = []
+    for line in texts.splitlines():
+        value, diagnostics = read(ast.literal_eval(line))
+        lines += [line, *(f"  {one}" for one in shown(diagnostics))]
+        if value is not None:
+            lines.append("  and it is read")
+    return "".join(f"{line}\n" for line in lines)
