@@ -53,7 +53,7 @@ from coursebuild.core.syntax.recording import (
     record_fence,
     record_table,
 )
-from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, normalized, trimmed
+from coursebuild.core.syntax.spans import PositionedToken, locate, normalized, trimmed
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
@@ -322,11 +322,6 @@ _READERS: dict[str, Callable[[TextReader, PositionedToken], Block | None]] = {
 }
 
 
-def _is_line(text: str) -> bool:
-    """Whether a text is one line, and no mark of a block stands at its beginning."""
-    return text[:1].isalpha() and "\n" not in text
-
-
 class Texts:
     """Markdown inside quizzes, labs and io blocks (a `TextParser`)."""
 
@@ -336,28 +331,19 @@ class Texts:
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
         base = normalized(excerpt)
-        if not _is_line(base.text):
-            return self._session.apart(lambda: self._text(base))
-        # A line that can only be a paragraph: nothing else is looked for.
-        content = trimmed(locate(base, [SourceSlice(base.text, 0)]))
-        inlines = self._inlines(base, content)
-        paragraph = Paragraph(content.span(), inlines.value)
-        return Parsed((paragraph,), inlines.diagnostics)
+        return self._session.apart(
+            lambda: TextReader(base, self._session, self._definitions(), nested=True).read()
+        )
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
         """The inlines of a text that is one paragraph at most."""
         content = trimmed(normalized(excerpt))
-        return self._inlines(content, content)
+        return self._session.apart(lambda: self._read_inlines(content))
 
-    def _text(self, base: Excerpt) -> tuple[Block, ...]:
-        return TextReader(base, self._session, self._definitions(), nested=True).read()
-
-    def _inlines(self, base: Excerpt, content: Excerpt) -> Parsed[tuple[Inline, ...]]:
-        return self._session.apart(lambda: self._marked(base, content))
-
-    def _marked(self, base: Excerpt, content: Excerpt) -> tuple[Inline, ...]:
+    def _read_inlines(self, content: Excerpt) -> tuple[Inline, ...]:
         balance = Balance(self._session.report)
-        inlines = InlineReader(base, self._definitions(), self._session, balance).read(content)
+        reader = InlineReader(content, self._definitions(), self._session, balance)
+        inlines = reader.read(content)
         balance.finish()
         return inlines
 

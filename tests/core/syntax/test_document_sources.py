@@ -165,7 +165,7 @@ NESTED = [("[", "]"), ("[", "](u)"), ("![", "](u)"), ("*a ", "b*")]
 def test_work_grows_in_proportion_to_repeated_pieces() -> None:
     faster = []
     for piece in REPEATED:
-        size = 1000 // len(piece)
+        size = 500 // len(piece)
         calls(piece)
         once, twice = calls(piece * size), calls(piece * (2 * size))
         if twice >= 2.2 * once + 400:
