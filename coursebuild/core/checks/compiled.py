@@ -31,10 +31,9 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
-_PART = pattern(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
+_PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
 class MjcfText(Struct, frozen=True):

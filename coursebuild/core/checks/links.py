@@ -53,15 +53,14 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.equations import equation_ids
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
 _Name: TypeAlias = (
     LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
 )
 
-_HTML_ID = pattern(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
-_HTML_ANCHOR = pattern(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
+_HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+_HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
 
 
 class LinkTargets(Struct, frozen=True):

@@ -15,7 +15,6 @@ from urllib.parse import unquote, urlsplit
 
 from coursebuild.core.model.course import Course
 from coursebuild.core.model.inlines import LessonTarget, PageTarget, Target, UrlTarget
-from coursebuild.core.text.patterns import pattern
 
 
 def local_file(url: str, document_path: str) -> str:
@@ -77,7 +76,7 @@ def scenario_anchor(name: str) -> str:
     return f"measured-{name}"
 
 
-_LINES = pattern(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-9][0-9]{0,8}))?")
+_LINES = re.compile(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-9][0-9]{0,8}))?")
 
 
 def linked_lines(anchor: str) -> tuple[str, int, int] | None:

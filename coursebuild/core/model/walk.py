@@ -6,6 +6,7 @@ Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_b
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -26,13 +27,12 @@ from coursebuild.core.model.blocks import (
 )
 from coursebuild.core.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong, Term
 from coursebuild.core.model.interactive import Lab
-from coursebuild.core.text.patterns import pattern
 
 _HOLDERS = (BlockQuote, Callout, ListBlock, Lab, FeatureBlock, Recording)
 """Blocks that may have others in them."""
 _AROUND = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
 """Inlines that may have others in them."""
-_COMMENTS = pattern(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
+_COMMENTS = re.compile(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
 
 
 def child_blocks(block: Block) -> tuple[Block, ...]:

@@ -16,17 +16,16 @@ from msgspec import Struct
 
 from coursebuild.core.model import Label, Meaning
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt
 
 Report = Callable[[Diagnostic], None]
 
-_TERM = pattern(r"\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}(\}?)", re.I)
-_SYMBOL = pattern(r"\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units)\b[^{}]{0,400}(\}?)", re.I)
-_LABEL = pattern(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
-_PAIR = pattern(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_ID = pattern(r"\{#(eq:[\w-]+)\}")
-_SPACES = pattern(r"\s+")
+_TERM = re.compile(r"\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}(\}?)", re.I)
+_SYMBOL = re.compile(r"\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units)\b[^{}]{0,400}(\}?)", re.I)
+_LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
+_PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
+_ID = re.compile(r"\{#(eq:[\w-]+)\}")
+_SPACES = re.compile(r"\s+")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` where the glossary is to say it otherwise'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'

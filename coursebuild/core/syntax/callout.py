@@ -7,16 +7,16 @@ Entry points: `read_head` (what the first line says), `resolve` (the kind that i
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 
 from msgspec import Struct
 
 from coursebuild.core.syntax.spans import trimmed
 from coursebuild.core.text.diagnostics import Parsed, diagnose, did_you_mean
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
-_HEAD = pattern(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
+_HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 FALLBACK = "note"
 """What a callout of an unknown kind is read as, so that all in it is still checked."""
 

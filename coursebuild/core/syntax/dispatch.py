@@ -24,7 +24,6 @@ from coursebuild.core.syntax.recording import stray_keys
 from coursebuild.core.syntax.script import parse_python
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
-from coursebuild.core.text.patterns import pattern
 
 _HEAD_RULES = frozenset(
     {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
@@ -127,7 +126,7 @@ def _nested(fence: Fence, session: ParsingState) -> CodeBlock:
     return fence.code()
 
 
-_ELEMENTS = pattern(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
+_ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
 def _parse_mjcf(fence: Fence) -> Parsed[Mjcf | CodeBlock]:

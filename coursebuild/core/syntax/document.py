@@ -11,6 +11,7 @@ Entry point: `parse_document`. It never raises, whatever the text:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from coursebuild.core.model import (
@@ -31,15 +32,14 @@ from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import whole
 from coursebuild.core.syntax.tree import TextReader
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Source, Span
 
-_YAML = pattern(
+_YAML = re.compile(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
     r"[\w-]+[ \t]*:(?:[ \t].*)?\n"  # the first field
     r"(?:.*\n)*?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
 )
-_TOML = pattern(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
+_TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 
 
 def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:

@@ -17,11 +17,10 @@ from collections.abc import Callable, Iterable, Iterator
 
 from coursebuild.core.syntax.nodes import StringNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt
 
-_LETTERS = pattern(r"[A-Za-z]+")
-_DOLLARS = pattern(r"(?<!\\)\$+")
+_LETTERS = re.compile(r"[A-Za-z]+")
+_DOLLARS = re.compile(r"(?<!\\)\$+")
 
 _COMMANDS = frozenset(
     re.findall(

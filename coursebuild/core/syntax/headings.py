@@ -14,14 +14,13 @@ from msgspec import Struct, field
 
 from coursebuild.core.model import Image, Inline, plain_text, walk_inlines
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
-_CANDIDATE = pattern(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
-_ID = pattern(r"#[\w:.-]*[\w:-]|#\w")
-_CLASS = pattern(r"\.[A-Za-z_][\w-]*")
-_NO_SLUG = pattern(r"[^\w\s-]")
-_SPACES = pattern(r"\s")
+_CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
+_ID = re.compile(r"#[\w:.-]*[\w:-]|#\w")
+_CLASS = re.compile(r"\.[A-Za-z_][\w-]*")
+_NO_SLUG = re.compile(r"[^\w\s-]")
+_SPACES = re.compile(r"\s")
 _HELP = (
     "write `{#id}`, `{.class}` or `{#id .class}`, "
     "of letters, digits, `-` and `_`, and in an id also `:` and `.`"

@@ -20,7 +20,6 @@ from coursebuild.core.model import HtmlFlow, Inline, Math, RawInline
 from coursebuild.core.syntax.links import TextPiece, check_raw_scheme, plain, with_mentions
 from coursebuild.core.syntax.math import find_formula
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
@@ -32,10 +31,12 @@ _RAW_TEXT = frozenset("script style textarea title".split())
 _LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
 
-_TAG = pattern(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
-_LINK = pattern(r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE)
-_PIECE = pattern(r"\\\$|\$|<")
-_ENTITY = pattern(r"&[^\s&;]{1,32};")
+_TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
+_LINK = re.compile(
+    r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE
+)
+_PIECE = re.compile(r"\\\$|\$|<")
+_ENTITY = re.compile(r"&[^\s&;]{1,32};")
 
 
 class Tag(NamedTuple):

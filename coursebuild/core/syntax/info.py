@@ -16,14 +16,13 @@ from msgspec import Struct
 
 from coursebuild.core.syntax.spans import joined
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
-_WORD = pattern(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
-_SPACED = pattern(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
-_SPACES = pattern(r"\s*")
-_NEXT_SPACE = pattern(r"\s|$")
-_ESCAPE = pattern(r"""\\(["\\])""")
+_WORD = re.compile(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
+_SPACED = re.compile(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
+_SPACES = re.compile(r"\s*")
+_NEXT_SPACE = re.compile(r"\s|$")
+_ESCAPE = re.compile(r"""\\(["\\])""")
 
 
 class Word(Struct, frozen=True):

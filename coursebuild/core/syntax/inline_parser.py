@@ -6,6 +6,7 @@ get their places in the text.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import cast
 
@@ -33,7 +34,6 @@ from markdown_it.utils import EnvType
 from coursebuild.core.syntax.attributes import Braces
 from coursebuild.core.syntax.math import math_inline
 from coursebuild.core.syntax.spans import InlineState, PositionedToken
-from coursebuild.core.text.patterns import pattern
 
 MAX_NESTING = 20
 """Brackets inside each other that may still become links and images."""
@@ -63,8 +63,8 @@ def _emphasis(state: StateInline, silent: bool) -> bool:
     return True
 
 
-_BRACE = pattern(r"\{\s*([A-Za-z]{2,20})")
-_BINDING = pattern(r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}""")
+_BRACE = re.compile(r"\{\s*([A-Za-z]{2,20})")
+_BINDING = re.compile(r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}""")
 
 
 def _like_out(key: str) -> bool:
@@ -93,7 +93,7 @@ def _code_span(state: StateInline, silent: bool) -> bool:
     return True
 
 
-_FOOTNOTE = pattern(r"\[\^([^\s\[\]]+)\]")
+_FOOTNOTE = re.compile(r"\[\^([^\s\[\]]+)\]")
 
 
 def _footnote_reference(state: StateInline, silent: bool) -> bool:
@@ -159,7 +159,7 @@ _RULES: dict[str, tuple[InlineRule, ...]] = {
     "&": (entity,),
     "$": (math_inline,),
 }
-_STOP = pattern(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
+_STOP = re.compile(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
 """Where text ends; a `!` is nothing without a bracket."""
 
 

@@ -55,7 +55,6 @@ from coursebuild.core.syntax.math import unread_formula
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken, locate
 from coursebuild.core.text.diagnostics import diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
@@ -65,8 +64,8 @@ _UNREAD = (
     "in `$x$` no blank stands inside the dollar signs, no digit follows the last one, and no line "
     "of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
 )
-_BRACES = pattern(r"\{[^}\s]{0,60}\}?")
-_DEFINED = pattern(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
+_BRACES = re.compile(r"\{[^}\s]{0,60}\}?")
+_DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
 class _Frame(Struct):

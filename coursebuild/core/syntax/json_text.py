@@ -29,21 +29,20 @@ from coursebuild.core.syntax.nodes import (
 )
 from coursebuild.core.syntax.wording import short
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 64
 """How deep objects and arrays may nest: far more than a person writes, far less than the
 interpreter's stack."""
 
-_SPACE = pattern(r"[ \t\n\r]*")
-_COMMENT = pattern(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
-_WORD = pattern(r"[^\W\d][\w$]*")
-_SCALAR = pattern(r"[^\W\d][\w$]*|[-+.0-9][-+.\w]*")
-_NUMBER = pattern(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_KEY = pattern(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
-_STRING = pattern(r'"((?:[^"\\\n]|\\.)*)"')
-_ESCAPE = pattern(
+_SPACE = re.compile(r"[ \t\n\r]*")
+_COMMENT = re.compile(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_WORD = re.compile(r"[^\W\d][\w$]*")
+_SCALAR = re.compile(r"[^\W\d][\w$]*|[-+.0-9][-+.\w]*")
+_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+_KEY = re.compile(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
+_STRING = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
+_ESCAPE = re.compile(
     r"\\u[Dd][89ABab][0-9A-Fa-f]{2}\\u[Dd][C-Fc-f][0-9A-Fa-f]{2}"
     r"|\\u[0-9A-Fa-f]{4}|\\.|[\x00-\x1f\ud800-\udfff]"
 )

@@ -33,12 +33,11 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
-_SCHEME = pattern(r"([A-Za-z][A-Za-z0-9+.-]*):")
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
 _FORBIDDEN = frozenset({"data", "file", "javascript", "vbscript"})
-_PICTURE = pattern(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
+_PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
 _OURS = ("lesson", "model", "page", "term")
 
 
@@ -97,11 +96,11 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+"
 _LEVEL = r"[0-9]+(?:\.[0-9]+)*"
-_FIRST = pattern(rf"(?<![\w\\])(?:(Lessons?)\s+({_LESSON})|(Levels?)\s+({_LEVEL}))(?!\w)")
+_FIRST = re.compile(rf"(?<![\w\\])(?:(Lessons?)\s+({_LESSON})|(Levels?)\s+({_LEVEL}))(?!\w)")
 _BETWEEN = r"(?:,?\s+(?:and|or|to)\s+|,\s+|\s?[–-]\s?)"
 _NEXT = {
-    "Lessons": pattern(rf"{_BETWEEN}({_LESSON})(?!\w)"),
-    "Levels": pattern(rf"{_BETWEEN}({_LEVEL})(?!\w)"),
+    "Lessons": re.compile(rf"{_BETWEEN}({_LESSON})(?!\w)"),
+    "Levels": re.compile(rf"{_BETWEEN}({_LEVEL})(?!\w)"),
 }
 
 

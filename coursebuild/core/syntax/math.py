@@ -12,6 +12,7 @@ before that means that it was never closed.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -20,13 +21,12 @@ from markdown_it.rules_inline import StateInline
 
 from coursebuild.core.syntax.attributes import Braces
 from coursebuild.core.syntax.spans import BlockState, InlineState, PositionedToken
-from coursebuild.core.text.patterns import pattern
 
-_TEX = pattern(r"(?:[^\\`$]++|\\[\s\S])*+")
-_BLOCK_TEX = pattern(r"(?:[^\\$]++|\\[\s\S]|\$(?!\$))*+")
-_BACKTICKS = pattern(r"`+")
-_DOLLARS = pattern(r"\$+")
-_LABEL = pattern(r"\{#[^{}$]*\}?")
+_TEX = re.compile(r"(?:[^\\`$]++|\\[\s\S])*+")
+_BLOCK_TEX = re.compile(r"(?:[^\\$]++|\\[\s\S]|\$(?!\$))*+")
+_BACKTICKS = re.compile(r"`+")
+_DOLLARS = re.compile(r"\$+")
+_LABEL = re.compile(r"\{#[^{}$]*\}?")
 _SPACE = " \t\n"
 _DIGITS = ("0", "1", "2", "3", "4", "5", "6", "7", "8", "9")
 
@@ -155,9 +155,9 @@ def _closing(src: str, at: int, end: int) -> int | None:
     return found if src.startswith("$$", found, end) else None
 
 
-_TEX_COMMAND = pattern(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
+_TEX_COMMAND = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
 """A command, an index or an exponent."""
-_MEANT = pattern(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
+_MEANT = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
 """A dollar sign that no sum of money follows."""
 
 

@@ -15,15 +15,14 @@ from coursebuild.core.syntax.fence import Fence, is_ours
 from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
-_CAPTION = pattern(r"\s*Output\b.*:\s*", re.DOTALL)
-_NEAR_CAPTION = pattern(
+_CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
+_NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,
 )
-_NUMBER = pattern(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
 _GROUPS = {

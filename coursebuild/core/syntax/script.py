@@ -17,7 +17,6 @@ from coursebuild.core.model import PlainCode, Script
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 
 DEFAULT_TIMEOUT = 60.0
@@ -27,15 +26,15 @@ LONGEST_TIMEOUT = 86400.0
 
 _VALUES = ("timeout", "requires", "args")
 _FLAGS = ("norun", "diverges", "deep")
-_NUMBER = pattern(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-_DEVICE = pattern(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
-_UNPORTABLE = pattern(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
+_NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+_DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
+_UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
 _SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - {
     "code",
     "test",
     "this",
 }
-_ON_LINE = pattern(r"\b(on|at) line ([0-9]+)")
+_ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
 def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:

@@ -6,6 +6,7 @@ Entry point: `read_table`. markdown-it finds the tables and their rows; a row is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -14,10 +15,9 @@ from markdown_it.common.utils import MD_TRIM_CHARS
 from coursebuild.core.model import Cell, Inline, Table
 from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt
 
-_PIPE = pattern(r"\\?\|")
+_PIPE = re.compile(r"\\?\|")
 _ALIGN: dict[object, Literal["left", "right", "center"]] = {
     "text-align:left": "left",
     "text-align:right": "right",

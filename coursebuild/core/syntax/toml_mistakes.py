@@ -10,17 +10,16 @@ import re
 from coursebuild.core.syntax.escapes import odd_character, tex_word
 from coursebuild.core.syntax.wording import short
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt
 
-_PLACE = pattern(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
-_TOKEN = pattern(
+_PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+_TOKEN = re.compile(
     r'#[^\n]*|"""(?:[^\\]|\\.)*?"{3,5}|' + r"'''.*?'{3,5}|"
     r'"(?!"")(?:[^"\\\n]|\\[^\n])*"|' + r"'(?!'')[^'\n]*'|[\[\]{}\"']",
     re.DOTALL,
 )
-_SCALAR = pattern(r"[^\n,\]}#]*")
-_WORD = pattern(r"[\w.+-]+|\S")
+_SCALAR = re.compile(r"[^\n,\]}#]*")
+_WORD = re.compile(r"[\w.+-]+|\S")
 _CURLY = tuple("“”„‟‘’‚‛«»")
 _WORDS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
 _NOTHING = frozenset(("null", "None", "nil", "Null", "NULL"))

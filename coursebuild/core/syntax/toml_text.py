@@ -30,12 +30,11 @@ from coursebuild.core.syntax.nodes import (
 )
 from coursebuild.core.syntax.toml_mistakes import double_backslash, mistake_of, place_of
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Source
 
 _LANGUAGE = tree_sitter.Language(tree_sitter_toml.language())
-_WIDE = pattern(r"[^\x00-\x7f]")
-_ESCAPE = pattern(r"\\(?:[ \t]*\n[ \t\n]*|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|.)")
+_WIDE = re.compile(r"[^\x00-\x7f]")
+_ESCAPE = re.compile(r"\\(?:[ \t]*\n[ \t\n]*|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|.)")
 _ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", "e": "\x1b"}
 
 

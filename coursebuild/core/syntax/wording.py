@@ -23,9 +23,8 @@ from coursebuild.core.syntax.nodes import (
     ObjectNode,
     StringNode,
 )
-from coursebuild.core.text.patterns import pattern
 
-_NUMBER = pattern(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
 class FormatWords(Struct, frozen=True):

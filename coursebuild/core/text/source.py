@@ -16,6 +16,7 @@ the only module that counts lines.
 from __future__ import annotations
 
 import hashlib
+import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
 from functools import cached_property
@@ -23,9 +24,7 @@ from itertools import accumulate
 
 from msgspec import Struct
 
-from coursebuild.core.text.patterns import pattern
-
-_NEWLINE = pattern(r"\r\n|\r|\n")
+_NEWLINE = re.compile(r"\r\n|\r|\n")
 
 
 def text_digest(text: str) -> bytes:
