@@ -10,16 +10,16 @@ import warnings
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
 
-from msgspec import Struct
-
-from coursebuild.core.model import CalloutKind, Comparison, Filter, Mode, Silence
+from coursebuild.core.model import CalloutKind, Comparison, Mode
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.course_schema import (
     CalloutTable,
+    CourseFile,
     FilterTable,
     SilenceTable,
     VerifyTable,
 )
+from coursebuild.core.syntax.decode import Decoding
 from coursebuild.core.syntax.nodes import NumberNode, ObjectNode, StringNode
 from coursebuild.core.syntax.wording import named
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
@@ -28,36 +28,26 @@ from coursebuild.core.text.source import Span
 
 _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
-Structs = Mapping[ObjectNode, Struct]
 
-
-def check_settings(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     """Everything that the types of these tables cannot say."""
     verify = root.get("verify")
     if isinstance(verify, ObjectNode):
-        yield from _check_verify(verify, structs)
-        for node in verify.objects("filter"):
-            if isinstance(structs.get(node), FilterTable):
-                yield from _check_filter(node)
+        for node, fields in decoding.each([verify], VerifyTable):
+            yield from _check_verify(node, fields)
+        for node, _ in decoding.each(verify.objects("filter"), FilterTable):
+            yield from _check_filter(node)
     callouts = root.get("callouts")
     for member in callouts.members if isinstance(callouts, ObjectNode) else ():
         if not _CALLOUT.fullmatch(member.key.value):
             message = f"{named(member.key.value)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
-    for node in root.objects("silence"):
-        fields = structs.get(node)
-        if isinstance(fields, SilenceTable):
-            yield from _check_silence(node, fields)
+    for node, silence in decoding.each(root.objects("silence"), SilenceTable):
+        yield from _check_silence(node, silence)
 
 
-# ------------------------------------------------------------------------------------- comparing
-
-
-def _check_verify(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
-    fields = structs.get(node)
-    if not isinstance(fields, VerifyTable):
-        return
+def _check_verify(node: ObjectNode, fields: VerifyTable) -> Iterator[Diagnostic]:
     tolerances = [m for name in ("rtol", "atol") if (m := node.member(name)) is not None]
     if fields.compare == "rtol" and not tolerances:
         message = '`compare = "rtol"` needs `rtol` or `atol`'
@@ -121,15 +111,6 @@ def _place(node: StringNode, error: Exception) -> Span:
     return node.excerpt.span(at, at + 1)
 
 
-def filters(fields: VerifyTable | None) -> tuple[Filter, ...]:
-    """What is replaced in both texts before they are compared."""
-    tables = fields.filter if fields is not None else ()
-    return tuple(Filter(table.pattern, table.replacement) for table in tables)
-
-
-# -------------------------------------------------------------------------- callouts and silences
-
-
 def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind, ...]:
     """The kinds that every course has, perhaps with labels of its own, and its further kinds."""
     kinds = {kind.name: kind for kind in CALLOUTS}
@@ -152,12 +133,5 @@ def _check_silence(node: ObjectNode, fields: SilenceTable) -> Iterator[Diagnosti
         message = f"`{fields.rule}` is an error; only warnings can be silenced"
         yield diagnose("silence-rule", node.place("rule"), message)
     if not fields.reason.strip():
-        help = 'say why: `reason = "…"`'
-        yield diagnose(
-            "silence-rule", node.place("reason"), "the silence gives no reason", help=help
-        )
-
-
-def silences(tables: tuple[SilenceTable, ...]) -> tuple[Silence, ...]:
-    """The warnings that are not shown."""
-    return tuple(Silence(table.rule, table.reason, table.path) for table in tables)
+        message, help = "the silence gives no reason", 'say why: `reason = "…"`'
+        yield diagnose("silence-rule", node.place("reason"), message, help=help)

@@ -18,18 +18,29 @@ import graphlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from msgspec import Struct
-
-from coursebuild.core.model import Course, CourseFeature, Lesson, Level, Page, Status
-from coursebuild.core.syntax.course_schema import CourseFile, LessonTable, LevelTable, PageTable
+from coursebuild.core.model import (
+    Course,
+    CourseFeature,
+    Filter,
+    Lesson,
+    Level,
+    Page,
+    Silence,
+    Status,
+)
+from coursebuild.core.syntax.course_schema import (
+    CourseFile,
+    LessonTable,
+    LevelTable,
+    PageTable,
+    VerifyTable,
+)
 from coursebuild.core.syntax.course_settings import (
     callout_kinds,
     check_settings,
     comparison,
-    filters,
-    silences,
 )
-from coursebuild.core.syntax.decode import decode
+from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
 from coursebuild.core.syntax.toml_text import parse_toml
@@ -44,8 +55,6 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.core.text.source import Source, Span
 
-Structs = Mapping[ObjectNode, Struct]
-
 
 def parse_course_map(source: Source) -> Parsed[Course | None]:
     """The course that the map describes, without what its files hold. Never raises."""
@@ -54,22 +63,22 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
     if root is None:
         return Parsed(None, sort_diagnostics(parsed.diagnostics))
     decoding = decode(root, CourseFile, "the course map", TOML)
-    levels = tuple(_levels(root, decoding.structs))
+    levels = tuple(_levels(root, decoding))
     lessons = [lesson for level in levels for lesson in level.lessons]
     nodes = [node for level in root.objects("level") for node in level.objects("lesson")]
     found = [
         *parsed.diagnostics,
         *decoding.diagnostics,
         *_check_ids(root, nodes),
-        *_check_files(root, decoding.structs),
-        *check_settings(root, decoding.structs),
+        *_check_files(root, decoding),
+        *check_settings(root, decoding),
     ]
     unusable = bool(found)
-    found += _check_places(root, decoding.structs)
+    found += _check_places(root, decoding)
     found += _check_prerequisites(lessons, _ids(nodes))
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(found))
-    course = _course(source, root, decoding.value, decoding.structs, levels)
+    course = _course(source, root, decoding.value, levels)
     return Parsed(course, sort_diagnostics(found))
 
 
@@ -77,10 +86,9 @@ def _course(
     source: Source,
     root: ObjectNode,
     fields: CourseFile,
-    structs: Structs,
     levels: tuple[Level, ...],
 ) -> Course:
-    about = fields.course
+    about, verify = fields.course, fields.verify or VerifyTable()
     table = root.get("course")
     engine = table.get("engine") if isinstance(table, ObjectNode) else None
     return Course(
@@ -94,10 +102,10 @@ def _course(
         id=about.id or "",
         engine=about.engine,
         engine_span=engine.span if engine is not None else None,
-        comparison=comparison(root, fields.verify),
-        filters=filters(fields.verify),
+        comparison=comparison(root, verify),
+        filters=tuple(Filter(f.pattern, f.replacement) for f in verify.filter),
         callouts=callout_kinds(fields.callouts),
-        silences=silences(fields.silence),
+        silences=tuple(Silence(s.rule, s.reason, s.path) for s in fields.silence),
         levels=levels,
         pages=tuple(
             Page(node.span, page.id, page.title, page.file, None, page.menu)
@@ -117,19 +125,14 @@ def _features(table: Node | None, paths: tuple[str, ...]) -> tuple[CourseFeature
 # --------------------------------------------------------------------------- levels and lessons
 
 
-def _levels(root: ObjectNode, structs: Structs) -> Iterator[Level]:
+def _levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Level]:
     """The levels, with those of their lessons whose fields are right."""
     for node in root.objects("level"):
-        fields = structs.get(node)
         name = _id(node.get("id"))
-        lessons = tuple(
-            _lesson(inner, lesson, name)
-            for inner in node.objects("lesson")
-            if isinstance(lesson := structs.get(inner), LessonTable)
-        )
-        title, summary = "", ""
-        if isinstance(fields, LevelTable):
-            title, summary = fields.title, fields.summary
+        inner = decoding.each(node.objects("lesson"), LessonTable)
+        lessons = tuple(_lesson(*lesson, name) for lesson in inner)
+        fields = next((fields for _, fields in decoding.each([node], LevelTable)), None)
+        title, summary = ("", "") if fields is None else (fields.title, fields.summary)
         yield Level(node.span, name, title, summary, lessons)
 
 
@@ -190,35 +193,32 @@ def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diag
             yield diagnose("id-repeated", place.span, message, notes=notes)
 
 
-def _check_places(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+def _check_places(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     """Each lesson stands in the level that its id begins with."""
     for level in root.objects("level"):
         name = _id(level.get("id"))
-        for node in level.objects("lesson"):
-            fields = structs.get(node)
-            if name and isinstance(fields, LessonTable) and not fields.id.startswith(f"{name}."):
+        for node, fields in decoding.each(level.objects("lesson"), LessonTable):
+            if name and not fields.id.startswith(f"{name}."):
                 message = f"the lesson `{fields.id}` stands in the level `{short(name)}`"
                 help = f"an id in this level begins with `{short(name)}.`"
                 yield diagnose("field-value", node.place("id"), message, help=help)
 
 
-def _check_files(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
-    named: list[tuple[str, Span]] = []
-    for node in root.objects("page"):
-        fields = structs.get(node)
-        if isinstance(fields, PageTable):
-            place = node.place("file")
-            named.append((fields.file, place))
-            if fields.id in _TAKEN:
-                message = f"a page cannot have the id `{fields.id}`"
-                help = "the site has a file of this name already"
-                yield diagnose("field-value", node.place("id"), message, help=help)
-            problem = _path_problem(fields.file)
-            if problem:
-                message = f"`{short(fields.file)}` {problem}"
-                help = "a path relative to the project, as in `content/pages/about.md`"
-                yield diagnose("field-value", place, message, help=help)
-    yield from repeated(named, "field-value", "two pages have the file `{}`")
+def _check_files(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
+    files: list[tuple[str, Span]] = []
+    for node, fields in decoding.each(root.objects("page"), PageTable):
+        place = node.place("file")
+        files.append((fields.file, place))
+        if fields.id in _TAKEN:
+            message = f"a page cannot have the id `{fields.id}`"
+            help = "the site has a file of this name already"
+            yield diagnose("field-value", node.place("id"), message, help=help)
+        problem = _path_problem(fields.file)
+        if problem:
+            message = f"`{short(fields.file)}` {problem}"
+            help = "a path relative to the project, as in `content/pages/about.md`"
+            yield diagnose("field-value", place, message, help=help)
+    yield from repeated(files, "field-value", "two pages have the file `{}`")
 
 
 def _path_problem(path: str) -> str:

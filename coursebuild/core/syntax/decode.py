@@ -17,7 +17,7 @@ import functools
 import math
 import operator
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Generic, TypeVar
 
 import msgspec.inspect as inspect
@@ -45,6 +45,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
 S = TypeVar("S", bound=Struct)
+T = TypeVar("T", bound=Struct)
 
 _FAILED = object()
 """The value of a node that is wrong."""
@@ -60,6 +61,13 @@ class Decoding(Struct, Generic[S], frozen=True):
     """Every object whose own fields are all right."""
     texts: tuple[tuple[StringNode, str], ...]
     """Every string that is Markdown, with `blocks` or `inlines`."""
+
+    def each(self, nodes: Iterable[ObjectNode], type: type[T]) -> Iterator[tuple[ObjectNode, T]]:
+        """Those of some objects whose own fields are right, each with its struct."""
+        for node in nodes:
+            struct = self.structs.get(node)
+            if isinstance(struct, type):
+                yield node, struct
 
 
 def decode(node: Node, type: type[S], name: str, words: FormatWords) -> Decoding[S]:

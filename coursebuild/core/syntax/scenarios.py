@@ -14,7 +14,7 @@ Entry point: `parse_declarations(source)`.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -31,7 +31,7 @@ from coursebuild.core.model.scenarios import (
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
 from coursebuild.core.syntax.course_schema import Slug
-from coursebuild.core.syntax.decode import decode
+from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fields import Positive, Text, repeated
 from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode
 from coursebuild.core.syntax.toml_text import parse_toml
@@ -44,8 +44,6 @@ from coursebuild.core.text.diagnostics import (
     sort_diagnostics,
 )
 from coursebuild.core.text.source import Source
-
-Structs = Mapping[ObjectNode, Struct]
 
 MOST_SAMPLES = 100_000
 """Looks at the state in a scenario."""
@@ -164,8 +162,8 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
     found = [
         *parsed.diagnostics,
         *decoding.diagnostics,
-        *_check_scenarios(root, decoding.structs),
-        *_check_names(root, decoding.structs),
+        *_check_scenarios(root, decoding),
+        *_check_names(root, decoding),
     ]
     if found or decoding.value is None:
         return Parsed(None, sort_diagnostics(found))
@@ -221,42 +219,32 @@ def _scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
 
 
 def _measured(written: str | None) -> Measured | None:
-    if written is None:
-        return None
-    kind, _, name = written.partition(":")
+    kind, _, name = (written or "").partition(":")
     match kind:
         case "body" | "site" | "sensor":
             return Measured(kind, name)
         case _:
-            raise AssertionError(kind)
+            return None
 
 
 # ---------------------------------------------------------------------------------------- checks
 
 
-def _check_names(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
-    scenarios = [n for n in root.objects("scenario") if isinstance(structs.get(n), ScenarioTable)]
-    names = [(_text(structs[n], "name"), n.place("name")) for n in scenarios]
+def _check_names(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
+    scenarios = decoding.each(root.objects("scenario"), ScenarioTable)
+    names = [(table.name, node.place("name")) for node, table in scenarios]
     yield from repeated(names, "field-value", "two scenarios have the name `{}`")
-    keeps = [n for n in root.objects("keep") if isinstance(structs.get(n), KeepTable)]
-    findings = [(_text(structs[n], "finding"), n.place("finding")) for n in keeps]
+    keeps = decoding.each(root.objects("keep"), KeepTable)
+    findings = [(table.finding, node.place("finding")) for node, table in keeps]
     yield from repeated(findings, "field-value", "the finding `{}` is kept twice")
 
 
-def _text(table: Struct, name: str) -> str:
-    value = getattr(table, name)
-    assert isinstance(value, str)
-    return value
-
-
-def _check_scenarios(root: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
-    for node in root.objects("scenario"):
-        table = structs.get(node)
-        if isinstance(table, ScenarioTable):
-            yield from _check_times(node, table)
-            yield from _check_timesteps(node, table)
-            yield from _check_controls(node, table)
-            yield from _check_reference(node, table)
+def _check_scenarios(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
+    for node, table in decoding.each(root.objects("scenario"), ScenarioTable):
+        yield from _check_times(node, table)
+        yield from _check_timesteps(node, table)
+        yield from _check_controls(node, table)
+        yield from _check_reference(node, table)
 
 
 def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
