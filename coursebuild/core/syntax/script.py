@@ -6,18 +6,17 @@ script; `fragment` of code that need not parse.
 
 from __future__ import annotations
 
-import functools
 import re
 import shlex
 import sys
 import warnings
-from typing import NamedTuple
+from collections.abc import Iterator
 
 from coursebuild.core.model import PlainCode, Script
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Excerpt
 
 DEFAULT_TIMEOUT = 60.0
 """Seconds."""
@@ -45,69 +44,52 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     )
     diagnostics = [*info.diagnostics, *keys.diagnostics]
     file, fragment = keys.value.get("file"), keys.value.get("fragment")
-    misspelt = any(word.key == "file" for word in info.value.words)
+    has_file = any(word.key == "file" for word in info.value.words)
     if file is None and not diagnostics:
-        running = (keys.value.get(key) for key in (*_VALUES, *_FLAGS))
-        diagnostics += [_needs_file(word) for word in running if word is not None]
-    if fragment is not None and misspelt:
+        for word in (keys.value.get(key) for key in (*_VALUES, *_FLAGS)):
+            if word is not None:
+                message = f"`{word.key}` says how to run a script, and this block has no `file`"
+                help = "add `file=examples/….py`, or leave it out"
+                diagnostics.append(diagnose("fence-key-value", word.key_span, message, help=help))
+    if fragment is not None and has_file:
         message = "a block with `file` is run, so it cannot be a `fragment`"
         diagnostics.append(diagnose("fence-key-value", fragment.span, message))
-    if fragment is None or misspelt:
-        wrong = syntax_mistake(fence.body)
-        if wrong is not None:
-            help = (
-                ""
-                if misspelt
-                else "write `fragment` after `python` if it is not meant to be complete"
-            )
-            diagnostics.append(diagnose("python-syntax", wrong[0], wrong[1], help=wrong[2] or help))
-    if file is None:
-        return Parsed(PlainCode(fence.span, fence.body, fragment is not None), tuple(diagnostics))
-    script, mistakes = _script(fence, file, keys.value)
-    diagnostics += mistakes
-    return Parsed(script or PlainCode(fence.span, fence.body, False), tuple(diagnostics))
+    if fragment is None or has_file:
+        diagnostics += _syntax_mistake(fence.body, script=has_file)
+    script = None if file is None else _script(fence, file, keys.value, diagnostics)
+    code = PlainCode(fence.span, fence.body, fragment is not None and file is None)
+    return Parsed(script or code, tuple(diagnostics))
 
 
-def _needs_file(word: Word) -> Diagnostic:
-    message = f"`{word.key}` says how to run a script, and this block has no `file`"
-    return diagnose(
-        "fence-key-value", word.key_span, message, help="add `file=examples/….py`, or leave it out"
-    )
-
-
-def _script(fence: Fence, file: Word, keys: FenceKeys) -> tuple[Script | None, list[Diagnostic]]:
-    diagnostics: list[Diagnostic] = []
-    path, path_span = file.value or "", file.value_span
-    wrong = path_mistake(path)
+def _script(
+    fence: Fence, file: Word, keys: FenceKeys, diagnostics: list[Diagnostic]
+) -> Script | None:
+    path = file.value or ""
+    wrong, help = path_mistake(path), "a script is written to `examples/`, for example "
+    help += "`examples/l4_2_inertia.py`"
     if fence.nested:
-        wrong = "a text of a quiz or lab cannot hold a script"
+        wrong, help = "a text of a quiz or lab cannot hold a script", ""
     if wrong:
-        help = (
-            ""
-            if fence.nested
-            else "a script is written to `examples/`, for example `examples/l4_2_inertia.py`"
-        )
-        diagnostics.append(diagnose("script-path", path_span, wrong, help=help))
+        diagnostics.append(diagnose("script-path", file.value_span, wrong, help=help))
     timeout = _timeout(keys.get("timeout"), diagnostics)
     requires = _modules(keys.get("requires"), diagnostics)
     args = _arguments(keys.get("args"), diagnostics)
     if wrong:
-        return None, diagnostics
-    code, norun = _with_line_end(fence.body), keys.get("norun") is not None
+        return None
     return Script(
         fence.span,
         path,
-        path_span,
-        code,
+        file.value_span,
+        _with_line_end(fence.body),
         fence.prefix,
         timeout,
         requires,
         args,
-        norun,
+        keys.get("norun") is not None,
         fence.body_span,
         keys.get("diverges") is not None,
         keys.get("deep") is not None,
-    ), diagnostics
+    )
 
 
 def _with_line_end(body: Excerpt) -> Excerpt:
@@ -193,27 +175,29 @@ def path_mistake(path: str) -> str:
     return ""
 
 
-def syntax_mistake(code: Excerpt) -> tuple[Span, str, str] | None:
-    """Where and why a piece of Python does not parse, and a hint; `None` when it does."""
-    mistake = python_mistake(code.text)
-    if mistake is None:
-        return None
+def _syntax_mistake(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
+    """Where and why a piece of Python does not parse, if it does not."""
+    error = _compile_error(code.text)
+    if error is None:
+        return
     rows = code.lines()
-    line = min(mistake.line, len(rows))
+    line = min(error.lineno or 1, len(rows))
     row = rows[line - 1]
-    start = min(mistake.column, len(row.text))
-    if "indent" in mistake.message:  # python may point into the white space before the code
-        start = max(start, len(row.text) - len(row.text.lstrip()))
-    end = mistake.end_column if mistake.end_line == line else len(row.text)
+    start = min(max((error.offset or 1) - 1, 0), len(row.text))
     indentation = len(row.text) - len(row.text.lstrip())
-    start = max(start, min(indentation, len(row.text)))
-    end = min(max(end, start + 1), len(row.text))
+    start = max(start, indentation)  # python may point into the white space before the code
+    end = len(row.text)
+    if error.end_lineno in (None, error.lineno):
+        end = max((error.end_offset or 0) - 1, 0)
+    end = max(start, min(max(end, start + 1), len(row.text)))
 
     def lesson_line(found: re.Match[str]) -> str:
         return f"{found[1]} line {code.line_span(int(found[2])).line}"
 
-    message, _, hint = _ON_LINE.sub(lesson_line, mistake.message).partition(". ")
-    return row.span(start, max(start, end)), _lower(message), _lower(hint)
+    message, _, help = _ON_LINE.sub(lesson_line, error.msg).partition(". ")
+    if not help and not script:
+        help = "write `fragment` after `python` if it is not meant to be complete"
+    yield diagnose("python-syntax", row.span(start, end), _lower(message), help=_lower(help))
 
 
 def _lower(sentence: str) -> str:
@@ -223,30 +207,17 @@ def _lower(sentence: str) -> str:
     return sentence
 
 
-class PythonMistake(NamedTuple):
-    """Where and why a text does not compile."""
-
-    line: int
-    """From 1."""
-    column: int
-    """From 0."""
-    end_line: int
-    end_column: int
-    message: str
-
-
-@functools.lru_cache(maxsize=64)
-def python_mistake(code: str) -> PythonMistake | None:
+def _compile_error(code: str) -> SyntaxError | None:
     """The first thing that Python has against a text."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             compile(code, "<lesson>", "exec", dont_inherit=True)
     except SyntaxError as error:
-        line, column = error.lineno or 1, max((error.offset or 1) - 1, 0)
-        end_column = max((error.end_offset or 0) - 1, 0)
-        return PythonMistake(line, column, error.end_lineno or line, end_column, error.msg)
+        return error
     except (ValueError, MemoryError, RecursionError, OverflowError) as error:
         message = f"the code cannot be compiled: {error}"
-        return PythonMistake(1, 0, 1, 0, message if str(error) else "the code is nested too deeply")
+        found = SyntaxError(message if str(error) else "the code is nested too deeply")
+        found.end_offset = 1
+        return found
     return None
