@@ -14,7 +14,7 @@ from coursebuild.core.model import Comparison, Inline, Mode, Recording, Table, p
 from coursebuild.core.syntax.fence import Fence, is_ours
 from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
 _CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
@@ -25,13 +25,7 @@ _NEAR_CAPTION = re.compile(
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
-_GROUPS = {
-    "exact": "exact",
-    "digits": "digits",
-    "rtol": "rtol",
-    "atol": "rtol",
-    "volatile": "volatile",
-}
+_MODES = {key: "rtol" if key == "atol" else key for key in (*_VALUES, *_FLAGS)}
 
 
 def is_caption(inlines: tuple[Inline, ...]) -> bool:
@@ -68,8 +62,9 @@ def record_fence(
             what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
             session.report(no_body(fence.head, what))
         return None
-    how = parse_comparison(fence)
-    session.diagnostics += how.diagnostics
+    keys, wrong = _keys(fence)
+    comparison = _comparison(keys, wrong)
+    session.diagnostics += wrong
     return Recording(
         caption_span.to(fence.span),
         caption,
@@ -77,9 +72,9 @@ def record_fence(
         fence.body,
         fence.body_span,
         fence.prefix,
-        how.value,
+        comparison,
         _script(caption_span, session),
-        readable=not how.diagnostics,
+        readable=not wrong,
     )
 
 
@@ -123,24 +118,19 @@ def _script(caption_span: Span, session: ParsingState) -> str | None:
     return session.script
 
 
-def parse_comparison(fence: Fence) -> Parsed[Comparison | None]:
+def _comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | None:
     """How a `text` fence says that it is compared; `None` where it says nothing."""
-    keys, diagnostics = _keys(fence)
     rtol = _tolerance(keys.get("rtol"), diagnostics)
     atol = _tolerance(keys.get("atol"), diagnostics)
     _contradictions(keys, diagnostics)
     ellipsis = keys.get("ellipsis") is not None
     if keys.get("volatile"):
-        return Parsed(Comparison(Mode.VOLATILE), tuple(diagnostics))
+        return Comparison(Mode.VOLATILE)
     if rtol is not None or atol is not None:
-        zero = Decimal(0)
-        comparison = Comparison(Mode.TOLERANCE, rtol or zero, atol or zero, ellipsis)
-        return Parsed(comparison, tuple(diagnostics))
+        return Comparison(Mode.TOLERANCE, rtol or Decimal(0), atol or Decimal(0), ellipsis)
     if keys.get("digits"):
-        return Parsed(Comparison(Mode.DIGITS, ellipsis=ellipsis), tuple(diagnostics))
-    if keys.get("exact") or ellipsis:
-        return Parsed(Comparison(Mode.EXACT, ellipsis=ellipsis), tuple(diagnostics))
-    return Parsed(None, tuple(diagnostics))
+        return Comparison(Mode.DIGITS, ellipsis=ellipsis)
+    return Comparison(ellipsis=ellipsis) if keys.get("exact") or ellipsis else None
 
 
 def stray_keys(fence: Fence) -> list[Diagnostic]:
@@ -175,22 +165,12 @@ def _tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | No
 
 def _contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
     """Report the first key that does not go with one before it."""
-    mode: Word | None = None
-    volatile, ellipsis = keys.get("volatile"), keys.get("ellipsis")
-    for word in keys.words:
-        group = _GROUPS.get(word.key)
-        if group is None:
-            continue
-        if mode is not None and _GROUPS[mode.key] != group:
-            _contradiction(mode, word, diagnostics)
-            return
-        mode = mode or word
-    if volatile is not None and ellipsis is not None:
-        first, second = sorted((volatile, ellipsis), key=lambda word: word.span.start)
-        _contradiction(first, second, diagnostics)
-
-
-def _contradiction(first: Word, second: Word, diagnostics: list[Diagnostic]) -> None:
-    message = f"`{second.key}` contradicts `{first.key}`"
-    notes = [Note(f"`{first.key}` is given here", first.key_span)]
-    diagnostics.append(diagnose("recording-keys", second.key_span, message, notes=notes))
+    for i, second in enumerate(keys.words):
+        for first in keys.words[:i]:
+            modes = {_MODES[first.key], _MODES[second.key]}
+            if len(modes) == 2 and ("ellipsis" not in modes or "volatile" in modes):
+                message = f"`{second.key}` contradicts `{first.key}`"
+                notes = [Note(f"`{first.key}` is given here", first.key_span)]
+                wrong = diagnose("recording-keys", second.key_span, message, notes=notes)
+                diagnostics.append(wrong)
+                return
