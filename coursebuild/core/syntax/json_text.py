@@ -15,7 +15,6 @@ from __future__ import annotations
 import re
 from typing import NoReturn
 
-from coursebuild.core.syntax.escapes import escaped_string, odd_character, tex_word
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
     BoolNode,
@@ -26,6 +25,9 @@ from coursebuild.core.syntax.nodes import (
     NumberNode,
     ObjectNode,
     StringNode,
+    escaped_string,
+    odd_character,
+    tex_word,
 )
 from coursebuild.core.syntax.wording import short
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose

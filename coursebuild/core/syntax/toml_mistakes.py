@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.core.syntax.escapes import odd_character, tex_word
+from coursebuild.core.syntax.nodes import odd_character, tex_word
 from coursebuild.core.syntax.wording import short
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt

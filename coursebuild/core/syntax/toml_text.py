@@ -17,7 +17,6 @@ import tree_sitter
 import tree_sitter_toml
 from msgspec import Struct, field
 
-from coursebuild.core.syntax.escapes import escaped_string
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
     BoolNode,
@@ -27,6 +26,7 @@ from coursebuild.core.syntax.nodes import (
     NumberNode,
     ObjectNode,
     StringNode,
+    escaped_string,
 )
 from coursebuild.core.syntax.toml_mistakes import double_backslash, mistake_of, place_of
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
