@@ -118,10 +118,8 @@ class _Decoder:
                 return self.literal(node, type, name)
             case inspect.IntType() | inspect.FloatType(), NumberNode():
                 return self.number(node, type, name)
-            case inspect.VarTupleType(), ArrayNode():
+            case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
                 return self.array(node, type, name, remarks)
-            case inspect.TupleType(), ArrayNode():
-                return self.tuple(node, type, name, remarks)
             case inspect.DictType(), ObjectNode():
                 return self.map(node, type, remarks)
             case inspect.StructType(), ObjectNode():
@@ -172,26 +170,24 @@ class _Decoder:
     # ------------------------------------------------------------------------------- containers
 
     def array(
-        self, node: ArrayNode, type: inspect.VarTupleType, name: str, remarks: dict[str, Any]
+        self,
+        node: ArrayNode,
+        type: inspect.VarTupleType | inspect.TupleType,
+        name: str,
+        remarks: dict[str, Any],
     ) -> object:
-        least, length = type.min_length or 0, len(node.items)
-        if length < least:
-            problem = f"needs at least {least} entries, and has {length}"
-            message = f"{named(name)} {problem if length else 'is empty'}"
-            return self.report("field-value", node.mark, message)
-        return self.items(node, [type.item_type] * length, name, remarks)
-
-    def tuple(
-        self, node: ArrayNode, type: inspect.TupleType, name: str, remarks: dict[str, Any]
-    ) -> object:
-        if len(node.items) != len(type.item_types):
-            problem = f"needs {len(type.item_types)} entries, and has {len(node.items)}"
+        length, problem = len(node.items), ""
+        if isinstance(type, inspect.TupleType):
+            types = type.item_types
+            if length != len(types):
+                problem = f"needs {len(types)} entries, and has {length}"
+        else:
+            types, least = (type.item_type,) * length, type.min_length or 0
+            if length < least:
+                problem = f"needs at least {least} entries, and has {length}"
+                problem = problem if length else "is empty"
+        if problem:
             return self.report("field-value", node.mark, f"{named(name)} {problem}")
-        return self.items(node, type.item_types, name, remarks)
-
-    def items(
-        self, node: ArrayNode, types: Iterable[inspect.Type], name: str, remarks: dict[str, Any]
-    ) -> object:
         values = [
             self.value(item, type, f"{name}[{i}]", remarks)
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))

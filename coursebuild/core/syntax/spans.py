@@ -203,13 +203,8 @@ def trimmed(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
 
 def whole(source: Source) -> Excerpt:
     """All of a file as Markdown sees it: LF, U+FFFD for NUL, no byte order mark."""
-    if "\r" in source.text:
-        excerpt = source.excerpt()
-    else:
-        excerpt = Excerpt(source, source.text, ((0, 0),))
-    if excerpt.text.startswith("\ufeff"):
-        excerpt = excerpt.slice(1)
-    return normalized(excerpt)
+    excerpt = source.excerpt()
+    return normalized(excerpt.slice(1) if excerpt.text.startswith("\ufeff") else excerpt)
 
 
 def normalized(excerpt: Excerpt) -> Excerpt:

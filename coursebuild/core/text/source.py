@@ -80,8 +80,9 @@ class Source(Struct, frozen=True, dict=True):
 
     def excerpt(self) -> Excerpt:
         """The whole text with its line ends made LF."""
-        starts = self.line_starts
-        lines = [(self.line_text(i + 1), start) for i, start in enumerate(starts)]
+        if "\r" not in self.text:
+            return Excerpt(self, self.text, ((0, 0),))
+        lines = [(self.line_text(i + 1), start) for i, start in enumerate(self.line_starts)]
         return Excerpt.of_lines(self, lines)
 
 
