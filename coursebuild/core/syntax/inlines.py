@@ -14,6 +14,7 @@ emphasis, strong, strikethrough, links and terms:
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from markdown_it.common.utils import normalizeReference
 from markdown_it.helpers import parseLinkDestination
@@ -76,33 +77,20 @@ class _Frame(Struct):
 
 
 class InlineReader:
-    """Reads the inline content of one text; `base` is what its block tokens were made from."""
+    """Reads the inline content of one text."""
 
-    def __init__(
-        self,
-        base: Excerpt,
-        definitions: Definitions,
-        session: ParsingState,
-        balance: Balance,
-    ) -> None:
-        self.base = base
+    def __init__(self, definitions: Definitions, session: ParsingState, balance: Balance) -> None:
         self.definitions = definitions
-        self.environment: EnvType | None = None
-        """What markdown-it knows of the link definitions, once it was asked for."""
-        self.notes = session.notes
-        self.anchors = session.anchors
+        self.session = session
         self.balance = balance
         self.report = session.report
+        self._environment: EnvType | None = None
 
     def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
         """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
-        return _Pass(self, content, mentions).read()
-
-    def tokens(self, text: str) -> list[PositionedToken]:
-        """The inline tokens of a block's content."""
-        if self.environment is None:
-            self.environment = self.definitions.environment()
-        return inline_tokens(text, self.environment)
+        if self._environment is None:  # all link definitions are known by now
+            self._environment = self.definitions.environment()
+        return _Pass(self, content, mentions).read(inline_tokens(content.text, self._environment))
 
 
 class _Pass:
@@ -117,9 +105,9 @@ class _Pass:
         self.links = 0 if mentions and may_mention(content.text) else 1
         """Open links, of Markdown and of HTML; one more where mentions are not wanted."""
 
-    def read(self) -> tuple[Inline, ...]:
+    def read(self, tokens: Iterable[PositionedToken]) -> tuple[Inline, ...]:
         self.reader.balance.enter()
-        for token in self.reader.tokens(self.content.text):
+        for token in tokens:
             kind = token.type
             if kind == "text" or kind == "text_special":
                 text = token.content
@@ -233,7 +221,9 @@ class _Pass:
     ) -> Link | None:
         url = str(opened.attrs["href"])
         span = self.content.span(opened.start, closed.end)
-        destination = self._destination(opened, closed)
+        destination = self.content.span(opened.start + 1, closed.end - 1)
+        if opened.markup != "autolink":
+            destination = self._destination(opened.start, closed.start, closed.end)
         wrong = check_scheme(url, destination)
         if wrong is not None:
             self.reader.report(wrong)
@@ -241,23 +231,14 @@ class _Pass:
         title = str(opened.attrs.get("title", ""))
         return Link(span, classify(url), destination, title, children)
 
-    def _destination(self, opened: PositionedToken, closed: PositionedToken) -> Span:
-        """Where the destination of a link is written: in it, or in the definition that it names."""
-        text, label_end = self.content.text, closed.start
-        if opened.markup == "autolink":
-            return self.content.span(opened.start + 1, closed.end - 1)
-        return self._written(text, opened.start, label_end, closed.end)
-
-    def _written(self, text: str, start: int, label_end: int, end: int) -> Span:
+    def _destination(self, start: int, label_end: int, end: int) -> Span:
+        """Where the destination of a link or image is written: in it, or in a definition."""
+        text = self.content.text
         if end > label_end + 1 and text[label_end + 1] == "(":
             at = label_end + 2
             while text[at] in " \t\n":
                 at += 1
-            found = parseLinkDestination(text, at, end)
-            if not found.ok:
-                return self.content.span(start, end)
-            angle = text[at] == "<"
-            return self.content.span(at + angle, found.pos - angle)
+            return _address(self.content, at) or self.content.span(start, end)
         label = text[start + 1 : label_end]
         if end > label_end + 3:
             label = text[label_end + 2 : end - 1]
@@ -266,11 +247,8 @@ class _Pass:
             return self.content.span(start, end)
         rows = locate(definition.base, definition.rows)
         head = _DEFINED.match(rows.text)
-        found = parseLinkDestination(rows.text, head.end() if head else 0, len(rows.text))
-        if head is None or not found.ok:
-            return rows.span()
-        angle = rows.text[head.end()] == "<"
-        return rows.span(head.end() + angle, found.pos - angle)
+        found = None if head is None else _address(rows, head.end())
+        return found or rows.span()
 
     # -- leaves
 
@@ -311,7 +289,7 @@ class _Pass:
             return Math(span, tex, display, None, read_meaning(self.content, braces, report))
         label = read_label(self.content, braces, report)
         if label is not None:
-            self.reader.anchors.take(label.id, label.span)
+            self.reader.session.anchors.take(label.id, label.span)
         return Math(span, tex, display, label)
 
     def _number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
@@ -342,7 +320,7 @@ class _Pass:
     def _image(self, token: PositionedToken, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])
         label_end = token.start + 2 + len(token.content)
-        place = self._written(self.content.text, token.start + 1, label_end, token.end)
+        place = self._destination(token.start + 1, label_end, token.end)
         wrong = check_scheme(url, place, image=True)
         if wrong is not None:
             self.reader.report(wrong)
@@ -354,10 +332,17 @@ class _Pass:
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
 
     def _footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
-        reference = self.reader.notes.refer(token.content, span)
+        reference = self.reader.session.notes.refer(token.content, span)
         if reference is None:
             self.run.append(TextPiece(f"[^{token.content}]", token.start, token.end))
         return reference
+
+
+def _address(text: Excerpt, at: int) -> Span | None:
+    """The address of a link that begins at an offset of a text, without angle brackets."""
+    found = parseLinkDestination(text.text, at, len(text.text))
+    angle = text.text.startswith("<", at)
+    return text.span(at + angle, found.pos - angle) if found.ok else None
 
 
 def alt_text(tokens: list[Token]) -> str:

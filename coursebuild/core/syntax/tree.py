@@ -70,7 +70,7 @@ class TextReader:
         self.texts = Texts(session)
         self.tokens = block_tokens(base, definitions)
         self.at = 0
-        self.inlines = InlineReader(base, definitions, session, self.balance)
+        self.inlines = InlineReader(definitions, session, self.balance)
         self._prepare()
 
     def _prepare(self) -> None:
@@ -342,7 +342,7 @@ class Texts:
 
     def _read_inlines(self, content: Excerpt) -> tuple[Inline, ...]:
         balance = Balance(self._session.report)
-        reader = InlineReader(content, self._definitions(), self._session, balance)
+        reader = InlineReader(self._definitions(), self._session, balance)
         inlines = reader.read(content)
         balance.finish()
         return inlines
