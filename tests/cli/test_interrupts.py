@@ -32,22 +32,19 @@ def heard(number: signal.Signals, act: Callable[[], object]) -> None:
     assert raised.type is EXCEPTIONS[number]
 
 
-@numbers
-def test_anywhere(number: signal.Signals) -> None:
-    heard(number, lambda: signal.raise_signal(number))
+def run(code: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
 @numbers
-def test_when_an_object_goes(number: signal.Signals) -> None:
+def test_signal_is_heard_where_python_drops_what_is_raised(number: signal.Signals) -> None:
+    """When an object goes, when nobody refers to one any more, when a process was forked."""
+
     class Goes:
         def __del__(self) -> None:
             signal.raise_signal(number)
 
-    heard(number, Goes)
-
-
-@numbers
-def test_when_nobody_refers_to_an_object_any_more(number: signal.Signals) -> None:
     class Referred:
         pass
 
@@ -57,12 +54,10 @@ def test_when_nobody_refers_to_an_object_any_more(number: signal.Signals) -> Non
         references.append(weakref.ref(one, lambda _: signal.raise_signal(number)))
 
     references: list[weakref.ref[Referred]] = []
+    heard(number, lambda: signal.raise_signal(number))
+    heard(number, Goes)
     heard(number, refer)
-
-
-@numbers
-def test_when_a_process_was_forked(number: signal.Signals) -> None:
-    code = (
+    done = run(
         "import os, signal, sys, time\n"
         "from coursebuild.cli.interrupts import heeded\n"
         "number = int(sys.argv[1])\n"
@@ -71,17 +66,15 @@ def test_when_a_process_was_forked(number: signal.Signals) -> None:
         "    with heeded():\n"
         "        if os.fork() == 0: os._exit(0)\n"
         "        time.sleep(60)\n"
-        "except KeyboardInterrupt as error: print(type(error).__name__)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(int(number))], capture_output=True, text=True, cwd=ROOT
+        "except KeyboardInterrupt as error: print(type(error).__name__)\n",
+        int(number),
     )
     assert (done.stdout, done.stderr) == (f"{EXCEPTIONS[number].__name__}\n", "")
 
 
 @numbers
-def test_while_a_type_is_looked_at(number: signal.Signals) -> None:
-    """Where msgspec's C code calls Python, what is raised would end the process."""
+def test_signal_waits_while_msgspec_looks_at_a_type(number: signal.Signals) -> None:
+    """What is raised where its C code calls Python would end the process."""
     asked: list[int] = []
 
     def field() -> type:
@@ -101,17 +94,7 @@ def test_while_a_type_is_looked_at(number: signal.Signals) -> None:
 
 
 @numbers
-@pytest.mark.parametrize("file", ["<frozen importlib._bootstrap>", "/lib/logging/__init__.py"])
-def test_while_a_lock_is_held(number: signal.Signals, file: str) -> None:
-    passed: list[int] = []
-    code = compile("signal.raise_signal(number)\npassed.append(1)", file, "exec")
-    names = {"signal": signal, "number": number, "passed": passed}
-    heard(number, lambda: exec(code, names))
-    assert passed
-
-
-@numbers
-def test_while_a_module_is_imported(
+def test_signal_waits_while_a_module_is_imported_or_a_lock_is_held(
     number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Modules in C cannot be imported by halves, and say so in other words, or not at all."""
@@ -123,23 +106,27 @@ def test_while_a_module_is_imported(
     monkeypatch.delitem(sys.modules, "outer_one", raising=False)
     heard(number, lambda: importlib.import_module("outer_one"))
     assert sys.modules["outer_one"].imported == 1
+    passed: list[str] = []
+    names = {"signal": signal, "number": number, "passed": passed}
+    for file in ("<frozen importlib._bootstrap>", "/lib/logging/__init__.py"):
+        locked = compile("signal.raise_signal(number)\npassed.append(1)", file, "exec")
+        heard(number, lambda locked=locked: exec(locked, names))  # type: ignore[misc]
+    assert len(passed) == 2
+    # Where the tool lies, and who has called it, does not matter.
+    for place in ("msgspec/venv/tool.py", "<frozen importlib._bootstrap>"):
+        code = "heard(number, lambda: signal.raise_signal(number))"
+        exec(compile(code, place, "exec"), {"heard": heard, **names})
 
 
-@numbers
-@pytest.mark.parametrize("place", ["msgspec/venv/tool.py", "<frozen importlib._bootstrap>"])
-def test_where_the_tool_lies_and_who_has_called_it_does_not_matter(
-    number: signal.Signals, place: str
-) -> None:
-    """Such as a tool in a folder with the name of a package, or one that is called in an import."""
-    code = compile("heard(number, lambda: signal.raise_signal(number))", place, "exec")
-    exec(code, {"heard": heard, "signal": signal, "number": number})
-
-
-def test_what_else_is_dropped_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_afterwards_all_is_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
+    before = [signal.getsignal(number) for number in EXCEPTIONS], sys.unraisablehook
+    with heeded():
+        assert signal.getsignal(signal.SIGTERM) != before[0][1]
+    assert ([signal.getsignal(number) for number in EXCEPTIONS], sys.unraisablehook) == before
     told: list[object] = []
-    before, sys.unraisablehook = sys.unraisablehook, told.append
+    sys.unraisablehook = told.append
     try:
-        with heeded():
+        with heeded():  # what else is dropped is told
 
             class Fails:
                 def __del__(self) -> None:
@@ -148,20 +135,13 @@ def test_what_else_is_dropped_is_told(capsys: pytest.CaptureFixture[str]) -> Non
             Fails()
         assert sys.unraisablehook == told.append
     finally:
-        sys.unraisablehook = before
+        sys.unraisablehook = before[1]
     assert len(told) == 1
 
 
-def test_afterwards_all_is_as_it_was() -> None:
-    before = [signal.getsignal(number) for number in EXCEPTIONS], sys.unraisablehook
-    with heeded():
-        assert signal.getsignal(signal.SIGTERM) != before[0][1]
-    assert ([signal.getsignal(number) for number in EXCEPTIONS], sys.unraisablehook) == before
-
-
-def test_ctrl_c_that_is_ignored_stays_so() -> None:
+def test_nothing_is_changed_where_signals_are_ignored_or_in_another_thread() -> None:
     """As under `nohup`, or in the background of a shell: the command goes on and ends well."""
-    code = (
+    done = run(
         "import os, signal\n"
         "from coursebuild.cli.interrupts import heeded\n"
         "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
@@ -171,42 +151,7 @@ def test_ctrl_c_that_is_ignored_stays_so() -> None:
         "    print('goes on')\n"
         "print(signal.getsignal(signal.SIGINT) is signal.SIG_IGN)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert (done.returncode, done.stdout, done.stderr) == (0, "goes on\nTrue\n", "")
-
-
-@numbers
-@pytest.mark.parametrize("threads", [0, 1])
-def test_when_the_command_is_through_and_the_process_ends(
-    number: signal.Signals, threads: int
-) -> None:
-    code = (
-        "import os, signal, sys, threading, time\n"
-        f"for _ in range({threads}):\n"
-        "    threading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
-        "from coursebuild.cli.interrupts import heeded\n"
-        "with heeded(alone=True): pass\n"
-        "os.kill(os.getpid(), int(sys.argv[1]))\n"
-        "for _ in range(1000): pass\n"
-        "sys.exit(5)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code, str(int(number))], cwd=ROOT)
-    assert done.returncode == 5
-
-
-def test_an_interrupt_out_of_an_executed_text_does_not_decide_how_the_process_ends() -> None:
-    code = (
-        "import sys\n"
-        "from coursebuild.cli.interrupts import heeded\n"
-        "with heeded(alone=True):\n"
-        "    try: exec('raise KeyboardInterrupt')\n"
-        "    except KeyboardInterrupt: pass\n"
-        "sys.exit(130)\n"
-    )
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 130
-
-
-def test_in_another_thread_nothing_is_changed() -> None:
     found: list[object] = []
 
     def look() -> None:
@@ -217,3 +162,31 @@ def test_in_another_thread_nothing_is_changed() -> None:
     thread.start()
     thread.join()
     assert found == [signal.getsignal(signal.SIGTERM)]
+
+
+@numbers
+def test_signal_does_not_change_the_status_of_a_command_that_is_through(
+    number: signal.Signals,
+) -> None:
+    for threads in (0, 1):
+        done = run(
+            "import os, signal, sys, threading, time\n"
+            f"for _ in range({threads}):\n"
+            "    threading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
+            "from coursebuild.cli.interrupts import heeded\n"
+            "with heeded(alone=True): pass\n"
+            "os.kill(os.getpid(), int(sys.argv[1]))\n"
+            "for _ in range(1000): pass\n"
+            "sys.exit(5)\n",
+            int(number),
+        )
+        assert done.returncode == 5
+    done = run(  # nor does an interrupt out of a text that was executed
+        "import sys\n"
+        "from coursebuild.cli.interrupts import heeded\n"
+        "with heeded(alone=True):\n"
+        "    try: exec('raise KeyboardInterrupt')\n"
+        "    except KeyboardInterrupt: pass\n"
+        "sys.exit(130)\n"
+    )
+    assert done.returncode == 130

@@ -195,7 +195,12 @@ def test_scripts_that_cannot_be_compared_say_why(make: Callable[..., Folder], wh
         + block("lottery.py", fixed, HERE)
         + block("printed.py", "import mujoco\nprint(mujoco.__version__)")
     )
+    course.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    course.write("models/broken.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
     done = against(course, "-q")
+    assert "fails      models/ball.xml:1  no longer compiles: no such element" in done.out
+    assert "models/broken" not in done.out
+    assert done.out.endswith("; 0 of 1 MJCF text compiles there\n")
     lines = {line.split()[1]: line for line in done.out.splitlines() if "examples/" in line}
     assert lines == {
         "examples/drifted.py": "drifted    examples/drifted.py  "
@@ -208,16 +213,6 @@ def test_scripts_that_cannot_be_compared_say_why(make: Callable[..., Folder], wh
         "(two runs of it there did not do the same)",
         "examples/printed.py": f"changed    examples/printed.py  by MuJoCo {OTHER}",
     }
-
-
-def test_model_that_no_longer_compiles_is_told(make: Callable[..., Folder], wheels: Path) -> None:
-    course = make(f"## A\n\n{PLAIN}")
-    course.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
-    course.write("models/broken.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
-    done = against(course, "-q")
-    assert "fails      models/ball.xml:1  no longer compiles: no such element" in done.out
-    assert "broken" not in done.out
-    assert done.out.endswith("; 0 of 1 MJCF text compiles there\n")
 
 
 def test_wrong_combinations_of_arguments_give_2(make: Callable[..., Folder]) -> None:

@@ -6,8 +6,6 @@ from collections.abc import Callable
 
 import pytest
 
-from support.live_course import Live
-from support.live_course import live as live
 from support.scratch_course import GOOD, Folder
 
 pytestmark = pytest.mark.site
@@ -43,43 +41,19 @@ def test_complete_lesson_with_nothing_to_read_is_told_and_not_published(make: Ma
     assert not (folder.root / "public").exists()
 
 
-def test_complete_lesson_with_little_to_read_is_no_mistake(make: Make) -> None:
+def test_what_counts_as_something_to_read(make: Make) -> None:
     little = ["Prose.\n", "<!-- x -->\n\nProse.\n", "---\n", "$$x$$\n", "    code\n", "<hr>\n", "x"]
-    done = make(GOOD, *little).main("check")
+    folder = make(GOOD, *little)
+    done = folder.main("check")
     assert done.status == 0, done.out
-
-
-def test_a_draft_says_itself_that_there_is_more_to_come(make: Make) -> None:
-    folder = make(GOOD, "")
-    head, second = folder.text("content/course.toml").split('"1.2"')
-    assert second.count('"complete"') == 1
-    draft = second.replace('"complete"', '"draft"')
-    folder.write("content/course.toml", f'{head}"1.2"{draft}')
-    assert folder.main("build").status == 0
-
-
-def test_a_broken_block_is_something(make: Make) -> None:
-    done = make(GOOD, "```quiz\n{\n```\n").main("check")
-    assert "error[json-syntax]" in done.out
-    assert "lesson-empty" not in done.out
-
-
-def test_prose_that_is_taken_away_is_noticed(make: Make) -> None:
-    """Though nobody else looks at prose, and what was found wrong is remembered."""
-    folder = make(GOOD, "Prose.\n")
-    for text, status in (("Prose.\n", 0), ("", 1), ("Other prose.\n", 0), ("<!-- x -->\n", 1)):
+    # Nobody else looks at prose, and what was found wrong is remembered.
+    for text, status in (("", 1), ("Other prose.\n", 0), ("<!-- x -->\n", 1)):
         folder.write(folder.lesson(2), text)
         done = folder.main("check")
         assert (done.status, "error[lesson-empty]" in done.out) == (status, status == 1)
-
-
-def test_a_preview_tells_it_too(make: Make, live: Callable[[Folder], Live]) -> None:
-    folder = make(GOOD, "Prose.\n")
-    one = live(folder)
-    assert one.wrong() == []
-    for text, wrong in (("", ["lesson-empty"]), ("Prose.\n", []), ("<!-- x -->", ["lesson-empty"])):
-        folder.write(folder.lesson(2), text)
-        one.save(folder.lesson(2))
-        assert one.wrong() == wrong
-        one.session.read()
-        assert one.wrong() == wrong
+    head, second = folder.text("content/course.toml").split('"1.2"')  # a draft says it itself
+    folder.write("content/course.toml", f'{head}"1.2"{second.replace("complete", "draft", 1)}')
+    assert folder.main("build").status == 0
+    folder.write(folder.lesson(3), "```quiz\n{\n```\n")
+    done = folder.main("check")
+    assert ("error[json-syntax]" in done.out, "lesson-empty" in done.out) == (True, False)

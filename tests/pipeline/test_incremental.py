@@ -9,14 +9,15 @@ import shutil
 import msgspec
 import pytest
 
-from coursebuild.core.engine.memo import Memo, sealed
+from coursebuild.core.engine.memo import sealed
 from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
 from support.edited_course import course as course
 
 pytestmark = pytest.mark.site
 
-SERVED = ("chapters", "chapters-noted", "compressed", "fonts", "published", "search", "unchanged")
+SERVED = ("compressed", "fonts", "published", "search", "unchanged")
 """Kinds of entries that are bytes of the site, or none of the memo's."""
+GLOSSARY, SYMBOLS = "glossary/index.html", "symbols/index.html"
 
 
 class Trap:
@@ -30,46 +31,41 @@ def lesson(id: str) -> str:
     return f"lessons/{id}-l{id.replace('.', '')}.html"
 
 
-def test_nothing_changed_draws_nothing(course: Course) -> None:
+def build(course: Course) -> dict[str, bytes]:
+    """The site, built anew from what is kept."""
+    shutil.rmtree(course.folder.root / "public", ignore_errors=True)
+    assert course.folder.main("build", "--quiet").status == 0
+    return course.folder.tree("public")
+
+
+def test_what_only_the_page_shows_draws_only_the_page(course: Course) -> None:
     assert drawn(course.folder) == set()
-
-
-def test_a_touched_or_rewritten_file_draws_nothing(course: Course) -> None:
     for path in (course.folder.root / "content").rglob("*"):
         if path.is_file():
             path.write_bytes(path.read_bytes())
-    assert drawn(course.folder) == set()
-
-
-def test_prose_draws_its_page(course: Course) -> None:
-    course.edit("1.2", "Prose", "Other prose")
-    assert drawn(course.folder) == {lesson("1.2")}
-    course.edit("1.2", "Other prose", "Prose")
-    assert drawn(course.folder) == set(), "what was there before is known"
-
-
-@pytest.mark.parametrize(
-    "edit",
-    [
+    assert drawn(course.folder) == set(), "they were touched, and no more"
+    for old, new in (
+        ("Prose", "Other prose"),
         ("[^n]: A note.", "[^n]: A note.\n\n## Second"),
         ("print(2)", "print(22)"),
         ("A note.", "Another note."),
         ("Remark", "Other"),
-    ],
-)
-def test_what_only_the_page_shows_draws_only_the_page(
-    course: Course, edit: tuple[str, str]
-) -> None:
-    course.edit("1.2", *edit)
-    assert drawn(course.folder) == {lesson("1.2")}
+    ):
+        course.edit("1.2", old, new)
+        assert drawn(course.folder) == {lesson("1.2")}, new
+        course.edit("1.2", new, old)
+        assert drawn(course.folder) == set(), "what was there before is known"
+    page = course.folder.text("content/pages/about.md")
+    course.folder.write("content/pages/about.md", page.replace("*it*", "that"))
+    assert drawn(course.folder) == {"about.html"}
+    course.folder.write("models/box.xml", '<mujoco model="b"/>\n')
+    assert drawn(course.folder) == {"models/box.html"}
 
 
-@pytest.mark.parametrize(
-    "edit", [("$x_2$", "$y$"), ("$x_2$", '$x_2${symbol="place"}'), ("First", "Second")]
-)
-def test_a_symbol_draws_the_index_as_well(course: Course, edit: tuple[str, str]) -> None:
-    course.edit("1.2", *edit)
-    assert drawn(course.folder) == {lesson("1.2"), "symbols/index.html"}
+def test_a_symbol_or_a_heading_draws_the_index_of_symbols(course: Course) -> None:
+    for old, new in (("$x_2$", "$y$"), ("$y$", '$x_2${symbol="place"}'), ("First", "Second")):
+        course.edit("1.2", old, new)
+        assert drawn(course.folder) == {lesson("1.2"), SYMBOLS}, new
 
 
 def test_a_link_draws_the_lesson_that_it_leads_to(course: Course) -> None:
@@ -82,19 +78,18 @@ def test_a_link_draws_the_lesson_that_it_leads_to(course: Course) -> None:
 
 
 def test_a_term_draws_the_glossary_and_who_uses_it(course: Course) -> None:
-    glossary = "glossary/index.html"
     course.edit("1.1", "Prose", "A [thing]{term} is one.\n\nProse")
     # The index of symbols leads to the glossary, which was not there.
-    assert drawn(course.folder) == {lesson("1.1"), glossary, "symbols/index.html"}
+    assert drawn(course.folder) == {lesson("1.1"), GLOSSARY, SYMBOLS}
     course.edit("1.2", "Prose", "See [it](term:thing). Prose")
-    assert drawn(course.folder) == {lesson("1.2"), glossary}
+    assert drawn(course.folder) == {lesson("1.2"), GLOSSARY}
     course.edit("1.1", "Prose", "Other prose")
     assert drawn(course.folder) == {lesson("1.1")}
     course.edit("1.1", "is one", "is none")
-    assert drawn(course.folder) == {lesson("1.1"), glossary}
+    assert drawn(course.folder) == {lesson("1.1"), GLOSSARY}
     course.edit("1.1", "[thing]{term}", "thing")
     course.edit("1.3", "Prose", "A [thing]{term} is one.\n\nProse")
-    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2"), lesson("1.3"), glossary}
+    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2"), lesson("1.3"), GLOSSARY}
 
 
 def test_the_number_of_a_formula_draws_who_refers_to_it(course: Course) -> None:
@@ -117,122 +112,68 @@ def test_a_question_draws_the_lists_of_lessons(course: Course) -> None:
     assert drawn(course.folder) == {lesson("1.2"), *lists}
 
 
-def test_a_title_draws_all_that_name_it(course: Course) -> None:
+def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     course.titles["1.2"] = "New title"
     course.save()
-    around = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3"), "symbols/index.html"}
+    around = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3"), SYMBOLS}
     around.add("progress/index.html")
     # Lesson 2.1 needs it, which the level of that one says too.
     assert drawn(course.folder) == around | {lesson("1.2"), lesson("2.1"), "levels/2.html"}
-
-
-def test_the_title_of_a_level_draws_its_lessons_and_its_neighbours(course: Course) -> None:
     course.levels["2"] = "Second"
     course.save()
     levels = {"levels/1.html", "levels/2.html", "progress/index.html"}
     assert drawn(course.folder) == {"index.html", *levels, lesson("2.1"), lesson("2.2")}
-
-
-def test_a_page_that_moves_draws_those_who_link_to_it(course: Course) -> None:
-    course.edit("1.1", "Prose", "[About](page:about#part)")
-    drawn(course.folder)
-    course.edit("1.3", "Prose", "More")
-    assert drawn(course.folder) == {lesson("1.3")}
-    page = course.folder.text("content/pages/about.md")
-    course.folder.write("content/pages/about.md", page.replace("*it*", "that"))
-    assert drawn(course.folder) == {"about.html"}
-
-
-def test_a_model_draws_its_page(course: Course) -> None:
-    course.folder.write("models/box.xml", '<mujoco model="b"/>\n')
-    assert drawn(course.folder) == {"models/box.html"}
-
-
-def test_the_name_of_a_kind_of_callout_draws_the_pages_that_have_one(course: Course) -> None:
     course.edit("1.3", "[!note]", "[!warning]")
     drawn(course.folder)
     course.extra = '[callouts.warning]\nlabel = "Careful"\npromise = "It bites."\n'
     course.save()
     assert drawn(course.folder) == {lesson("1.3")}
-
-
-def test_the_name_of_the_course_draws_what_tells_it_and_frames_all(course: Course) -> None:
-    assert course.folder.main("build", "--quiet").status == 0
     text = course.folder.text("content/course.toml")
     course.folder.write("content/course.toml", text.replace('"Tested"', '"Renamed"'))
-    assert course.folder.main("build", "--quiet").status == 0
-    for path, page in course.folder.tree("public").items():
+    for path, page in build(course).items():
         if path.endswith(".html"):
             assert b"Renamed" in page and b"Tested" not in page
 
 
-def test_a_damaged_store_is_made_again(course: Course) -> None:
-    assert course.folder.main("build", "--quiet").status == 0
-    before = course.folder.tree("public")
+JUNK = {
+    "empty": b"",
+    "null": b"null",
+    "another value": b"[[1]]",
+    "a call": msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
+    "a pickle": pickle.dumps(Trap()),
+}
+
+
+def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Course) -> None:
+    before = build(course)
     assert course.folder.spoil() > 30
-    course.edit("1.1", "Prose", "Pros")
-    course.edit("1.1", "Pros", "Prose")
-    shutil.rmtree(course.folder.root / "public")
-    assert course.folder.main("build", "--quiet").status == 0
-    assert course.folder.tree("public") == before
-
-
-@pytest.mark.parametrize(
-    "junk",
-    [
-        b"",
-        b"null",
-        b"[[1]]",
-        msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
-        pickle.dumps(Trap()),
-    ],
-    ids=["empty", "null", "other", "a call", "pickle"],
-)
-def test_whole_entries_that_somebody_else_wrote_are_ignored(course: Course, junk: bytes) -> None:
-    assert course.folder.main("build", "--quiet").status == 0
-    before = course.folder.tree("public")
+    assert build(course) == before
     folder = course.folder.root / ".coursebuild"
-    kinds = set()
-    for path in sorted(folder.rglob("*")):
-        name = path.relative_to(folder).as_posix()
-        kind = name.partition("/")[0]
-        if path.is_file() and len(path.name) == 64 and kind not in SERVED:
-            path.write_bytes(sealed(name, junk))
-            kinds.add(kind)
-    assert {"summaries", "pages", "maps", "keys"} <= kinds
-    shutil.rmtree(course.folder.root / "public")
-    assert course.folder.main("build", "--quiet").status == 0
-    assert course.folder.tree("public") == before
+    for what, junk in JUNK.items():
+        kinds = set()
+        for path in sorted(folder.rglob("*")):
+            name = path.relative_to(folder).as_posix()
+            kind = name.partition("/")[0]
+            if path.is_file() and len(path.name) == 64 and kind not in SERVED:
+                path.write_bytes(sealed(name, junk))
+                kinds.add(kind)
+        assert {"summaries", "pages", "maps", "keys"} <= kinds
+        assert build(course) == before, what
 
 
-def test_a_page_that_the_store_has_lost_is_drawn_for_its_frame(
-    course: Course, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert course.folder.main("build", "--quiet").status == 0
-    before = course.folder.tree("public")
-    shutil.rmtree(course.folder.root / "public")
-    peek = Memo.peek
-    lost: list[str] = []
-
-    def without_pages(self: Memo, kind: str, key: str) -> bytes | None:
-        if kind != "pages":
-            return peek(self, kind, key)
-        lost.append(key)
-        return None
-
-    monkeypatch.setattr(Memo, "peek", without_pages)
-    assert course.folder.main("build", "--quiet").status == 0
-    assert course.folder.tree("public") == before
-    assert lost
-
-
-def test_a_broken_link_of_an_unchanged_page_is_found(course: Course) -> None:
+def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None:
     course.edit("1.1", "Prose", '<a href="1.2-l12.html#first">x</a>')
-    assert course.folder.main("build", "--quiet").status == 0
+    course.edit("1.3", "Prose", "[there](lesson:1.2#first)")
+    build(course)
     course.edit("1.2", "## First", "## Last")
+    for _ in range(2):
+        done = course.folder.main("build")
+        assert (done.status, "error[link-anchor]" in done.out) == (1, True)
+    course.edit("1.3", "#first", "#last")
     done = course.folder.main("build")
     assert done.status == 1
     assert "public/lessons/1.1-l11.html" in done.out
     assert "`lessons/1.2-l12.html` has no anchor `#first`" in done.out
     course.edit("1.2", "## Last", "## First")
-    assert course.folder.main("build", "--quiet").status == 0
+    course.edit("1.3", "#last", "#first")
+    build(course)

@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
+from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.runner import ScriptServer
+from coursebuild.preview import rebuild
 from support.live_course import Builds, Live, differences, share
 from support.live_course import builds as builds
 from support.live_course import live as live
@@ -32,21 +34,18 @@ def test_course_of_every_construct_after_edits_is_what_a_clean_build_gives(
     share(folder, tmp_path / "trials")
     running = live(folder)
 
-    def same() -> None:
-        built = builds(folder)
-        assert built is not None
-        assert differences(running.site(), built) == []
-
     # A lab and a model that moved, and one that changed.
     lesson = "content/lessons/A.1-models-and-questions.md"
     folder.write(lesson, "A first paragraph, with $x + ж$.\n\n" + folder.text(lesson))
     assert running.save(lesson)
     folder.replace(lesson, '"title": "A falling box"', '"title": "A box that falls"')
     assert running.save(lesson)
-    same()
+    running.site()
     folder.replace("models/box.xml", "<mujoco", "<!-- a box --><mujoco")
     assert not running.save("models/box.xml")
-    same()
+    built = builds(folder)
+    assert built is not None
+    assert differences(running.site(), built) == []
 
 
 def test_a_page_is_new_before_anything_else_is_done(
@@ -70,51 +69,41 @@ def test_lists_of_lessons_follow_their_questions(
     running = live(folder)
     running.site()
     path = folder.lesson(2)
+    good = folder.text(path)
     asking = '```quiz\n{"id": "q", "title": "Q", "questions": [%s]}\n```\n'
     one, other = (
         f'{{"kind": "open", "id": "{id}", "q": "{id}?", "reference": "So."}}' for id in "ab"
     )
     lists = ("index.html", "levels/1.html", "progress/index.html", "review/index.html")
 
-    def same() -> bool:
+    def same(text: str) -> bool:
+        folder.write(path, text)
+        assert running.save(path)
+        running.rebuild.once()
         built = builds(folder)
         assert built is not None
         return [running.find(p) for p in lists] == [built.get(p) for p in lists]
 
-    for text in (one, f"{one}, {other}", other):
-        folder.write(path, GOOD.replace("hello.py", "other.py") + "\n" + asking % text)
-        assert running.save(path)
-        running.rebuild.once()
-        assert same()
-    folder.write(path, GOOD.replace("hello.py", "other.py"))
-    assert running.save(path)
-    running.rebuild.once()
+    assert same(f"{good}\n{asking % one}")
+    assert same(f"{good}\n{asking % f'{one}, {other}'}")
+    assert same(good)
     assert running.find("review/index.html") is None
-    assert same()
 
 
 def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]) -> None:
-    folder = make(GOOD)
-    running = live(folder)
-    running.site()
-    version = running.session.version
-    folder.write(folder.lesson(), folder.read(folder.lesson()))
-    assert running.session.edit([folder.lesson()]) is False
-    assert running.session.read() is False
-    assert running.session.version == version
-
-
-def test_rereading_finds_nothing_new_where_a_page_lies_outside_of_content(
-    make: Make, live: Callable[[Folder], Live]
-) -> None:
+    """Also where a page lies outside of `content/`."""
     folder = make(GOOD)
     page = '\n[[page]]\nid = "p"\ntitle = "P"\npath = "docs/p.md"\n'
-    folder.write("content/course.toml", folder.read("content/course.toml") + page.encode())
+    folder.write("content/course.toml", folder.text("content/course.toml") + page)
     folder.write("docs/p.md", "## A page\n\nText.\n")
     running = live(folder)
     running.site()
-    for _ in range(2):
-        assert running.session.read() is False
+    version = running.session.version
+    for path in (folder.lesson(), "docs/p.md"):
+        folder.write(path, folder.read(path))
+        assert running.session.edit([path]) is False
+    assert running.session.read() is False
+    assert running.session.version == version
 
 
 def test_the_last_good_page_stays_and_the_others_go_on(
@@ -227,3 +216,134 @@ def test_scripts_run_behind_and_only_those_that_changed(
     assert not running.save("models/ball.xml")
     running.site()
     assert len(started) == 3
+
+
+# --- what others make of a lesson
+
+
+def test_terms_symbols_links_and_numbers_follow_the_text(
+    make: Make, live: Callable[[Folder], Live], builds: Builds
+) -> None:
+    folder = make("## A\n\nText with $x$.\n", "## B\n\nText.\n")
+    one, two = folder.lesson(1), folder.lesson(2)
+    running = live(folder)
+
+    def same(*paths: str) -> dict[str, bytes]:
+        """Save; the pages are those of a build."""
+        assert running.save(*paths)
+        running.rebuild.once()
+        built = builds(folder)
+        assert built is not None
+        pages = [path for path in built if path.startswith(("glossary/", "symbols/", "lessons/1."))]
+        pages = [path for path in pages if path.endswith(".html")]
+        assert [path for path in pages if running.find(path) != built[path]] == []
+        for path in ("glossary/index.html", "symbols/index.html"):
+            assert running.session.files.has_page(path) is (path in built)
+        return {path: built[path] for path in pages}
+
+    folder.replace(one, "Text", "A [thing]{term} is $q$. Text")
+    folder.replace(two, "Text", 'The [thing](term:thing) of Lesson 1.1, $z${symbol="height"}')
+    pages = same(one, two)
+    assert "glossary/index.html" in pages
+    assert b"Referred to by" in pages["lessons/1.1-one.html"]
+    assert b"height" in pages["symbols/index.html"]
+    folder.replace(one, "is $q$", "is $\\dot q$, so that\n\n$$a = b$$ {#eq:a}\n\nis")
+    assert running.save(one)
+    folder.replace(two, "height", "depth")
+    folder.replace(two, "Lesson 1.1", "[](lesson:1.1#eq:a)")
+    assert running.save(two)
+    folder.replace(one, "[thing]{term}", "thing")
+    folder.replace(two, "[thing](term:thing)", "thing")
+    pages = same(one, two)
+    assert b"(1) of Lesson 1.1" in pages["lessons/1.2-two.html"]
+    assert "glossary/index.html" not in pages
+
+
+def test_a_term_that_goes_makes_a_mistake_elsewhere_until_it_comes_back(
+    make: Make, live: Callable[[Folder], Live]
+) -> None:
+    folder = make("A [thing]{term} is.\n", "See [it](term:thing).\n")
+    one, two = folder.lesson(1), folder.lesson(2)
+    running = live(folder)
+    for path, old, new, wrong in (
+        (one, "[thing]{term}", "thing", ["link-term"]),
+        (two, "See [it](term:thing)", "A [Thing]{term} is", []),
+        (one, "thing", "[thing]{term}", ["term-repeated"]),
+        (one, "A [thing]{term} is.\n", "<!-- x -->", ["lesson-empty"]),
+    ):
+        folder.replace(path, old, new)
+        running.save(path)
+        running.session.read()
+        assert running.wrong() == wrong
+
+
+# --- what a save comes to in its own time
+
+
+def test_script_that_imports_another_runs_again_when_that_is_edited(
+    make: Make, live: Callable[[Folder], Live]
+) -> None:
+    folder = make(
+        block("first.py", 'print("one")\nVALUE = 1', "one")
+        + block("second.py", "import first\nprint(first.VALUE)", "one\n1")
+    )
+    one = live(folder)
+    one.rebuild.once()
+    assert one.wrong() == []
+    folder.replace(folder.lesson(), "VALUE = 1", "VALUE = 2")
+    assert one.save(folder.lesson())
+    one.rebuild.once()
+    assert one.wrong() == ["output-drift"]
+
+
+def test_what_fails_is_said_once_and_tried_again(
+    make: Make,
+    live: Callable[[Folder], Live],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    one = live(make(GOOD))
+    once, tries = one.rebuild.once, iter(range(4))
+
+    def failing() -> None:
+        if next(tries) < 3:
+            raise EffectError("the disk is full")
+        once()
+        one.rebuild.fail(KeyboardInterrupt())
+
+    monkeypatch.setattr(one.rebuild, "once", failing)
+    monkeypatch.setattr(rebuild, "QUIET", 0.01)
+    monkeypatch.setattr(rebuild, "RETRY", 0.05)
+    with pytest.raises(KeyboardInterrupt):
+        one.rebuild.follow()
+    assert next(tries, None) is None
+    assert capsys.readouterr().err.count("coursebuild: the disk is full\n") == 1
+    assert one.session.trouble == ""
+
+
+def test_page_that_a_build_has_drawn_is_taken_only_where_it_is_the_same(
+    make: Make, live: Callable[[Folder], Live], builds: Builds
+) -> None:
+    folder = make(GOOD, GOOD.replace("hello.py", "other.py"))
+    assert folder.main("build").status == 0
+    folder.write(folder.lesson(), GOOD + "\nMore of ж.\n")
+    built = builds(folder)
+    assert built is not None
+    running = live(folder)
+    assert running.find("lessons/1.1-one.html") is not None
+    assert differences(running.site(), built) == []
+    assert folder.spoil()
+    assert differences(live(folder).site(), built) == []
+
+
+def test_page_with_a_mistake_is_not_taken_from_a_build_before_it(
+    make: Make, live: Callable[[Folder], Live]
+) -> None:
+    folder = make(GOOD)
+    assert folder.main("build").status == 0
+    folder.write(folder.lesson(), GOOD + "\n[Nowhere](#nowhere)\n")
+    running = live(folder)
+    running.rebuild.once()
+    assert running.wrong() == ["link-anchor"]
+    assert running.find("lessons/1.1-one.html") is None
+    assert running.session.files.has_page("lessons/1.1-one.html")

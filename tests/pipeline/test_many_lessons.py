@@ -1,4 +1,4 @@
-"""A further lesson takes little more memory than its text; long courses are built as short ones."""
+"""A further lesson takes little more memory than its text."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.model.results import CachedFile, OutputFile
+from coursebuild.core.model.results import CachedFile
 from coursebuild.pipeline.build import build, prepare
 from coursebuild.pipeline.progress import Progress
 from support.scratch_course import Folder, block
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.slow
 
 FEW, MANY = 40, 110
 TEXT = 20_000
@@ -58,7 +58,6 @@ def peak(folder: Folder) -> int:
         gc.unfreeze()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("again", [False, True], ids=["cold", "one edit"])
 def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, again: bool) -> None:
     peaks: dict[int, list[int]] = {FEW: [], MANY: []}
@@ -73,46 +72,3 @@ def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, aga
         peaks[count].append(peak(folder))
     slope = (min(peaks[MANY]) - min(peaks[FEW])) / (MANY - FEW)
     assert slope < SLOPE, f"{slope:.0f} bytes a lesson: {peaks}"
-
-
-def test_pages_are_drawn_in_copies_of_what_was_read_here(tmp_path: Path, stores: Path) -> None:
-    """Texts too few to be read in copies of the process, pages enough to be drawn there."""
-    sites = []
-    for jobs in (1, 2):
-        folder = Folder(tmp_path / f"jobs{jobs}")
-        write_course(folder, 7, 300)
-        folder.borrow(stores)
-        assert build(folder.options(jobs), Path("public")).ok
-        sites.append(folder.tree("public"))
-    assert sites[0] == sites[1]
-
-
-def test_a_course_whose_store_is_whole_or_damaged(tmp_path: Path, stores: Path) -> None:
-    """Nothing is read again where it is whole; where it is damaged, the site is the same."""
-    folder = Folder(tmp_path / "course")
-    write_course(folder, 40, 300)
-    folder.borrow(stores)
-    assert build(folder.options(), Path("public")).ok
-    clean = folder.tree("public")
-
-    def again() -> dict[str, bytes]:
-        with prepare(folder.options(), Progress(quiet=True)) as prepared:
-            assert prepared.report.ok, prepared.report.diagnostics
-            made = {
-                f.path: f.data if isinstance(f, OutputFile) else f.make() for f in prepared.files
-            }
-        return {path: data for path, data in clean.items() if made.get(path) != data}
-
-    def entries() -> dict[Path, int]:
-        return {path: path.stat().st_ino for path in (folder.root / ".coursebuild").glob("*/*")}
-
-    marker = {".coursebuild-site", "files.json"}  # what publishing adds
-    before = entries()
-    assert again().keys() == marker
-    assert entries() == before, "nothing was made"
-    assert folder.spoil() > 3 * 40
-    assert again().keys() == marker
-    mended = entries()
-    assert mended != before
-    assert again().keys() == marker
-    assert entries() == mended, "what was made again is found"

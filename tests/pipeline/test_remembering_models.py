@@ -85,24 +85,22 @@ def test_nothing_is_compiled_twice(root: Path, compiled: list[str]) -> None:
     assert compiled == []
 
 
-@pytest.mark.parametrize(
-    ("file", "again"),
-    [
+def test_what_is_made_of_a_file_is_compiled_again(root: Path, compiled: list[str]) -> None:
+    run(root)
+    for file, again in (
         ("models/assets/m.obj", ["main"]),
         ("models/part.xml", ["main", "part"]),
         ("models/main.xml", ["main"]),
         ("models/other.txt", []),
-    ],
-)
-def test_what_is_made_of_a_file_is_compiled_again(
-    root: Path, compiled: list[str], file: str, again: list[str]
-) -> None:
-    run(root)
+    ):
+        compiled.clear()
+        path = root / file
+        path.write_text((path.read_text() if path.exists() else "") + "\n")
+        run(root)
+        assert compiled == again, file
     compiled.clear()
-    path = root / file
-    path.write_text((path.read_text() if path.exists() else "") + "\n")
-    run(root)
-    assert compiled == again
+    run(root, fresh=True)
+    assert compiled == ["main", "part"]
 
 
 def test_an_error_is_remembered_until_the_missing_file_is_there(
@@ -115,22 +113,12 @@ def test_an_error_is_remembered_until_the_missing_file_is_there(
     assert run(root) == first
     assert compiled == []
     (root / "models/assets/m.obj").write_text(MESH)
-    assert run(root)["main"].error == ""
+    whole = run(root)
+    assert whole["main"].error == ""
     assert compiled == ["main"]
-
-
-def test_afresh(root: Path, compiled: list[str]) -> None:
-    run(root)
-    compiled.clear()
-    run(root, fresh=True)
-    assert compiled == ["main", "part"]
-
-
-def test_a_damaged_entry_is_compiled_again(root: Path, compiled: list[str]) -> None:
-    first = run(root)
     for path in (root / ".coursebuild/models").rglob("*"):
         if path.is_file():
             path.write_bytes(path.read_bytes()[:-1])
     compiled.clear()
-    assert run(root) == first
-    assert compiled == ["main", "part"]
+    assert run(root) == whole
+    assert compiled == ["main", "part"], "what was kept is damaged"

@@ -85,22 +85,3 @@ def test_nothing_in_a_site_says_where_it_was_built(original: Folder) -> None:
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
                 texts += [archive.read(member) for member in archive.namelist()]
         assert not [place for place in places if any(place in text for text in texts)], name
-
-
-@pytest.mark.slow
-def test_build_after_edits_gives_the_bytes_of_one_after_none(
-    original: Folder, tmp_path: Path, stores: Path
-) -> None:
-    """A folder that has seen other courses gives what a fresh one gives."""
-    folder = copy(tmp_path / "used", stores)
-    lesson = "content/lessons/1.1-text.md"
-    text = folder.text(lesson)
-    for edited in (
-        text + "More.\n\n```python file=examples/extra.py\nprint(1)\n```\n",
-        text.replace("## Callouts", "## Other"),
-        text + "[gone](lesson:9.9)\n",
-        text,
-    ):
-        folder.write(lesson, edited)
-        assert folder.main("build").status == (1 if "gone" in edited else 0)
-    assert differences(original, folder) == []

@@ -60,34 +60,29 @@ def test_every_address_of_a_page_is_there(preview: Preview) -> None:
 
 def test_what_has_its_hash_in_its_name_may_be_kept(preview: Preview) -> None:
     page = preview.get("/index.html")[2].decode()
-    styles = re.findall(r'href="(assets/[^"]+\.css)"', page)
-    assert len(styles) == 1
+    (style,) = re.findall(r'href="(assets/[^"]+\.css)"', page)
     for path, kept in (
-        (f"/{styles[0]}", "max-age=31536000, immutable"),
+        (f"/{style}", "max-age=31536000, immutable"),
         ("/assets/nothing.00000000.css", "no-store"),
         ("/index.html", "no-store"),
     ):
         assert preview.get(path)[1]["Cache-Control"] == kept
 
 
-def test_address_of_nothing_has_the_page_that_says_so(preview: Preview) -> None:
+def test_address_of_nothing_has_the_page_that_says_so(preview: Preview, make: Make) -> None:
     status, headers, body = preview.get("/no/such/page.html")
     assert (status, headers["Content-Type"]) == (404, "text/html; charset=utf-8")
     assert b"There is no page at this address" in body
     assert b'data-page="no/such/page.html" data-state=""' in body  # it is told once it is there
-
-
-def test_page_for_missing_addresses_has_its_style(make: Make) -> None:
-    """It names everything from where the published site will be."""
-    folder = make(GOOD)
+    folder = make(GOOD)  # it names everything from where the published site will be
     folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
-    with serving(folder) as preview:
-        preview.heard("ready: ")
-        status, _, body = preview.get("/no/such/page.html")
+    with serving(folder) as other:
+        other.heard("ready: ")
+        status, _, body = other.get("/no/such/page.html")
         found = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
         assert (status, len(found)) == (404, 1)
-        assert preview.get(found[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
-        assert b"Scratch" in preview.get("/a/b/")[2]
+        assert other.get(found[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
+        assert b"Scratch" in other.get("/a/b/")[2]
 
 
 OUTSIDE = (
@@ -120,14 +115,11 @@ def test_nothing_but_the_site_is_served(preview: Preview) -> None:
     assert given == []
 
 
-def test_head_has_no_body(preview: Preview) -> None:
+def test_head_has_no_body_and_other_methods_are_refused(preview: Preview) -> None:
     for path in ("/", "/nothing", "/.coursebuild/events"):
         status, headers, body = preview.get(path, "HEAD")
         assert (status, body) == (404 if path == "/nothing" else 200, b"")
         assert headers["Content-Type"].startswith("text/")
-
-
-def test_other_methods_are_refused(preview: Preview) -> None:
     methods = ("PUT", "DELETE", "OPTIONS", "TRACE", "NONSENSE")
     found = {method: preview.get("/", method)[0] for method in methods}
     assert found == dict.fromkeys(methods, 501)

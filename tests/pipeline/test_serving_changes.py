@@ -1,14 +1,16 @@
-"""`serve`: saves of every kind, and what open pages are told of them."""
+"""`serve`: saves of every kind, what open pages are told of them, and how a preview ends."""
 
 from __future__ import annotations
 
+import signal
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from support.preview_process import PATIENT, Preview, serving, wait_for
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, SILENT, Folder, block, ended, wait_until_alone
 
 Make = Callable[..., Folder]
 pytestmark = pytest.mark.site
@@ -237,32 +239,69 @@ def test_script_that_was_changed_is_not_waited_for(make: Make) -> None:
 
 def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
     folder = make(GOOD + "[gone](lesson:7.7)\n")
+    good = folder.read("content/course.toml")
+    folder.write("content/course.toml", "[course\n")
     page = "/lessons/1.1-one.html"
-    with serving(folder) as preview:
-        preview.heard("error[link-lesson]")
+    with serving(folder) as preview, preview.events() as events:
+        events.until(lambda told: "map-syntax" in told.rules())
+        status, _, body = preview.get("/")
+        assert status == 404
+        assert b"Nothing is built yet." in body and b"/.coursebuild/preview.js" in body
+        folder.write("content/course.toml", good)
+        events.settled("link-lesson")
+        assert events.state == ""
         status, _, body = preview.get(page)
         assert status == 200
         assert b"This page cannot be shown before its mistakes are mended." in body
         assert b"/.coursebuild/preview.js" in body
         assert b"Scratch" in preview.get("/")[2]
-        with preview.events() as events:
-            events.settled("link-lesson")
-            assert events.state == ""
-            folder.write(folder.lesson(), GOOD)
-            events.until(lambda told: told.state != "")
+        folder.write(folder.lesson(), GOOD)
+        events.until(lambda told: told.state != "")
         assert b"hello 3.14159" in preview.get(page)[2]
     assert not (folder.root / "public").exists()
 
 
-def test_map_that_is_wrong_from_the_beginning(make: Make) -> None:
+# --- how it ends
+
+
+def test_preview_that_is_interrupted_ends_cleanly(make: Make) -> None:
     folder = make(GOOD)
-    good = folder.read("content/course.toml")
-    folder.write("content/course.toml", "[course\n")
-    with serving(folder) as preview, preview.events("index.html") as events:
-        events.until(lambda told: told.rules() == ["map-syntax"])
-        status, _, body = preview.get("/")
-        assert status == 404
-        assert b"Nothing is built yet." in body and b"/.coursebuild/preview.js" in body
-        folder.write("content/course.toml", good)
-        events.settled()
-        assert preview.get("/")[0] == 200
+    pruned = folder.root / ".coursebuild" / "pruned"
+    with (
+        serving(folder, "--cache-size", "1K", env=SILENT) as preview,
+        preview.events() as events,
+    ):
+        preview.heard("checked: ")
+        assert not pruned.exists()
+        preview.process.send_signal(signal.SIGINT)
+        preview.stopped()
+        for _ in events.stream:  # it ends
+            pass
+        assert preview.process.stdout is not None and preview.process.stdout.read() == b""
+        port = preview.port
+    assert list(folder.tmp.iterdir()) == []
+    assert pruned.exists(), "what is kept stays within its bound for who only previews as well"
+    # The port is free again.
+    process = folder.start("serve", "--port", str(port), stderr=subprocess.PIPE)
+    with ended(process):
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith(b"serving http://127.0.0.1:%d/" % port)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_scripts_end_with_the_preview(make: Make, number: int) -> None:
+    slow = "import time, pathlib\npathlib.Path('begun').touch()\nwhile True: time.sleep(60)"
+    folder = make("## One\n\n" + block("x.py", slow))
+    with serving(folder) as preview:
+        wait_for(folder.root / "begun")
+        preview.process.send_signal(number)
+        status = preview.process.wait(600)
+        assert status == (-number if number == signal.SIGKILL else 0)
+    wait_until_alone(folder)
+
+
+def test_preview_that_is_ended_while_the_course_is_read_ends_cleanly(make: Make) -> None:
+    folder = make(*(GOOD.replace("hello.py", f"hello{n}.py") + "$x$\n" * 500 for n in range(6)))
+    with serving(folder, env=SILENT) as preview:  # it has said where it will serve
+        preview.process.send_signal(signal.SIGTERM)
+        preview.stopped()
