@@ -37,16 +37,6 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.site import Site
 
 
-_FOLLOWING = (
-    "coursebuild.core.checks.course",
-    "coursebuild.core.scripts.bound_numbers",
-    "coursebuild.pipeline.site",
-    "coursebuild.core.pages.exports.files",
-    "coursebuild.core.pages.search.files",
-)
-"""What is needed when the course was read."""
-
-
 class Prepared(Struct, frozen=True):
     """A verdict on the course, and its site; the site is empty where something is wrong."""
 
@@ -94,7 +84,7 @@ def prepare(options: Options, progress: Progress, make: Make | None = None) -> I
     """
     with (
         scripts_ahead(options) as run_all,
-        Documents(options.store, options.jobs, progress.stage, _FOLLOWING) as documents,
+        Documents(options.store, options.jobs, progress.stage) as documents,
     ):
         yield _prepared(options, progress, documents, make, run_all)
 
@@ -107,14 +97,7 @@ def _prepared(
     run_all: RunAll | None,
 ) -> Prepared:
     began = time.monotonic()
-    loaded = load(
-        options.root,
-        documents.parse,
-        documents.ahead,
-        documents.course_map,
-        documents.declarations,
-        documents.check,
-    )
+    loaded = load(options.root, documents)
     if loaded.course is None:
         report = judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
         return Prepared(report, ())

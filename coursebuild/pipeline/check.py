@@ -73,14 +73,7 @@ def _check(
 ) -> Report:
     began = time.monotonic()
     with Documents(options.store, options.jobs, progress.stage) as documents:
-        loaded = load(
-            options.root,
-            documents.parse,
-            documents.ahead,
-            documents.course_map,
-            documents.declarations,
-            documents.check,
-        )
+        loaded = load(options.root, documents)
     course = loaded.course
     if course is None:
         return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)

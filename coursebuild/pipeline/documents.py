@@ -1,7 +1,7 @@
 """The documents of a course from what is kept, and by work spread over the cores where it is not.
 
-Entry point: `Documents`, a context manager, which gives summaries (`parse`) and draws pages
-(`draw`).
+Entry point: `Documents`, a context manager and the `Parser` of a course, which gives summaries
+(`document`) and draws pages (`draw`).
 
 1. `ahead` is told which texts there are. The summaries of texts that were read before come from the
    store; the others are read, in copies of this process where there are many.
@@ -10,7 +10,6 @@ Entry point: `Documents`, a context manager, which gives summaries (`parse`) and
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
@@ -23,6 +22,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import course_fingerprint
+from coursebuild.pipeline.load import Parser
 from coursebuild.pipeline.tasks import (
     SUMMARIES,
     Answer,
@@ -47,38 +47,22 @@ def _silent(name: str) -> AbstractContextManager[None]:
     return nullcontext()
 
 
-_MAPS, _DECLARATIONS = "maps", "declarations"
-"""Kinds of entries in the store."""
-_CHECKED = "checked"
-"""The kind of the entry that says in what nothing was wrong."""
+_MAPS, _DECLARATIONS, _CHECKED = "maps", "declarations", "checked"
+"""Kinds of entries in the store; the last says in what nothing was wrong."""
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
 _AT_ONCE = 256
 """Texts whose summaries are waited for before more are read."""
 
 
-class Documents:
-    """Outlines of the documents of a course, and their pages."""
+class Documents(Parser):
+    """Summaries of the documents of a course, and their pages."""
 
-    def __init__(
-        self,
-        store: Memo,
-        jobs: int,
-        stage: Stage = _silent,
-        following: Sequence[str] = (),
-        *,
-        warm: bool = False,
-    ) -> None:
-        """`jobs` copies of this process at most; `stage` is told when long work begins.
-
-        `following` are modules that will be needed later, and are imported while copies read.
-        `warm`: this process lives long, and what typesets formulas stays.
-        """
-        self._warm = warm
+    def __init__(self, store: Memo, jobs: int, stage: Stage = _silent) -> None:
+        """`jobs` copies of this process at most; `stage` is told when long work begins."""
         self._store = store
         self._stage = stage
         self._jobs = jobs
-        self._following = following
         self._tasks: dict[str, Task] = {}
         self._summaries: dict[str, DocumentSummary] = {}
         self._fingerprint: tuple[Course, str | None] | None = None
@@ -91,9 +75,13 @@ class Documents:
         return self
 
     def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the copies, and what typesets formulas: a process that ends with it may hang."""
         self.rest()
         if self._reader is not None:
-            self._reader.__exit__(*error)
+            self._reader.close()
 
     @property
     def summaries(self) -> tuple[DocumentSummary, ...]:
@@ -113,9 +101,7 @@ class Documents:
         state = (self.fingerprint(course) or "").encode()
         if state and self._store.get(_CHECKED, key, local=True) == state:
             return ()
-        from coursebuild.core.checks.course import check_course
-
-        found = check_course(course)
+        found = super().check(course)
         if state and not found:
             self._store.put(_CHECKED, key, state, local=True)
         return found
@@ -145,7 +131,8 @@ class Documents:
         return summary is not None
 
     def _read(self, tasks: Sequence[Task]) -> None:
-        answers, readers = self._work("reading lessons and pages", self._requests(tasks))
+        requests: Iterator[tuple[int | None, Request]] = ((None, task) for task in tasks)
+        answers, readers = self._work("reading lessons and pages", requests)
         for task, data, reader in zip(tasks, answers, readers, strict=True):
             summary = decode(data, DocumentSummary, task.source)
             assert summary is not None
@@ -153,14 +140,9 @@ class Documents:
             if reader is not None:
                 self._readers[task.source.path] = reader
 
-    def _requests(self, tasks: Sequence[Task]) -> Iterator[tuple[int | None, Request]]:
-        yield from ((None, task) for task in tasks)
-        if self._workers is not None:
-            for name in self._following:
-                importlib.import_module(name)
-            self._following = ()
-
-    def parse(self, source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
+    def document(
+        self, source: Source, callouts: frozenset[str], *, lesson: bool
+    ) -> Parsed[Document]:
         """A document without its prose, and what is wrong in it."""
         known = self._tasks.get(source.path)
         if known is None or not known.is_of(source, callouts, lesson):
@@ -170,23 +152,11 @@ class Documents:
 
     def course_map(self, source: Source) -> Parsed[Course | None]:
         """The course that a map describes, and what is wrong in it."""
-
-        def parse(source: Source) -> Parsed[Course | None]:
-            from coursebuild.core.syntax.coursemap import parse_course_map
-
-            return parse_course_map(source)
-
-        return self._remembered(_MAPS, source, parse)
+        return self._remembered(_MAPS, source, super().course_map)
 
     def declarations(self, source: Source) -> Parsed[Declarations | None]:
         """What a file beside a model declares, and what is wrong in it."""
-
-        def parse(source: Source) -> Parsed[Declarations | None]:
-            from coursebuild.core.syntax.scenarios import parse_declarations
-
-            return parse_declarations(source)
-
-        return self._remembered(_DECLARATIONS, source, parse)
+        return self._remembered(_DECLARATIONS, source, super().declarations)
 
     def _remembered(
         self, kind: str, source: Source, parse: Callable[[Source], Parsed[Value]]
@@ -260,5 +230,5 @@ class Documents:
         if self._reader is None:
             from coursebuild.pipeline.reading import PageReader
 
-            self._reader = PageReader(self._store, warm=self._warm)
+            self._reader = PageReader(self._store)
         return self._reader

@@ -1,26 +1,25 @@
 """Disk → Course: read the map, the lessons, the pages and the models, and parse them.
 
-Entry point: `load(root)`; `parse` may remember what it parsed before, and `ahead` be told first of
-all that will be parsed.
+Entry point: `load(root)`. A `Parser` parses the texts; `documents.Documents` is one that gives what
+was parsed before.
 
 1. Read everything (`core.files.read`), parse `content/course.toml`. Where the map is broken the
    lessons are parsed all the same, so that all mistakes are told in one run.
-2. Attach its document to each lesson and page; compare what the map names with what is there.
-3. Check the course as a whole.
-4. Parse what `models/NAME.toml` declare of the models beside them.
+2. Parse what `models/NAME.toml` declare of the models beside them.
+3. Attach its document to each lesson and page; compare what the map names with what is there.
+4. Check the course as a whole.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol, TypeAlias
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.course_features import load_course_features
-from coursebuild.core.files.read import CourseFiles, read_course, read_sources
+from coursebuild.core.files.read import read_course, read_sources
 from coursebuild.core.model import Course, Declarations, Document, Lesson, Level, Page, Status
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.run.versions import engine_version
@@ -37,79 +36,57 @@ class Loaded(Struct, frozen=True):
     diagnostics: tuple[Diagnostic, ...]
 
 
-class Parse(Protocol):
-    """`parse_document`, or what remembers its results."""
+class Parser:
+    """Parses texts and checks courses, each time anew."""
 
-    def __call__(
+    def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
+        """Hear which texts will be parsed, and which of them are lessons."""
+
+    def document(
         self, source: Source, callouts: frozenset[str], *, lesson: bool
     ) -> Parsed[Document]:
-        """The document that a text holds, and its mistakes."""
-
-
-Ahead: TypeAlias = Callable[[Sequence[tuple[Source, bool]], frozenset[str]], None]
-"""Is told which texts will be parsed, and which of them are lessons."""
-
-ParseMap: TypeAlias = Callable[[Source], Parsed[Course | None]]
-"""`parse_course_map`, or what remembers its results."""
-
-ParseDeclarations: TypeAlias = Callable[[Source], Parsed[Declarations | None]]
-"""`parse_declarations`, or what remembers its results."""
-
-
-Check: TypeAlias = Callable[[Course], tuple[Diagnostic, ...]]
-"""`check_course`, or what remembers that it found nothing."""
-
-
-def load(
-    root: Path,
-    parse: Parse | None = None,
-    ahead: Ahead | None = None,
-    course_map: ParseMap | None = None,
-    declarations: ParseDeclarations | None = None,
-    check: Check | None = None,
-) -> Loaded:
-    """Read and parse everything below `root`."""
-    read = read_course(root)
-    if parse is None:
+        """The document that a text holds, and what is wrong in it."""
         from coursebuild.core.syntax.document import parse_document
 
-        parse = parse_document
-    if course_map is None:
+        return parse_document(source, callouts, lesson=lesson)
+
+    def course_map(self, source: Source) -> Parsed[Course | None]:
+        """The course that a map describes, and what is wrong in it."""
         from coursebuild.core.syntax.coursemap import parse_course_map
 
-        course_map = parse_course_map
-    if check is None:
+        return parse_course_map(source)
+
+    def declarations(self, source: Source) -> Parsed[Declarations | None]:
+        """What a file beside a model declares, and what is wrong in it."""
+        from coursebuild.core.syntax.scenarios import parse_declarations
+
+        return parse_declarations(source)
+
+    def check(self, course: Course) -> tuple[Diagnostic, ...]:
+        """What is wrong with a course as a whole."""
         from coursebuild.core.checks.course import check_course
 
-        check = check_course
-    found = list(read.diagnostics)
-    loader = _Loader(root, read.value, found, parse, ahead, course_map, check)
-    declared = loader.declared(declarations)
-    course = loader.course(declared)
+        return check_course(course)
+
+
+def load(root: Path, parser: Parser | None = None) -> Loaded:
+    """Read and parse everything below `root`."""
+    loader = _Loader(root, Parser() if parser is None else parser)
+    course = loader.course(loader.declared())
     return Loaded(course, tuple(loader.found))
 
 
 class _Loader:
     """The state of one loading: what was read, and what was found wrong."""
 
-    def __init__(
-        self,
-        root: Path,
-        files: CourseFiles,
-        found: list[Diagnostic],
-        parse: Parse,
-        ahead: Ahead | None,
-        course_map: ParseMap,
-        check: Check,
-    ) -> None:
+    def __init__(self, root: Path, parser: Parser) -> None:
+        read = read_course(root)
         self.root = root
-        self.parse = parse
-        self.ahead = ahead
-        self.course_map = course_map
-        self.check = check
-        self.files = files
-        self.found = found
-        self.sources: Mapping[str, Source] = {s.path: s for s in (*files.lessons, *files.pages)}
+        self.parser = parser
+        self.files = read.value
+        self.found = list(read.diagnostics)
+        sources = (*self.files.lessons, *self.files.pages)
+        self.sources: Mapping[str, Source] = {source.path: source for source in sources}
         self.callouts = frozenset(kind.name for kind in CALLOUTS)
         self.unnamed: dict[str, Source] = {}
         """Lesson files that the map does not name, by path; one that was surely meant is taken out.
@@ -144,31 +121,25 @@ class _Loader:
             files=self._others(course),
             declarations=declared,
         )
-        self.found += self.check(course)
+        self.found += self.parser.check(course)
         self.found += _check_engine(course)
         return course
 
     def _map(self) -> Course | None:
         if self.files.map is None:
             return None
-        parsed = self.course_map(self.files.map)
+        parsed = self.parser.course_map(self.files.map)
         self.found += parsed.diagnostics
         if parsed.value is not None:
             self.found += load_course_features(self.root, parsed.value)
         return parsed.value
 
-    def declared(self, parse: ParseDeclarations | None) -> tuple[Declarations, ...]:
+    def declared(self) -> tuple[Declarations, ...]:
         """What stands beside the models; a file without a model is a mistake."""
         models = {model.name for model in self.files.models}
         found: list[Declarations] = []
-        if not self.files.declarations:
-            return ()
-        if parse is None:
-            from coursebuild.core.syntax.scenarios import parse_declarations
-
-            parse = parse_declarations
         for source in self.files.declarations:
-            parsed = parse(source)
+            parsed = self.parser.declarations(source)
             self.found += parsed.diagnostics
             model = source.path.removesuffix(".toml") + ".xml"
             if model.removeprefix("models/").removesuffix(".xml") not in models:
@@ -183,12 +154,11 @@ class _Loader:
         return tuple(found)
 
     def _announce(self, lessons: Sequence[Source], pages: Sequence[Source]) -> None:
-        if self.ahead is not None:
-            sources = [*((s, True) for s in lessons), *((s, False) for s in pages)]
-            self.ahead(sources, self.callouts)
+        sources = [*((s, True) for s in lessons), *((s, False) for s in pages)]
+        self.parser.ahead(sources, self.callouts)
 
     def _document(self, source: Source, *, lesson: bool) -> Document:
-        parsed = self.parse(source, self.callouts, lesson=lesson)
+        parsed = self.parser.document(source, self.callouts, lesson=lesson)
         self.found += parsed.diagnostics
         return parsed.value
 

@@ -12,11 +12,10 @@ What draws is imported when there is something to draw.
 
 from __future__ import annotations
 
-import gc
 import importlib
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self, assert_never
+from typing import TYPE_CHECKING, assert_never
 
 import msgspec
 from markupsafe import Markup
@@ -68,12 +67,6 @@ long to write as to make."""
 _ROOM = 700_000
 """Characters of documents that wait to be drawn, some 25 bytes each. Further ones are parsed
 again, so that memory does not grow with the course."""
-_COLLECT = 512
-"""Texts after which what is left in cycles is looked for, of each some 2 kB: the collector's own
-measure would let a process grow for much longer."""
-_RENEW = 512
-"""Texts after which the engine is made anew, since it keeps a little of every formula: of each text
-some 6 kB. A new one takes as long for its first texts as for 20 further ones."""
 
 
 class _Whole(Struct, frozen=True):
@@ -113,28 +106,19 @@ def prepare_to_read(sample: Task) -> None:
 
 
 class PageReader:
-    """Reads and draws; a context manager, since formulas are typeset by an engine."""
+    """Reads and draws; formulas are typeset by an engine, which is closed at last."""
 
-    def __init__(self, store: Memo, *, warm: bool = False) -> None:
-        """`warm`: formulas are typeset again after pages were drawn."""
+    def __init__(self, store: Memo) -> None:
         self._store = store
-        self._warm = warm
         self._lock = threading.RLock()
         self._engine: MathEngine | None = None
         self._waiting: dict[str, tuple[Task, _Whole]] = {}
         """Documents that were read and not drawn yet, by path."""
         self._room = _ROOM
-        self._read_texts = 0
         self._tools: dict[str, Tools] = {}
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._rest()
-
-    def _rest(self) -> None:
-        """Free the memory of the engine, until it is needed again."""
+    def close(self) -> None:
+        """End the engine that typesets formulas, until it is needed again."""
         if self._engine is not None:
             self._engine.close()
             self._engine = None
@@ -147,8 +131,6 @@ class PageReader:
             return self._answer(request)
 
     def _answer(self, request: Task | Draw | Ask) -> Answer:
-        if not isinstance(request, Task) and not self._warm:
-            self._rest()
         match request:
             case Task():
                 return self._read(request)
@@ -160,10 +142,6 @@ class PageReader:
                 assert_never(request)
 
     # --- reading
-
-    def summary(self, task: Task) -> DocumentSummary:
-        """The summary of a text, read now."""
-        return self._summary(self._whole(task))
 
     def _summary(self, whole: _Whole) -> DocumentSummary:
         found = formula_findings(whole.document, whole.formulas)
@@ -186,11 +164,6 @@ class PageReader:
         if summary.lasting:  # that a formula took too long may not happen again
             self._store.put(SUMMARIES, task.key, data, local=True)
         self._keep(task, whole)
-        self._read_texts += 1
-        if self._read_texts % _RENEW == 0:
-            self._rest()
-        if self._read_texts % _COLLECT == 0:
-            gc.collect()
         return data
 
     def _keep(self, task: Task, whole: _Whole) -> None:

@@ -88,7 +88,7 @@ class Session:
         self.found_by_running: tuple[Diagnostic, ...] = ()
         self.all_due = True
         """Whether more changed than documents, so that any script may do something else now."""
-        self._documents = Documents(options.store, 1, warm=True)
+        self._documents = Documents(options.store, 1)
         self._reading = threading.Lock()
         """Held while documents are read: `Documents` knows one text of each."""
         self._assets = Assets(template_texts(), Bundle(), prepared_folder())
@@ -115,7 +115,7 @@ class Session:
     def close(self) -> None:
         """End what typesets formulas: a process that ends with it running may hang."""
         with self.changed:
-            self._documents.__exit__(None, None, None)
+            self._documents.close()
 
     # --- what may be asked
 
@@ -183,7 +183,7 @@ class Session:
             if source != owner.document.source or self._static.get(path):
                 callouts = _callouts(self.course)
                 lesson = isinstance(owner, Lesson)
-                parsed = self._documents.parse(source, callouts, lesson=lesson)
+                parsed = self._documents.document(source, callouts, lesson=lesson)
                 found = (*read.diagnostics, *parsed.diagnostics)
                 fresh.append((replace(owner, document=parsed.value), found))
         return fresh
@@ -206,14 +206,7 @@ class Session:
         while True:
             edits = self.edits
             with self._reading:
-                loaded = load(
-                    self.root,
-                    documents.parse,
-                    documents.ahead,
-                    documents.course_map,
-                    documents.declarations,
-                    documents.check,
-                )
+                loaded = load(self.root, documents)
                 course = loaded.course
                 reports = None if course is None else shown_reports(self.root, course)
                 with self.changed:
