@@ -44,7 +44,8 @@ from coursebuild.core.values import encode
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.verify import extract_scripts, run, verify
+from coursebuild.pipeline.scripts import extract_scripts, run
+from coursebuild.pipeline.verify import verify
 
 
 def timed(

@@ -40,7 +40,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.verify import extract_scripts, run
+from coursebuild.pipeline.scripts import extract_scripts, run
 root = pathlib.Path.cwd()
 options = Options(root, int(sys.argv[1]), True, Memo(root, fresh=True))
 chosen = extract_scripts(load(root).course, options).runnable

@@ -33,7 +33,8 @@ from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, UsageError, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
-from coursebuild.pipeline.verify import compile_models, extract_scripts, run
+from coursebuild.pipeline.scripts import extract_scripts, run
+from coursebuild.pipeline.verify import compile_models
 from coursebuild.report.against import AgainstReport, ModelLine, ScriptAgainst
 
 

@@ -18,16 +18,15 @@ from msgspec.structs import replace
 from coursebuild.core.engine.publish import check_out, publish
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model.results import FileList, Results, SiteFile
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Severity
 from coursebuild.pipeline.check import no_lessons, scripts_ahead
-from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.judge import judge
-from coursebuild.pipeline.load import Loaded, load
+from coursebuild.pipeline.judge import depends_on, judge
+from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
-from coursebuild.pipeline.verify import Verified, verify
+from coursebuild.pipeline.verify import verify
 from coursebuild.report import Report
 
 if TYPE_CHECKING:
@@ -99,8 +98,7 @@ def _prepared(
     began = time.monotonic()
     loaded = load(options.root, documents)
     if loaded.course is None:
-        report = judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
-        return Prepared(report, ())
+        return Prepared(judge(None, loaded.diagnostics, began), ())
     verified = verify(loaded.course, options, progress, static=True, run_all=run_all)
     reports = shown_reports(options.root, loaded.course)
     found = [*loaded.diagnostics, *verified.diagnostics, *no_lessons(loaded.course)]
@@ -115,12 +113,6 @@ def _prepared(
         site = (make or site_files)(loaded.course, results, documents, options, reports.value)
         files, drawn, listed = site.files, site.drawn, site.listed
         found += site.diagnostics
-    report = _report(loaded, verified, found, time.monotonic() - began)
+    report = judge(loaded.course, found, began, scripts=verified.scripts, labs=verified.labs)
     report = replace(report, depends=depends_on(loaded.course, verified.results))
     return Prepared(report, files if report.ok else (), drawn, listed if report.ok else None)
-
-
-def _report(loaded: Loaded, verified: Verified, found: list[Diagnostic], seconds: float) -> Report:
-    course = loaded.course
-    written = [] if course is None else [x for x in course.lessons if x.document is not None]
-    return judge(course, found, verified.scripts, seconds, lessons=len(written), labs=verified.labs)

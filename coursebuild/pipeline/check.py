@@ -17,9 +17,8 @@ from coursebuild.core.model import Course, Status
 from coursebuild.core.run.prewarm import RunAll, prewarmed_runner
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, diagnose
-from coursebuild.pipeline.depends import depends_on
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
@@ -76,7 +75,7 @@ def _check(
         loaded = load(options.root, documents)
     course = loaded.course
     if course is None:
-        return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
+        return judge(None, loaded.diagnostics, began)
     chosen = select(course, names, options.root)
     verified = verify(course, options, progress, chosen.documents, shard=shard, run_all=run_all)
     if timings is not None:
@@ -95,8 +94,8 @@ def _check(
     report = judge(
         course,
         found,
-        verified.scripts,
-        time.monotonic() - began,
+        began,
+        scripts=verified.scripts,
         lessons=len(chosen.lessons),
         documents=chosen.documents,
         labs=verified.labs,

@@ -6,9 +6,7 @@ written, and neither NumPy nor MuJoCo is imported.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Literal
 
 from coursebuild.core.model import (
@@ -22,7 +20,6 @@ from coursebuild.core.model import (
     Link,
     ModelTarget,
     NumberBinding,
-    Page,
     UrlTarget,
     block_inlines,
     document_blocks,
@@ -44,7 +41,7 @@ from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.records import bench_path
 from coursebuild.pipeline.lab_inputs import SIMULATED, lab_inputs, labs_of
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
 from coursebuild.pipeline.remember import Memory
 from coursebuild.report.explained import Explained, Explanation, State
 
@@ -71,6 +68,7 @@ class _Explainer:
             for model in course.models
         }
         extractions = extract(course).value
+        self.documents = documents_by_name(course)
         self.scripts = {
             extraction.path: (extraction, job)
             for extraction, job in zip(extractions, jobs(extractions), strict=True)
@@ -80,15 +78,15 @@ class _Explainer:
         }
 
     def of(self, name: str) -> Explanation:
-        for candidate in (name, self._from_root(name)):
+        path = path_from_root(name, self.root)
+        for candidate in (name, path):
             found = self._named(candidate)
             if found is not None:
                 return found
-        path = self._from_root(name)
         dependents = self._dependents(path)
         whole = self._part_of(path)
         if not dependents and not whole and not (self.root / path).exists():
-            near = nearest(name, [*self.scripts, *self.labs, *self._documents()])
+            near = nearest(name, [*self.scripts, *self.labs, *self.documents])
             help = f"; did you mean `{near}`?" if near is not None else ""
             raise UsageError(f"nothing of this course is called `{name}`{help}")
         return self._file(path, "file", dependents)
@@ -100,7 +98,7 @@ class _Explainer:
             return Explanation(name, "script", (own,), dependents, shown=self._shown(name))
         if name in self.labs:
             return Explanation(name, "lab", (self._lab(name),))
-        part = self._documents().get(name)
+        part = self.documents.get(name)
         if part is not None:
             scripts = [
                 self._script(p) for p, (e, _) in self.scripts.items() if e.document == part.path
@@ -123,24 +121,6 @@ class _Explainer:
 
     def _part_of(self, path: str) -> tuple[str, ...]:
         return tuple(model for model, files in self.models.items() if path in files)
-
-    def _from_root(self, name: str) -> str:
-        """A path as the course writes it: given from its folder, or from the working directory."""
-        for start in (Path.cwd(), self.root):
-            path = Path(os.path.normpath(start / name))
-            if path.is_relative_to(self.root) and (path.exists() or start == self.root):
-                return path.relative_to(self.root).as_posix()
-        return name
-
-    def _documents(self) -> dict[str, Lesson | Page]:
-        found: dict[str, Lesson | Page] = {}
-        for page in self.course.pages:
-            found |= {page.id: page, page.path: page}
-        for lesson in self.course.lessons:
-            file = f"{lesson.id}-{lesson.slug}"
-            for alias in (lesson.slug, file, f"{file}.md", lesson.path, lesson.id):
-                found[alias] = lesson
-        return found
 
     # --- scripts and labs
 

@@ -22,8 +22,8 @@ from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.scripts import ExtractedScripts, extract_scripts
 from coursebuild.pipeline.update import changed_text
-from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts
 from coursebuild.report import Report
 
 
@@ -38,7 +38,7 @@ def _extract(options: Options, *, adopt: bool) -> Report:
     loaded = load(options.root)
     course = loaded.course
     if course is None:
-        return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
+        return judge(None, loaded.diagnostics, began)
     extracted = extract_scripts(course, options)
     remarks = _told(extracted)
     refused: list[Diagnostic] = []
@@ -53,9 +53,7 @@ def _extract(options: Options, *, adopt: bool) -> Report:
     found = [*loaded.diagnostics, *extracted.diagnostics, *refused]
     if not remarks and all(d.severity is not Severity.ERROR for d in found):
         remarks.append("every script is extracted already")
-    lessons = sum(lesson.document is not None for lesson in course.lessons)
-    seconds = time.monotonic() - began
-    return judge(course, found, (), seconds, lessons=lessons, remarks=tuple(remarks))
+    return judge(course, found, began, remarks=tuple(remarks))
 
 
 def _told(extracted: ExtractedScripts) -> list[str]:

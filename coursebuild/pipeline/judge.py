@@ -1,14 +1,16 @@
 """From findings to a report: silenced warnings are left out, the rest is sorted and counted.
 
-Entry point: `judge`.
+Entry points: `judge`; `depends_on`, the files for which the verdict on a course holds.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Iterable, Sequence
 from fnmatch import fnmatchcase
 
 from coursebuild.core.model import Course, Silence
+from coursebuild.core.model.results import Outcome, Results
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.report import LabLine, Report, ScriptLine, Summary
 
@@ -29,18 +31,22 @@ _OF_RUNS = (
 def judge(
     course: Course | None,
     diagnostics: Iterable[Diagnostic],
-    scripts: Sequence[ScriptLine],
-    seconds: float,
+    began: float | None = None,
     *,
-    lessons: int,
+    scripts: Sequence[ScriptLine] = (),
+    labs: tuple[LabLine, ...] = (),
+    lessons: int | None = None,
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),
-    labs: tuple[LabLine, ...] = (),
 ) -> Report:
-    """The report of a command.
+    """The report of a command that began at this moment of `time.monotonic`.
 
-    `documents` limits it to mistakes in these files and in the map, and of the scripts that ran.
+    `lessons`: how many it is about; all that are written where nothing is said. `documents` limits
+    it to mistakes in these files and in the map, and of the scripts that ran.
     """
+    if lessons is None:
+        everything = () if course is None else course.lessons
+        lessons = sum(lesson.document is not None for lesson in everything)
     told = sort_diagnostics(diagnostics)
     if documents is not None and course is not None:
         wanted = {*documents, course.map.path}
@@ -56,7 +62,7 @@ def judge(
         errors=errors,
         warnings=len(kept) - errors,
         silenced=len(told) - len(kept),
-        seconds=seconds,
+        seconds=0.0 if began is None else time.monotonic() - began,
         cached=sum(line.cached for line in scripts),
     )
     return Report(kept, tuple(scripts), summary, remarks, labs)
@@ -69,3 +75,21 @@ def _silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
         and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
         for silence in silences
     )
+
+
+def depends_on(course: Course, results: Results) -> tuple[str, ...] | None:
+    """The files beside those in the course's own folders on which the verdict depends.
+
+    `None` where nobody can know them all, as where a script starts other programs.
+    """
+    files: set[str] = {page.path for page in course.pages}
+    for run in results.runs:
+        if run.outcome in (Outcome.NORUN, Outcome.SKIPPED):
+            continue  # what is installed is looked at in any case
+        if run.trace is None or run.trace.opaque or "." in run.trace.folders:
+            return None
+        files |= {*run.trace.files, *run.trace.folders, *run.trace.outside}
+    for _, compiled in results.models:
+        if compiled.facts is not None:
+            files |= {*compiled.facts.includes}
+    return tuple(sorted(files))

@@ -151,15 +151,30 @@ def select(course: Course, names: tuple[str, ...], root: Path) -> Selection:
     return Selection(lessons, pages, frozenset(paths))
 
 
-def _named(course: Course, name: str, root: Path) -> Lesson | Page:
-    by_name: dict[str, Lesson | Page] = {}
+def documents_by_name(course: Course) -> dict[str, Lesson | Page]:
+    """Lessons by id, slug, `id-slug` and file, pages by id and file."""
+    found: dict[str, Lesson | Page] = {}
     for page in course.pages:
-        by_name |= {page.id: page, page.path: page}
+        found |= {page.id: page, page.path: page}
     for lesson in course.lessons:
         file = f"{lesson.id}-{lesson.slug}"
         for alias in (lesson.slug, file, f"{file}.md", lesson.path, lesson.id):
-            by_name[alias] = lesson
-    found = by_name.get(name) or by_name.get(_from_root(name, root))
+            found[alias] = lesson
+    return found
+
+
+def path_from_root(name: str, root: Path) -> str:
+    """A path as the course names it: given from its folder, or from the working directory."""
+    for start in (root, Path.cwd()):
+        path = Path(os.path.normpath(start / name))
+        if path.exists() and path.is_relative_to(root):
+            return path.relative_to(root).as_posix()
+    return name
+
+
+def _named(course: Course, name: str, root: Path) -> Lesson | Page:
+    by_name = documents_by_name(course)
+    found = by_name.get(name) or by_name.get(path_from_root(name, root))
     if found is None:
         near = nearest(name, [alias for alias in by_name if ("/" in alias) == ("/" in name)])
         written = [lesson.id for lesson in course.lessons if lesson.status is not Status.PLANNED]
@@ -169,12 +184,3 @@ def _named(course: Course, name: str, root: Path) -> Lesson | Page:
     if isinstance(found, Lesson) and found.status is Status.PLANNED:
         raise UsageError(f"lesson {found.id} is planned, so there is nothing in it yet")
     return found
-
-
-def _from_root(name: str, root: Path) -> str:
-    """A path as the course names it: given from its folder, or from the working directory."""
-    for start in (root, Path.cwd()):
-        path = Path(os.path.normpath(start / name))
-        if path.exists() and path.is_relative_to(root):
-            return path.relative_to(root).as_posix()
-    return name

@@ -21,7 +21,7 @@ from coursebuild.core.scripts.sensitivity import sensitivity, worth_moving
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
-from coursebuild.pipeline.verify import run
+from coursebuild.pipeline.scripts import run
 
 _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
 

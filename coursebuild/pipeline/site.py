@@ -21,7 +21,12 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.digests import Digests
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.prepared import prepared_copy, prepared_folder
+from coursebuild.core.engine.prepared import (
+    prepared_copy,
+    prepared_cut,
+    prepared_folder,
+    prepared_source,
+)
 from coursebuild.core.engine.steps import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import Bundle, template_texts
@@ -41,7 +46,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt, Source, key_of, text_digest
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.memoized import kept_font
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.pages import Pages
 from coursebuild.pipeline.tasks import all_imports
@@ -153,7 +157,7 @@ class SiteMaker:
             facts, cut = _ANYTHING, _whole
         else:
             facts = replace(facts, text=facts.text | common_characters(self.library))
-            cut = functools.partial(kept_font, self.store)
+            cut = functools.partial(_cut_font, self.store)
         key = step_key("shared files", facts, cut is _whole)
         data = _Data(self.store, key, functools.partial(self._make_shared, facts, cut))
         names, paths = data.listing()
@@ -267,6 +271,18 @@ class SiteMaker:
         return Exports(
             self.library, pages, ExportContext(self._packed, self._imports, taken)
         ).files()
+
+
+def _cut_font(store: Memo, job: FontJob) -> bytes:
+    """A cut font: cut already, or cut now from the smallest font that has all that it needs."""
+
+    def make() -> bytes:
+        from coursebuild.core.pages.fonts import VERSION, subset_font
+
+        source = prepared_source(job.data, job.characters, VERSION)
+        return subset_font(job if source is None else replace(job, data=source))
+
+    return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make)
 
 
 class _Data:

@@ -40,7 +40,7 @@ from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
-from coursebuild.pipeline.verify import ExtractedScripts, extract_scripts, run, script_lines
+from coursebuild.pipeline.scripts import ExtractedScripts, extract_scripts, run, script_lines
 from coursebuild.report import Report
 
 
@@ -58,7 +58,7 @@ def _update(
     loaded = load(options.root)
     course = loaded.course
     if course is None:
-        return judge(None, loaded.diagnostics, (), time.monotonic() - began, lessons=0)
+        return judge(None, loaded.diagnostics, began)
     chosen = select(course, names, options.root)
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
@@ -79,13 +79,11 @@ def _update(
         found += _noise(now.course, chosen, changed, first, options, progress)
     if not remarks and all(d.severity is not Severity.ERROR for d in found):
         remarks = ("every recorded output is up to date",)
-    lines = script_lines(scripts, _told(first, again), ())
-    seconds = time.monotonic() - began
     return judge(
         course,
         found,
-        lines,
-        seconds,
+        began,
+        scripts=script_lines(scripts, _told(first, again), ()),
         lessons=len(chosen.lessons),
         documents=chosen.documents,
         remarks=remarks,

@@ -1,12 +1,12 @@
-"""Course → Results: extract and run the scripts, compare, compile the models.
+"""Course → Results: run the scripts, compare, compile the models, try the labs.
 
-Entry point: `verify(course, options, progress, lessons)`.
+Entry point: `verify(course, options, progress, documents)`.
 
-1. Scripts are written to `examples/`; one that was edited there by hand is reported and not run.
-2. The scripts of the chosen lessons run, `options.jobs` at a time.
-3. Recorded outputs and bound numbers are held against the runs.
-4. Models and MJCF blocks are compiled in a child process, which is not started for a course that
+1. Scripts are written to `examples/`, and those of the chosen documents run (`scripts`).
+2. Recorded outputs and bound numbers are held against the runs.
+3. Models and MJCF blocks are compiled in a child process, which is not started for a course that
    has none.
+4. Labs are tried beside the scripts.
 
 Documents may be summaries. Formulas are no part of this: see `pipeline.documents`.
 """
@@ -14,44 +14,32 @@ Documents may be summaries. Formulas are no part of this: see `pipeline.document
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, assert_never
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.steps import step_key
 from coursebuild.core.features import check_runs
-from coursebuild.core.files.errors import OutsideProjectError
-from coursebuild.core.files.examples import Blocked, Obstacle, write_examples
-from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, FeatureBlock, Lab, document_blocks, document_has
-from coursebuild.core.model.results import (
-    CompileResult,
-    LabResult,
-    Outcome,
-    Results,
-    ScriptJob,
-    ScriptRun,
-    Verdict,
-)
+from coursebuild.core.model.results import CompileResult, LabResult, Results, ScriptRun
 from coursebuild.core.run.versions import engine_version, python_version
-from coursebuild.core.scripts.binding_memory import BindingMemory
+from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingMemory, LazyInputs
 from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
-from coursebuild.core.scripts.dependencies import Inputs
-from coursebuild.core.scripts.divergence import is_lost
-from coursebuild.core.scripts.extract import Extraction, extract, jobs
+from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.findings import script_findings
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
-from coursebuild.pipeline.memoized import KeptBindings
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.remember import Memory, longest_first
+from coursebuild.pipeline.remember import Memory
+from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
 from coursebuild.report import LabLine, ScriptLine
 
 if TYPE_CHECKING:
     from coursebuild.core.run.prewarm import RunAll
-    from coursebuild.core.run.runner import RunEvent
     from coursebuild.pipeline.shards import Shard
 
 
@@ -160,200 +148,38 @@ def _leaned_on(course: Course, documents: Collection[str]) -> set[str]:
     return paths
 
 
-# --- scripts
+class KeptBindings:
+    """Bound numbers in which nothing is wrong, by a hash of all that this depends on.
 
-
-class ExtractedScripts(Struct, frozen=True):
-    """The scripts as they are in `examples/` now."""
-
-    all: tuple[Extraction, ...]
-    runnable: tuple[Extraction, ...]
-    """Those whose file is what the lesson says."""
-    diagnostics: tuple[Diagnostic, ...]
-    written: tuple[str, ...]
-    removed: tuple[str, ...]
-    blocked: tuple[Blocked, ...]
-    digests: Mapping[str, str] = field(default_factory=dict)
-    """The SHA-256 of the file of each, as far as it is known."""
-
-
-class _Files(Mapping[str, bytes]):
-    """The bytes of scripts by path, of which never more than one is held."""
-
-    def __init__(self, extractions: Mapping[str, Extraction]) -> None:
-        self._extractions = extractions
-
-    def __getitem__(self, path: str) -> bytes:
-        return self._extractions[path].data
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._extractions)
-
-    def __len__(self) -> int:
-        return len(self._extractions)
-
-
-def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
-    """Bring `examples/` up to date, as far as nobody's edits are lost."""
-    parsed = extract(course)
-    folders = {document.source.path.rpartition("/")[0] for document in course.documents}
-    remove_leftovers(options.root / folder for folder in folders)
-    try:
-        report = write_examples(options.root, _Files({e.path: e for e in parsed.value}))
-    except OutsideProjectError as error:
-        place = parsed.value[0].script.path_span if parsed.value else course.map.span(0, 0)
-        told = diagnose("script-path", place, error.message, help="make it a folder of the course")
-        return ExtractedScripts(parsed.value, (), (*parsed.diagnostics, told), (), (), ())
-    by_path = {e.path: e for e in parsed.value}
-    blocked = {example.path for example in report.blocked}
-    found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
-    runnable = tuple(e for e in parsed.value if e.path not in blocked)
-    return ExtractedScripts(
-        parsed.value,
-        runnable,
-        tuple(found),
-        report.written,
-        report.removed,
-        report.blocked,
-        report.digests,
-    )
-
-
-_LEFT = {
-    Obstacle.EDITED: "{path} was edited by hand since it was extracted, so it is left as it is",
-    Obstacle.FOREIGN: "{path} holds something else than this block, which was not extracted there",
-    Obstacle.ORPHAN: "{path} was edited by hand, and no lesson has this script any more",
-    Obstacle.LINK: "{path} is, or lies behind, a link, and nothing is written through links",
-    Obstacle.FOLDER: "{path} cannot be written: a folder and a file would have the same name",
-}
-
-
-def _left(blocked: Blocked, extraction: Extraction | None, course: Course) -> Diagnostic:
-    """Why a file in `examples/` was left alone, and how to go on."""
-    message = _LEFT[blocked.obstacle].format(path=blocked.path)
-    if extraction is None:
-        help = "move the file away, or bring it back into a lesson"
-        return diagnose("example-edited", course.map.span(0, 0), message, help=help)
-    if blocked.obstacle in (Obstacle.LINK, Obstacle.FOLDER):
-        help = "move what is there away, or extract the script to another path"
-        return diagnose("script-path", extraction.script.path_span, message, help=help)
-    help = (
-        "`coursebuild extract --adopt` brings what the file holds into the lesson; "
-        "to drop it instead, delete the file"
-    )
-    if blocked.diverged:
-        help = (
-            "the block was changed as well: bring what is to stay of the file into it by hand, "
-            "then delete the file"
-        )
-    notes = [Note("from the block to the file:\n" + blocked.diff.rstrip())] if blocked.diff else []
-    return diagnose("example-edited", extraction.script.path_span, message, help=help, notes=notes)
-
-
-def run(
-    chosen: Iterable[Extraction],
-    options: Options,
-    progress: Progress,
-    stage: str = "running scripts",
-    memory: Memory | None = None,
-    run_all: RunAll | None = None,
-    perturbation: int = 0,
-    digests: Mapping[str, str] | None = None,
-    known: Mapping[str, ScriptRun] | None = None,
-) -> tuple[ScriptRun, ...]:
-    """The results of the chosen scripts: remembered ones, and those of the others run now.
-
-    What begins and ends is told. `memory` is what is remembered; another one than that of the
-    options where everything is to run. `run_all` is what runs them, where it
-    is not `run_scripts`.
-    `perturbation`: with initial states moved, in the direction that has this number. `digests`:
-    of files, by path, as far as they are known. `known`: results, by path, that hold.
+    Those of the last run are kept, and no others.
     """
-    chosen = tuple(chosen)
-    memory = Memory(options.root, options.store) if memory is None else memory
-    todo = jobs(chosen, perturbation)
-    done = dict(known or {})
-    inputs = {
-        job.path: _inputs(memory, job, extraction, digests or {})
-        for job, extraction in zip(todo, chosen, strict=True)
-        if not job.norun and job.path not in done
-    }
-    if inputs:
-        done |= memory.recall(tuple(inputs.values()))
-    left = [job for job in todo if job.path not in done]
-    for finished in _run(left, inputs, options, progress, stage, memory, run_all):
-        done[finished.path] = finished
-    return tuple(done[job.path] for job in todo)
 
+    def __init__(self, store: Memo) -> None:
+        self._store = store
+        self._key = step_key("bindings")
+        known = store.get_value("bindings", self._key, list[str], local=True)
+        self._before = frozenset(known or ())
+        self._now: set[str] = set()
 
-def _inputs(
-    memory: Memory, job: ScriptJob, extraction: Extraction, digests: Mapping[str, str]
-) -> Inputs:
-    known = digests.get(job.path)
-    return memory.inputs(job, extraction.data) if known is None else memory.inputs_by(job, known)
+    def holds(self, key: str, inputs: LazyInputs) -> bool:
+        """Whether nothing was wrong in the last run."""
+        if key in self._before:
+            self._now.add(key)
+            return True
+        return False
 
+    def add(self, key: str, inputs: LazyInputs, evidence: BindingEvidence) -> None:
+        """That nothing is wrong."""
+        self._now.add(key)
 
-def _run(
-    todo: Sequence[ScriptJob],
-    inputs: Mapping[str, Inputs],
-    options: Options,
-    progress: Progress,
-    stage: str,
-    memory: Memory,
-    run_all: RunAll | None,
-) -> tuple[ScriptRun, ...]:
-    """Run scripts, the longest first, and remember what they did."""
-    if not todo:
-        return ()
-    from coursebuild.core.run.runner import RunFinished, RunStarted, run_scripts
+    def before(self, inputs: LazyInputs) -> BindingEvidence:
+        """Not kept: what is said of a course does not depend on what was said of it before."""
+        return BindingEvidence()
 
-    count = sum(not job.norun for job in todo)
-    if not count:
-        return run_scripts(options.root, todo, parallel=1)
-    lasted = {job.path: memory.last(job.path) for job in todo}
-    seconds = {path: None if last is None else last.seconds for path, last in lasted.items()}
-
-    def told(event: RunEvent) -> None:
-        match event:
-            case RunStarted():
-                memory.started(event.path)
-                progress.started(event.path)
-            case RunFinished():
-                done = event.run
-                memory.keep(inputs[done.path], done)
-                progress.finished(done.path, done.outcome.value, done.seconds)
-            case _:
-                assert_never(event)
-
-    memory.begin()
-    with progress.stage(stage, count):
-        ordered = longest_first(todo, seconds)
-        if options.executor is not None:
-            from coursebuild.core.run.dask_runner import run_on_dask
-
-            runs = run_on_dask(options.executor, options.root, ordered, on_event=told)
-        else:
-            run_all = run_all or options.run_all or run_scripts
-            runs = run_all(options.root, ordered, parallel=options.jobs, on_event=told)
-    memory.close()
-    return runs
-
-
-def script_lines(
-    chosen: Sequence[Extraction], runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
-) -> tuple[ScriptLine, ...]:
-    """How each script did, as a report lists it."""
-    drifted = {v.recording.script for v in verdicts if v.status == "drift"}
-    lines = []
-    for extraction, done in zip(chosen, runs, strict=True):
-        drift = done.outcome is Outcome.OK and done.path in drifted
-        status = "drift" if drift else done.outcome.value
-        if done.outcome is Outcome.OK and is_lost(extraction, done):
-            status = "diverged"
-        lines.append(
-            ScriptLine(done.path, extraction.owner, status, done.seconds, done.cached, done.missing)
-        )
-    return tuple(lines)
+    def save(self) -> None:
+        """Keep what was found."""
+        if self._now != self._before:
+            self._store.put_value("bindings", self._key, sorted(self._now), local=True)
 
 
 def lab_lines(labs: Sequence[LabResult]) -> tuple[LabLine, ...]:

@@ -31,7 +31,8 @@ from coursebuild.pipeline.check import no_lessons
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
-from coursebuild.pipeline.verify import run, verify
+from coursebuild.pipeline.scripts import run
+from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.session import Session, is_same_script
 from coursebuild.report import Style, render_report

@@ -93,7 +93,7 @@ def test_lists_of_lessons_follow_their_questions(
 def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]) -> None:
     """Also where a page lies outside of `content/`."""
     folder = make(GOOD)
-    page = '\n[[page]]\nid = "p"\ntitle = "P"\npath = "docs/p.md"\n'
+    page = '\n[[page]]\nid = "p"\ntitle = "P"\nfile = "docs/p.md"\n'
     folder.write("content/course.toml", folder.text("content/course.toml") + page)
     folder.write("docs/p.md", "## A page\n\nText.\n")
     running = live(folder)

@@ -203,4 +203,4 @@ class Workshop:
         own = replace(options, cache=Memo(root))
         _, found = try_labs(loaded.course, dict(models), own, engines, wrong=wrong)
         diagnostics = [*loaded.diagnostics, *wrong, *found]
-        return judge(loaded.course, diagnostics, (), 0.0, lessons=2).diagnostics
+        return judge(loaded.course, diagnostics).diagnostics
