@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from support.built_sites import BuiltCourses
 from support.scratch_course import ROOT, Folder
 
 pytestmark = pytest.mark.engine
@@ -18,12 +19,9 @@ FULL = ROOT / "tests/courses/full/course"
 
 
 @pytest.fixture(scope="module")
-def original(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
-    """The course that uses everything, built in this process."""
-    folder = copy(tmp_path_factory.mktemp("original") / "course", stores)
-    done = folder.main("build", "--jobs", "1")
-    assert done.status == 0, done.out
-    return folder
+def original(built_courses: BuiltCourses) -> Folder:
+    """The course that uses everything, built in a process of the tests."""
+    return built_courses.of_case("full")
 
 
 def copy(root: Path, stores: Path) -> Folder:

@@ -81,6 +81,7 @@ class Builds:
 
     def __init__(self, where: Path, stores: Path) -> None:
         self.where, self.stores, self.numbers = where, stores, itertools.count()
+        self.trials = where / "trials"
 
     def __call__(self, folder: Folder) -> dict[str, bytes] | None:
         """The published files, or nothing for a course with mistakes."""
@@ -89,7 +90,7 @@ class Builds:
             if (folder.root / top).is_dir():
                 shutil.copytree(folder.root / top, fresh.root / top)
         fresh.borrow(self.stores)
-        share(fresh, self.where / "trials")
+        share(fresh, self.trials)
         done = fresh.main("build")
         if done.status != 0:
             return None
