@@ -3,26 +3,24 @@
 Entry point: `FolderWatcher`. What reading a course leaves out (caches, editors' own files) is no
 change.
 
-The folders of the course are watched with all that is in them. Pages may lie elsewhere
-(`docs/guide.md`, `README.md`): of their folders only these files count. Folders that are made later
-are watched from then on.
+The folders of the course are watched with all that is in them, also those that are made later.
+Pages may lie elsewhere (`docs/guide.md`, `README.md`): these files are looked at now and then.
 """
 
 from __future__ import annotations
 
 import contextlib
-import posixpath
 import queue
 import stat
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError, reason
 
 FOLDERS = ("content", "features", "models", "mjcourse")
 LOOK = 0.200
-"""Seconds from one look for new and removed folders to the next."""
+"""Seconds from one look for new and removed folders, and at files elsewhere, to the next."""
 _STEP = 2
 """Milliseconds from one look for events to the next: a save is told of within two of them."""
 
@@ -35,21 +33,16 @@ class FolderWatcher:
         self._stop = threading.Event()
         self._others: frozenset[str] = frozenset()
         self._events: queue.SimpleQueue[frozenset[str] | OSError] = queue.SimpleQueue()
-        self._begun = [threading.Event(), threading.Event()]
-        self._threads = [
-            threading.Thread(target=self._run, args=(watch, begun), name="watch", daemon=True)
-            for watch, begun in zip((self._folders, self._files), self._begun, strict=True)
-        ]
+        self._begun = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
 
     def start(self) -> None:
         """Begin to watch; `wait` says when nothing is missed any more."""
-        for thread in self._threads:
-            thread.start()
+        self._thread.start()
 
     def wait(self) -> None:
         """Until no change is missed."""
-        for begun in self._begun:
-            begun.wait()
+        self._begun.wait()
 
     @property
     def stopped(self) -> bool:
@@ -60,9 +53,8 @@ class FolderWatcher:
         """Watch no longer."""
         self._stop.set()
         self._events.put(frozenset())
-        for thread in self._threads:
-            if thread.is_alive():
-                thread.join(1.0)
+        if self._thread.is_alive():
+            self._thread.join(1.0)
 
     def watch_also(self, paths: frozenset[str]) -> None:
         """Files elsewhere that count as well, by POSIX path relative to the course's folder."""
@@ -87,66 +79,52 @@ class FolderWatcher:
             )
         return found
 
-    def _run(self, watch: Callable[[Callable[[], None]], None], begun: threading.Event) -> None:
+    def _run(self) -> None:
         try:
-            watch(begun.set)
+            self._follow()
         except OSError as error:
             self._events.put(error)
         finally:
-            begun.set()
+            self._begun.set()
 
-    # --- the course's own folders
-
-    def _folders(self, begun: Callable[[], None]) -> None:
+    def _follow(self) -> None:
         before: frozenset[str] | None = None
+        seen: dict[str, tuple[int, ...]] = {}
         while not self._stop.is_set():
-            folders = self._there(FOLDERS)
+            folders = self._folders()
             # Told of once they are watched: a file may be put into a new one at any time, and into
             # any while none was.
             news = frozenset() if before is None else before | folders.keys()
-            for changed in self._watch(tuple(self._root / f for f in folders), recursive=True):
-                begun()
-                if changed | news:
-                    self._events.put(changed | news)
+            for changed in self._watch(tuple(self._root / f for f in folders)):
+                self._begun.set()
+                known, seen = seen, {path: self._state(path) for path in self._others}
+                others = {path for path in seen if known.get(path, seen[path]) != seen[path]}
+                if changed | news | others:
+                    self._events.put(changed | news | others)
                 news = frozenset()
-                if self._there(FOLDERS) != folders:
+                if self._folders() != folders:
                     break
             before = frozenset(folders)
 
-    # --- files elsewhere
-
-    def _files(self, begun: Callable[[], None]) -> None:
-        others: frozenset[str] = frozenset()
-        before: dict[str, tuple[int, int]] = {}
-        while not self._stop.is_set():
-            known, others = others, self._others
-            parents = {path: posixpath.dirname(path) for path in others}
-            folders = self._there(parents.values())
-            # As above; of what was not asked for until now nobody has missed anything.
-            moved = {f for f in parents.values() if folders.get(f) != before.get(f)}
-            news = frozenset(path for path in known & others if parents[path] in moved)
-            for changed in self._watch(tuple(self._root / f for f in folders), recursive=False):
-                begun()
-                if wanted := changed & others | news:
-                    self._events.put(wanted)
-                news = frozenset()
-                if self._others != others or self._there(parents.values()) != folders:
-                    break
-            before = folders
-
-    # --- both
-
-    def _there(self, folders: Iterable[str]) -> dict[str, tuple[int, int]]:
-        """The folders that there are, and which they are: device and inode."""
+    def _folders(self) -> dict[str, tuple[int, ...]]:
+        """The folders of the course that there are, and which they are: device and inode."""
         found = {}
-        for name in sorted(set(folders)):
+        for name in FOLDERS:
             with contextlib.suppress(OSError):
                 status = (self._root / name).stat()
                 if stat.S_ISDIR(status.st_mode):
-                    found[name] = status.st_dev, status.st_ino
+                    found[name] = (status.st_dev, status.st_ino)
         return found
 
-    def _watch(self, folders: tuple[Path, ...], *, recursive: bool) -> Iterator[frozenset[str]]:
+    def _state(self, path: str) -> tuple[int, ...]:
+        """What is another after a save of a file."""
+        try:
+            status = (self._root / path).stat()
+        except OSError:
+            return ()
+        return status.st_mtime_ns, status.st_size, status.st_ino
+
+    def _watch(self, folders: tuple[Path, ...]) -> Iterator[frozenset[str]]:
         """Changes in these folders; an empty set at first, and now and then."""
         if not folders:
             while not self._stop.is_set():
@@ -163,7 +141,6 @@ class FolderWatcher:
             step=_STEP,
             rust_timeout=round(1000 * LOOK),
             yield_on_timeout=True,
-            recursive=recursive,
         ):
             yield frozenset(Path(path).relative_to(self._root).as_posix() for _, path in batch)
 
