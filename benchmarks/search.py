@@ -45,8 +45,9 @@ from benchmarks.generate.wordy import vocabulary, write_wordy  # noqa: E402
 
 QUERIES = ("inertia tensor", "gyroscope", "energy drift", "model", "quaternion rotation")
 WITHOUT = """
-import coursebuild.core.pages.search.page as page
-page.searched = lambda sheet, document, body: None
+from coursebuild.core.features import Feature
+import coursebuild.features.search as search
+search.FEATURE = Feature(name="search")
 """
 COMMAND = "import sys\n{patch}\nfrom coursebuild.cli import main\nsys.exit(main(sys.argv[1:]))"
 PEER_PAGE = """<!DOCTYPE html><html lang="en"><title>x</title><ol></ol>

@@ -22,22 +22,24 @@ import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
 
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Document, FeatureBlock
+from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.rules import RULES, Rule
 
 if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
+    from coursebuild.core.model.results import FileList, SiteFile
+    from coursebuild.core.pages.added_files import SiteContext
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.exports.plain import Plain
     from coursebuild.core.pages.library import Library
-    from coursebuild.core.pages.search.sections import SectionReader
+    from coursebuild.core.pages.page_inputs import PageInputs
     from coursebuild.core.pages.tools import Tools
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
@@ -46,6 +48,19 @@ B = TypeVar("B", bound=FeatureBlock)
 
 GROUP = "coursebuild.features"
 """The group of entry points under which packages offer features."""
+
+
+class IndexReader(Protocol):
+    """Reads what the search finds of a block."""
+
+    def add(self, kind: Literal["text", "code", "formula", "output"], text: str) -> None:
+        """Read a text, unless there is nothing in it."""
+
+    def blocks(self, blocks: Iterable[Block]) -> None:
+        """Read the blocks inside."""
+
+    def text(self, inlines: Iterable[Inline]) -> str:
+        """A line of Markdown as text."""
 
 
 class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
@@ -65,7 +80,7 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
     wide: bool = True
     """Whether it takes the whole width of the text, so that no docked lab can stand beside it."""
-    index: Callable[[SectionReader, B], None] = lambda reader, block: None
+    index: Callable[[IndexReader, B], None] = lambda reader, block: None
     """Gives the search what can be found of the block."""
 
 
@@ -132,6 +147,11 @@ class Feature(Struct, frozen=True, kw_only=True):
     style: str = ""
     """CSS that every page of the site gets."""
     parts: tuple[PagePart, ...] = ()
+    note: Callable[[PageInputs, Document | None, str], bytes] | None = None
+    """What `files` has to know of a page, from its inputs, its document and its HTML; it is kept
+    with the page. Nothing where that says nothing."""
+    files: Callable[[SiteContext], Iterable[SiteFile | FileList]] | None = None
+    """Further files of the site."""
 
 
 CORE_PAGES = ("home", "level", "lesson", "stub", "model", "page", "notfound")

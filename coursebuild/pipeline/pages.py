@@ -27,12 +27,12 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.steps import step_key
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CachedFile
+from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.frame import Frames, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import has
 from coursebuild.core.pages.page_list import PageEntry, own_pages, page_list, page_title
 from coursebuild.core.pages.record import PageRecord
-from coursebuild.core.pages.search.files import IndexEntry
 from coursebuild.core.pages.shared import PageFacts
 from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
@@ -62,8 +62,8 @@ class _Wanted(Struct, frozen=True):
 class _Page(Struct, frozen=True):
     wanted: _Wanted
     indexed: bool
-    entry: IndexEntry | None
-    """Where it is searched."""
+    notes: tuple[tuple[str, NotedPage], ...]
+    """Of features, by name."""
     ids: tuple[str, ...]
     """Its anchors."""
 
@@ -109,22 +109,18 @@ class Pages:
         """Site paths of the pages that search engines should list."""
         return (page.wanted.path for page in self._pages if page.indexed)
 
-    @property
-    def searched(self) -> tuple[IndexEntry, ...]:
-        """The pages that are searched, in order."""
-        entries = (page.entry for page in self._pages)
-        return tuple(entry for entry in entries if entry is not None)
+    def noted(self, feature: str) -> tuple[NotedPage, ...]:
+        """The pages of which a feature has noted something, in order."""
+        return tuple(one for page in self._pages for name, one in page.notes if name == feature)
 
-    def found_by(self, path: str) -> tuple[bytes, bytes]:
-        """The text and the terms that a page is found by."""
+    def note(self, feature: str, path: str) -> bytes:
+        """What a feature has noted of one of these pages."""
         page = self._at(path)
         kept = KeptPage.read(self._store.peek(PAGES, page.key))
-        if kept is not None and kept.text:
-            return kept.text, kept.terms
+        if kept is not None and feature in kept.notes:
+            return kept.notes[feature]
         # It was damaged, or the store cannot be written.
-        searched = self._documents.drawn(self._request(page)).searched
-        assert searched is not None
-        return searched.text, searched.terms
+        return self._documents.drawn(self._request(page)).notes[feature]
 
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
@@ -264,10 +260,12 @@ class Pages:
     def _noted(self, page: _Wanted, record: PageRecord) -> _Page:
         """A page, now that it is known what it says."""
         self._facts.add(record)
-        entry, draft = None, record.draft
-        if record.search is not None:
-            entry = IndexEntry(draft.path, draft.kind, draft.title, *record.search)
-        return _Page(page, draft.indexed, entry, record.ids)
+        draft = record.draft
+        notes = tuple(
+            (name, NotedPage(draft.path, draft.kind, page.page.id, draft.title, digest))
+            for name, digest in record.notes
+        )
+        return _Page(page, draft.indexed, notes, record.ids)
 
     def _known(self, key: str) -> PageRecord | None:
         """The record of a page that was drawn before."""

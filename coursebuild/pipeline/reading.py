@@ -12,6 +12,7 @@ What draws is imported when there is something to draw.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import threading
 from collections.abc import Sequence
@@ -82,10 +83,10 @@ _HEAVY = (
     "coursebuild.core.pages.highlight",
     "coursebuild.core.pages.lesson",
     "coursebuild.core.pages.pages",
-    "coursebuild.core.pages.search.page",
     "coursebuild.core.syntax.document",
     "coursebuild.core.syntax.lab",
     "coursebuild.features.quiz.parse",
+    "coursebuild.features.search.page",
 )
 
 
@@ -211,7 +212,7 @@ class PageReader:
     # --- drawing
 
     def draw(self, request: Draw) -> Drawn:
-        """A page, its body, and what it is found by."""
+        """A page, its body, and what is noted of it."""
         with self._lock:
             return self._drawn(request)
 
@@ -228,9 +229,9 @@ class PageReader:
             return record(draw(request.inputs, document, tools), request.base_url)
 
     def _drawn(self, request: Draw) -> Drawn:
+        from coursebuild.core.pages.added_files import page_notes
         from coursebuild.core.pages.draw import draw_whole
         from coursebuild.core.pages.exports.files import page_byproducts
-        from coursebuild.core.pages.search.page import searched
 
         whole = self._whole(request.task) if request.task is not None else None
         tools = self._tools_for(request.language)
@@ -240,15 +241,15 @@ class PageReader:
         inputs = request.inputs
         draft, page = draw_whole(inputs, document, tools)
         found, body = record(draft, request.base_url)
-        by = searched(inputs, document, str(draft.body))
-        if by is not None:
-            found = replace(found, search=(by.name, by.digest))
+        notes = page_notes(inputs, document, str(draft.body))
+        digests = tuple((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
+        found = replace(found, notes=digests)
         made = page_byproducts(inputs, page, request.base_url, body)
-        return Drawn(found, body, by, made)
+        return Drawn(found, body, notes, made)
 
     def _draw(self, request: Draw) -> bytes:
         drawn = self._drawn(request)
-        page = KeptPage.of(drawn.record, drawn.body, drawn.searched)
+        page = KeptPage.of(drawn)
         self._store.put(BYPRODUCTS, request.key, encode(drawn.byproducts), local=True)
         # At last, since a page that is there is not drawn again.
         self._store.put(PAGES, request.key, msgspec.msgpack.encode(page), local=True)

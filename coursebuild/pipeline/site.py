@@ -33,13 +33,12 @@ from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Results, SiteFile
 from coursebuild.core.pages import meta, urls, zips
+from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.compressed import COPIES, compressed_files, kept_copy
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.offline import file_list, offline_files
 from coursebuild.core.pages.page_list import PageEntry
-from coursebuild.core.pages.search.files import SearchFiles, search_words
 from coursebuild.core.pages.shared import PageFacts, common_characters
 from coursebuild.core.run.packages import distributions, library_files
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
@@ -55,8 +54,8 @@ if TYPE_CHECKING:
 
 _SHARED, _SHARED_DATA = "shared", "shared-data"
 """Kinds of entries in the store: the names of what all pages share, and its bytes."""
-_CELLS = "search"
-"""Kind of the entries that hold parts of the index of the search."""
+_PARTS = "parts"
+"""Kind of the entries that hold parts of what features add to a site."""
 _DIGEST = hashlib.sha256().digest_size * 2
 
 
@@ -130,9 +129,8 @@ class SiteMaker:
         self.documents.rest()
         names, shared = self._shared(None if whole_fonts else pages.facts)
         files = [*self._labs(), *self._downloads()]
-        files += offline_files(self.course, self.assets)
-        files += self._search(pages)
-        files += shared
+        added, listed = added_files(functools.partial(self._context, pages, names))
+        files += [*added, *shared]
         files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
         if self.course.base_url:
             sitemap = meta.sitemap(self.course, pages.indexed)
@@ -143,7 +141,6 @@ class SiteMaker:
         if entries is None and not pages.are_sound({file.path for file in files}):
             found = tuple(broken_links([*framed, *files], self.course.base_url))
         everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
-        listed = file_list(names, step_key("list of files", names))
         return Site(everything, listed, found, pages.drawn, names, pages.keys)
 
     # --- what all pages share
@@ -194,15 +191,16 @@ class SiteMaker:
         files = self.library.labs.files
         return [*files, *self._copies(files)]
 
-    def _search(self, pages: Pages) -> Iterator[SiteFile]:
-        files = SearchFiles(
-            pages.searched,
-            search_words(self.library.words),
-            lambda path: pages.found_by(path)[0],
-            lambda path: pages.found_by(path)[1],
-            _Cells(self.store),
+    def _context(self, pages: Pages, names: Names, feature: str) -> SiteContext:
+        """What a feature makes further files from."""
+        return SiteContext(
+            self.library,
+            self.assets,
+            names,
+            pages.noted(feature),
+            functools.partial(pages.note, feature),
+            functools.partial(self.store.get_or_create, _PARTS, local=True),
         )
-        return files.files()
 
     # --- downloads
 
@@ -322,21 +320,6 @@ class _Data:
             return None if data is None else msgspec.msgpack.decode(data, type=type)
         except msgspec.MsgspecError:
             return None
-
-
-class _Cells:
-    """Parts of the index of the search, in the store."""
-
-    def __init__(self, store: Memo) -> None:
-        self._store = store
-
-    def get(self, key: str) -> bytes | None:
-        """What an earlier build made."""
-        return self._store.get(_CELLS, key, local=True)
-
-    def put(self, key: str, data: bytes) -> None:
-        """Keep it for the next build."""
-        self._store.put(_CELLS, key, data, local=True)
 
 
 class _Imports:

@@ -17,7 +17,6 @@ from coursebuild.core.engine.steps import step_key
 from coursebuild.core.model import Document
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord
-from coursebuild.core.pages.search.values import Searched
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode
@@ -127,8 +126,8 @@ class Drawn(Struct, frozen=True):
 
     record: PageRecord
     body: str
-    searched: Searched | None
-    """What it is found by; `None` where it is not searched."""
+    notes: dict[str, bytes]
+    """See `page_notes`."""
     byproducts: PageByproducts
     """What it gives to the files beside it."""
 
@@ -143,17 +142,15 @@ class KeptPage(Struct, frozen=True, array_like=True):
     """A page in the store."""
 
     packed_record: bytes
-    text: bytes
-    """See `Searched`; empty where the page is not searched. So is the next."""
-    terms: bytes
+    notes: dict[str, bytes]
+    """See `page_notes`."""
     body: bytes
     """UTF-8."""
 
     @classmethod
-    def of(cls, record: PageRecord, body: str, searched: Searched | None) -> KeptPage:
+    def of(cls, drawn: Drawn) -> KeptPage:
         """A page that was drawn just now."""
-        text, terms = (b"", b"") if searched is None else (searched.text, searched.terms)
-        return cls(encode(record), text, terms, body.encode())
+        return cls(encode(drawn.record), drawn.notes, drawn.body.encode())
 
     @classmethod
     def read(cls, data: bytes | None) -> KeptPage | None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from support.live_course import Live
+from support.live_course import live as live
 from support.scratch_course import ROOT, Folder
 
 pytestmark = pytest.mark.site
@@ -163,3 +166,70 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
         assert "error[task-name]: two tasks are called A & B\n" in course.main("check").out
     course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\n```\n")
     assert course.main("check").out.startswith("error[task-name]: this task has no name\n")
+
+
+# --- pages
+
+
+@pytest.fixture
+def inventory(course: Folder) -> Folder:
+    """A course with the page of the docs."""
+    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    code = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    course.write("features/inventory.py", code[1])
+    course.replace(MAP, '"features/shout.py"', '"features/shout.py", "features/inventory.py"')
+    course.write("models/box.xml", "<mujoco><worldbody/></mujoco>\n")
+    return course
+
+
+def test_the_page_of_the_docs_is_a_page_of_the_site(inventory: Folder) -> None:
+    done = inventory.main("build")
+    assert done.status == 0, done.out
+    html = inventory.text("public/inventory/index.html")
+    assert '<li><a href="../models/box.html">box</a>, used 0 times</li>' in html
+    assert "<title>Inventory · " in html
+    assert '<a href="inventory/index.html">Inventory</a>' in inventory.text("public/index.html")
+    assert '"inventory/index.html"' in inventory.text("public/search/index.js")
+    assert "[box](../models/box.md)" in inventory.text("public/inventory/index.md")
+
+
+def test_a_page_of_a_feature_follows_the_course(
+    inventory: Folder, live: Callable[[Folder], Live]
+) -> None:
+    shown = live(inventory)
+    page = "inventory/index.html"
+    assert b"used 0 times" in (shown.find(page) or b"")
+    inventory.write("content/lessons/1.1-one.md", "See [it](model:box).\n")
+    shown.save("content/lessons/1.1-one.md")
+    assert b"used 1 times" in (shown.find(page) or b"")
+    site = shown.site()
+    assert inventory.main("build").status == 0
+    built = inventory.tree("public")
+    assert site == {path: built[path] for path in site}
+    (inventory.root / "models/box.xml").unlink()
+    inventory.write("content/lessons/1.1-one.md", "Text.\n")
+    assert inventory.main("build").status == 0
+    assert not [path for path in inventory.tree("public") if "inventory" in path]
+
+
+def test_a_broken_link_of_a_page_of_a_feature_is_told(inventory: Folder) -> None:
+    inventory.replace("features/inventory.py", 'href="{}"', 'href="{}l"')
+    done = inventory.main("build")
+    assert done.status == 1
+    assert "error[link-broken]: `../models/box.htmll` leads nowhere" in done.out
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("search", "there is a page `search` already"),
+        ("lessons", "there is a page `lessons` already"),
+        ("home", "there is a page `home` already"),
+        ("../x", "a page cannot be called `../x`: use small letters, digits and `-`"),
+    ],
+)
+def test_a_page_that_cannot_be_added_is_told(inventory: Folder, name: str, message: str) -> None:
+    inventory.replace("features/inventory.py", 'name="inventory",\n    v', f'name="{name}",\n    v')
+    done = inventory.main("check")
+    assert done.status == 1
+    assert f"error[feature-broken]: features/inventory.py: {message}" in done.out

@@ -70,9 +70,7 @@ def test_an_edit_writes_what_it_is_about_and_nothing_else(folder: Folder) -> Non
     assert len(new) == 3, "the text of the page, the word's shard and spelling"
     assert len(after) == len(before)
     same = {path for path in after if after[path] == before.get(path)}
-    assert {path for path in after.keys() - same if path in before} == {
-        f"search/index.js{copy}" for copy in ("", ".br", ".gz")
-    }
+    assert {path for path in after.keys() - same if path in before} == {"search/index.js"}
 
 
 def test_what_is_taken_back_is_as_it_was(folder: Folder) -> None:
@@ -97,7 +95,7 @@ def test_every_page_is_listed_in_the_order_of_the_course(folder: Folder) -> None
 def test_a_store_that_cannot_be_written_is_no_matter(folder: Folder) -> None:
     before = index(folder)
     store = folder.root / ".coursebuild"
-    for kind in ("search", "pages", "summaries"):
+    for kind in ("parts", "pages", "summaries"):
         shutil.rmtree(store / kind)
         (store / kind).write_text("in the way")
     lesson = "content/lessons/1.7-l7.md"

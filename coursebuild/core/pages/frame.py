@@ -56,8 +56,6 @@ class Names(Struct, frozen=True):
     icon: str
     credits: str
     touch_icon: str
-    search_script: str
-    """Loaded when a reader opens the search."""
     scripts: tuple[tuple[str, str], ...] = ()
     """Of the parts of pages, by the mark of each (`PagePart`)."""
 
@@ -176,7 +174,6 @@ def _shared_values(
         "theme_script": place.href(names.theme_script),
         "script": place.href(names.script),
         "part_scripts": _part_scripts(place, names, parts),
-        "search_script": place.href(names.search_script),
         "manifest": place.href(urls.MANIFEST),
         "touch_icon": place.href(names.touch_icon),
         "home": place.href(urls.HOME),

@@ -33,8 +33,8 @@ class PageRecord(Struct, frozen=True):
     """Anchors, sorted; see `links.without_lines`."""
     references: tuple[Reference, ...]
     """Where its links lead, sorted, each once."""
-    search: tuple[str, str] | None = None
-    """Name and digest of what the page is found by; see `Searched`."""
+    notes: tuple[tuple[str, str], ...] = ()
+    """What features noted of the page: the feature's name and a digest; see `added_files`."""
 
     @property
     def facts(self) -> PageFacts:

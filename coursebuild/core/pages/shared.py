@@ -130,7 +130,6 @@ def shared_files(
         icon=publish("icon.svg", assets.template("icon.svg").encode()),
         credits=publish("licences.txt", _licences(assets)),
         touch_icon=publish("icon-touch.png", assets.file("icons/icon-touch.png")),
-        search_script=script("search.js"),
         scripts=tuple(scripts),
     )
     return tuple(files), names

@@ -11,21 +11,22 @@ Entry point: `render_site(course, results, assets, options)`.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from hashlib import sha256
 
 from msgspec import Struct, field
 
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import OutputFile, Results
+from coursebuild.core.model.results import FileFacts, OutputFile, Results
 from coursebuild.core.pages import fonts, meta, urls, zips
+from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files, page_notes
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.exports.files import ExportContext, Exports, OnDemand
-from coursebuild.core.pages.frame import Draft, frame
+from coursebuild.core.pages.frame import Draft, Names, frame
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.offline import facts_of, file_list, offline_files
-from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.search.whole import site_search
+from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.shared import (
     PageFacts,
     common_characters,
@@ -57,7 +58,8 @@ def render_site(
     options = options or SiteOptions()
     library = Library.of(course, results, assets, reports=options.reports)
     drafts, facts = [], []
-    drawn = tuple(entry.draft(library) for entry in page_list(library))
+    entries = tuple(page_list(library))
+    drawn = tuple(entry.draft(library) for entry in entries)
     for draft, declarations in map(settled, drawn):
         drafts.append(draft)
         facts.append(page_facts(draft, declarations))
@@ -67,12 +69,42 @@ def render_site(
     files += library.labs.files
     files += _downloads(library, options)
     files += _machine_files(course, drafts)
-    files += site_search(library, drawn)
-    files += offline_files(course, assets)
+    added, listed = added_files(functools.partial(_context, library, assets, names, entries, drawn))
+    files += [f if isinstance(f, OutputFile) else OutputFile(f.path, f.make()) for f in added]
     files += _exports(library, options, drafts)
-    listed = file_list(names, "")
-    files.append(OutputFile(listed.path, listed.make(facts_of(files))))
-    return tuple(sorted(files, key=lambda file: file.path))
+    if listed is not None:
+        files.append(OutputFile(listed.path, listed.make(map(_facts, sorted(files, key=_path)))))
+    return tuple(sorted(files, key=_path))
+
+
+def _path(file: OutputFile) -> str:
+    return file.path
+
+
+def _facts(file: OutputFile) -> FileFacts:
+    return FileFacts(file.path, sha256(file.data).hexdigest(), len(file.data))
+
+
+def _context(
+    library: Library,
+    assets: Assets,
+    names: Names,
+    entries: Sequence[PageEntry],
+    drawn: Sequence[Draft],
+    feature: str,
+) -> SiteContext:
+    """What a feature makes further files from; nothing is kept."""
+    notes: dict[str, bytes] = {}
+    pages: list[NotedPage] = []
+    for entry, draft in zip(entries, drawn, strict=True):
+        found = page_notes(entry.inputs(library), entry.document(library), str(draft.body))
+        if feature in found:
+            notes[draft.path] = found[feature]
+            digest = sha256(found[feature]).hexdigest()
+            pages.append(NotedPage(draft.path, draft.kind, entry.id, draft.title, digest))
+    return SiteContext(
+        library, assets, names, tuple(pages), notes.__getitem__, lambda key, make: make()
+    )
 
 
 def all_facts(library: Library, pages: Iterable[PageFacts]) -> PageFacts:

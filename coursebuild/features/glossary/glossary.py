@@ -43,7 +43,7 @@ class LetterView(Struct, frozen=True):
 
 def glossary_values(library: Library) -> dict[str, object]:
     """What the glossary shows."""
-    place = urls.Place(urls.GLOSSARY)
+    place = urls.Place("glossary/index.html")
     terms = sorted(library.references.terms.values(), key=lambda t: sort_key(t.term.name))
     groups = groupby(terms, key=lambda t: initial(t.term.name))
     letters = tuple(
@@ -52,7 +52,7 @@ def glossary_values(library: Library) -> dict[str, object]:
     )
     return {
         "letters": letters,
-        "symbols": place.href(urls.SYMBOLS) if library.references.has_symbols else "",
+        "symbols": place.href("symbols/index.html") if library.references.has_symbols else "",
     }
 
 

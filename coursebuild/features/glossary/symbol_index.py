@@ -38,7 +38,7 @@ class SymbolView(Struct, frozen=True):
 
 def symbols_values(library: Library) -> dict[str, object]:
     """What the index shows."""
-    place = urls.Place(urls.SYMBOLS)
+    place = urls.Place("symbols/index.html")
     rows = [
         _view(library, place, row)
         for row in sorted(library.references.symbols, key=lambda row: sort_key(row.symbol))
@@ -46,7 +46,7 @@ def symbols_values(library: Library) -> dict[str, object]:
     return {
         "declared": tuple(row for row in rows if row.meanings),
         "undeclared": tuple(row for row in rows if not row.meanings),
-        "glossary": place.href(urls.GLOSSARY) if library.references.terms else "",
+        "glossary": place.href("glossary/index.html") if library.references.terms else "",
     }
 
 

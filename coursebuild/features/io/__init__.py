@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from coursebuild.core.features import Feature, FenceKind
+from coursebuild.core.features import Feature, FenceKind, IndexReader
 from coursebuild.features.io.model import Io
 from coursebuild.features.io.parse import parse_io
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.exports.plain import Plain
-    from coursebuild.core.pages.search.sections import SectionReader
 
 
 def draw(page: PageContext, card: Io) -> Markup:
@@ -28,7 +27,7 @@ def markdown(writer: Plain, card: Io) -> str:
     return "\n".join(f"- **{label}:** {text}" for label, text in rows)
 
 
-def index(reader: SectionReader, card: Io) -> None:
+def index(reader: IndexReader, card: Io) -> None:
     """All lines can be found."""
     for _, text in card.parts():
         reader.add("text", reader.text(text))

@@ -1,9 +1,11 @@
-"""The page about what is kept in the browser, which is also shown where a page is not."""
+"""The site without a network, and the page about it, which is also shown where a page is not."""
 
 from coursebuild.core.features import Feature, PageKind, PagePart
+from coursebuild.features.offline.files import offline_files
 
 FEATURE = Feature(
     name="offline",
     pages=(PageKind(name="offline", values=lambda library: {}, order=70, indexed=False),),
+    files=offline_files,
     parts=(PagePart(mark="data-keep", bundled="offline.js", texts=("offline.live.",)),),
 )

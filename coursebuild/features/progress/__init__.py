@@ -16,6 +16,7 @@ from coursebuild.core.pages.owners import owner_path
 from coursebuild.core.pages.pages import level_view
 from coursebuild.core.pages.quiz_index import count
 
+_PROGRESS, _REVIEW = "progress/index.html", "review/index.html"
 KEPT_AS = "coursebuild.progress."
 """What the name under which a browser keeps progress begins with; the course's key follows. As in
 site/js/progress/store.js."""
@@ -35,19 +36,19 @@ class Asking(Struct, frozen=True):
 
 def progress_values(library: Library) -> dict[str, object]:
     """What the page of the reader's progress shows: all lessons, by level."""
-    place = urls.Place(urls.PROGRESS)
+    place = urls.Place(_PROGRESS)
     return {
         "levels": tuple(level_view(library, place, level) for level in library.course.levels),
         "pages": tuple(one for one in _asking(library, place) if not one.id),
-        "review": place.href(urls.REVIEW) if library.asked else "",
+        "review": place.href(_REVIEW) if library.asked else "",
         "name": KEPT_AS + library.course.key,
     }
 
 
 def review_values(library: Library) -> dict[str, object]:
     """What the page of the review shows: where questions are, and when missed ones come back."""
-    place = urls.Place(urls.REVIEW)
-    return {"pages": _asking(library, place), "progress": place.href(urls.PROGRESS)}
+    place = urls.Place(_REVIEW)
+    return {"pages": _asking(library, place), "progress": place.href(_PROGRESS)}
 
 
 def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:

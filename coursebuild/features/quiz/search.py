@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from coursebuild.features.quiz.model import ChoiceQuestion, OrderQuestion, Quiz
 
 if TYPE_CHECKING:
-    from coursebuild.core.pages.search.sections import SectionReader
+    from coursebuild.core.features import IndexReader
 
 
-def index_quiz(reader: SectionReader, quiz: Quiz) -> None:
+def index_quiz(reader: IndexReader, quiz: Quiz) -> None:
     """Its title, its questions, and what there is to choose from."""
     reader.add("text", quiz.title)
     for question in quiz.questions:

@@ -12,12 +12,11 @@ from pathlib import Path
 import mmdr
 from markupsafe import Markup
 
-from coursebuild.core.features import Feature, FenceKind
+from coursebuild.core.features import Feature, FenceKind, IndexReader
 from coursebuild.core.model import FeatureBlock
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.exports.marks import fence as code_block
 from coursebuild.core.pages.exports.plain import Plain
-from coursebuild.core.pages.search.sections import SectionReader
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import parse_info, read_keys
 from coursebuild.core.syntax.texts import TextParser
@@ -73,7 +72,7 @@ def markdown(writer: Plain, block: Diagram) -> str:
     return code_block("mermaid", block.text)
 
 
-def index(reader: SectionReader, block: Diagram) -> None:
+def index(reader: IndexReader, block: Diagram) -> None:
     """What it shows can be found."""
     reader.add("text", block.alt)
 

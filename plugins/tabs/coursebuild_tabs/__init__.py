@@ -12,11 +12,10 @@ from pathlib import Path
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, FenceKind, PagePart
+from coursebuild.core.features import Feature, FenceKind, IndexReader, PagePart
 from coursebuild.core.model import Block, FeatureBlock
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.exports.plain import Plain
-from coursebuild.core.pages.search.sections import SectionReader
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
@@ -80,7 +79,7 @@ def markdown(writer: Plain, block: Tabs) -> str:
     return "\n\n".join(f"**{tab.title}**\n\n{writer.blocks(tab.blocks)}" for tab in block.tabs)
 
 
-def index(reader: SectionReader, block: Tabs) -> None:
+def index(reader: IndexReader, block: Tabs) -> None:
     """All versions can be found."""
     for tab in block.tabs:
         reader.add("text", tab.title)

@@ -18,7 +18,6 @@ NAMES = Names(
     icon="assets/i.svg",
     credits="assets/c.txt",
     touch_icon="assets/i.png",
-    search_script="assets/f.js",
     scripts=(("data-quiz=", "assets/q.js"),),
 )
 HOSTILE = 'a "b" <c> & \x07 d\'s \ue000title\ue001 — é'

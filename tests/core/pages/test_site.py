@@ -108,8 +108,6 @@ def test_the_files_of_a_site(site: dict[str, bytes]) -> None:
         "robots.txt",
         "search/index.html",
         "search/index.js",
-        "search/index.js.br",
-        "search/index.js.gz",
         "service-worker.js",
         "sitemap.xml",
     ]

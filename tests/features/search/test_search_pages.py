@@ -6,14 +6,16 @@ import json
 
 import pytest
 
-from coursebuild.core.model import Document
-from coursebuild.core.pages.lesson import lesson_inputs, stub_inputs
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.pages import level_inputs, model_inputs
-from coursebuild.core.pages.search.page import page_text, searched, terms
-from coursebuild.core.pages.search.sections import drawn_sections
-from coursebuild.core.pages.search.values import PageText, Section, SectionPiece
+from coursebuild.features.search.page import (
+    note_page,
+    page_sections,
+    terms,
+    text_and_terms,
+)
+from coursebuild.features.search.sections import Section, SectionPiece, drawn_sections
 from support.rendered_course import Make
 
 LESSON = """Before any *heading*, at $I_{xx}$.[^n]
@@ -56,14 +58,16 @@ import mujoco
 """
 
 
-def text_of(make: Make, text: str) -> PageText:
+def sections_of(make: Make, text: str) -> tuple[Section, ...]:
     made = make(text)
     library = Library.of(made.course, made.results, made.assets)
-    lesson = library.lessons["0.1"]
-    document: Document = lesson.document
-    found = page_text(lesson_inputs(library, lesson, document), document, "")
-    assert found is not None
-    return found
+    document = library.lessons["0.1"].document
+    return page_sections(inputs_of(library, "lesson", "0.1"), document, "")
+
+
+def inputs_of(library: Library, kind: str, id: str = "") -> PageInputs:
+    pages = (page for page in page_list(library) if (page.kind, page.id) == (kind, id))
+    return next(pages).inputs(library)
 
 
 def said(section: Section) -> list[tuple[str, str]]:
@@ -71,16 +75,15 @@ def said(section: Section) -> list[tuple[str, str]]:
 
 
 def test_a_lesson_by_its_sections(make: Make) -> None:
-    page = text_of(make, LESSON)
-    assert (page.title, page.name) == ("Falling", "0.1")
-    heads = [(s.anchor, s.heading, s.level) for s in page.sections]
+    sections = sections_of(make, LESSON)
+    heads = [(s.anchor, s.heading, s.level) for s in sections]
     assert heads == [
         ("", "", 0),
         ("out", "Outer", 2),
         ("inner-bold", "Inner bold", 3),
         ("empty", "Empty", 2),
     ]
-    start, outer, inner, empty = page.sections
+    start, outer, inner, empty = sections
     assert said(start) == [
         ("text", "A body falls."),
         ("text", "Say what falls"),
@@ -104,7 +107,7 @@ def test_a_lesson_by_its_sections(make: Make) -> None:
 
 
 def test_a_quiz_gives_no_answer_away(make: Make) -> None:
-    texts = [text for section in text_of(make, LESSON).sections for _, text in said(section)]
+    texts = [text for section in sections_of(make, LESSON) for _, text in said(section)]
     at = texts.index("Check")
     assert texts[at + 1 : at + 7] == ["Which one?", "This", "That", "Sort", "alpha", "zeta"]
     assert not any("secret" in text for text in texts)
@@ -113,26 +116,23 @@ def test_a_quiz_gives_no_answer_away(make: Make) -> None:
 def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
     made = make("Text.")
     library = Library.of(made.course, made.results, made.assets)
-    inputs = {page.kind: page.inputs(library) for page in page_list(library)}
     for kind in ("home", "notfound", "search", "offline", "progress"):
-        assert page_text(inputs[kind], None, "<p>Text</p>") is None, kind
-    stub = page_text(stub_inputs(library, library.lessons["1.2"]), None, "<p>Other</p>")
-    assert stub == PageText(
-        "Later", "1.2", (Section("", "", 0, (SectionPiece("text", "Comes later."),)),)
+        assert note_page(inputs_of(library, kind), None, "<p>Text</p>") == b"", kind
+    planned = inputs_of(library, "lesson", "1.2")
+    assert page_sections(planned, None, "<p>Other</p>") == (
+        Section("", "", 0, (SectionPiece("text", "Comes later."),)),
     )
-    level = page_text(level_inputs(library, made.course.levels[0]), None, "<p>Lessons</p>")
-    assert level is not None and "Lessons" not in str(level)
-    model = page_text(model_inputs(library, made.course.models[0]), None, "<h2 id='x'>Facts</h2>")
-    assert model is not None
-    assert model.sections[0].pieces[-1].text.startswith('<mujoco model="box">')
-    assert model.sections[1] == Section("x", "Facts", 2, ())
+    assert b"Lessons" not in note_page(inputs_of(library, "level", "0"), None, "<p>Lessons</p>")
+    model = page_sections(inputs_of(library, "model", "box"), None, "<h2 id='x'>Facts</h2>")
+    assert model[0].pieces[-1].text.startswith('<mujoco model="box">')
+    assert model[1] == Section("x", "Facts", 2, ())
 
 
 def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
     piece = SectionPiece("text", "body body body body; inertia")
     code = SectionPiece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
-    page = PageText("Body", "4.2", (Section("a", "Inertia", 2, (piece, code), ("frac",)),))
-    lines = terms(page).decode().split("\n")
+    sections = (Section("a", "Inertia", 2, (piece, code), ("frac",)),)
+    lines = terms(["4.2", "Body"], sections).decode().split("\n")
     assert lines == sorted(lines, key=lambda line: line[1:])
     assert {line[1:]: line[0] for line in lines} == {
         "4.2": "c",
@@ -153,10 +153,9 @@ def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
 def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make) -> None:
     made = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 \x07.\n')
     library = Library.of(made.course, made.results, made.assets)
-    lesson = library.lessons["0.1"]
-    found = searched(lesson_inputs(library, lesson, lesson.document), lesson.document, "")
-    assert found is not None and found.name == "0.1"
-    text = found.text.decode()
+    document = library.lessons["0.1"].document
+    note = note_page(inputs_of(library, "lesson", "0.1"), document, "")
+    text = text_and_terms(note)[0].decode()
     assert text.startswith('coursebuildSearch.take("page","",') and text.endswith(")\n")
     sections = json.loads(text.removeprefix('coursebuildSearch.take("page","",')[:-2])
     assert sections[-1][1] == '<img src=x onerror="alert(1)">'

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.model.results import FileFacts, OutputFile
-from coursebuild.core.pages.offline import PAPER, facts_of, listing, short_name
+from coursebuild.core.model.results import FileFacts
+from coursebuild.features.offline.files import PAPER, listing, short_name
 from support.rendered_course import Make
 
 ROOT = Path(__file__).parents[3]
@@ -40,56 +40,34 @@ def file(path: str, size: int = 100) -> FileFacts:
     return FileFacts(path.replace("#", digest(path)[:8]), digest(path), size)
 
 
-@pytest.mark.parametrize(
-    ("path", "group"),
-    [
-        ("index.html", "shell"),
-        ("offline/index.html", "shell"),
-        ("assets/fonts/f.#.woff2", "shell"),
-        ("lessons/1.1-a.html", "text"),
-        ("manifest.webmanifest", "text"),
-        ("assets/offline.#.js", "text"),
-        ("assets/labs/1.1-lab-1.#.png", "text"),
-        ("files/lessons/s.svg", "text"),
-        ("files/lessons/Foto.jpeg", "text"),
-        ("assets/labs/mujoco.#.wasm", "rest"),
-        ("assets/labs/1.1-lab-1.#.json", "rest"),
-        ("files/data.csv", "rest"),
-        ("files/film.mp4", "rest"),
-        ("models/box.xml", "rest"),
-        ("examples/a.py", "rest"),
-    ],
-)
-def test_each_file_is_in_the_group_of_those_who_need_it(path: str, group: str) -> None:
-    found = listed(file(path))
-    groups = {name for name in ("shell", "text", "rest") if found[name]["files"]}
-    assert groups == {group}
-    assert found[group]["bytes"] == 100
-    wanted = "" if "#" in path else digest(path)[:12]
-    assert list(found[group]["files"].values()) == [wanted]
+GROUPS = {
+    "shell": "index.html offline/index.html assets/fonts/f.#.woff2",
+    "text": "lessons/1.1-a.html manifest.webmanifest assets/offline.#.js search/index.js"
+    " assets/labs/1.1-lab-1.#.png files/lessons/s.svg files/lessons/Foto.jpeg",
+    "rest": "assets/labs/mujoco.#.wasm assets/labs/1.1-lab-1.#.json files/data.csv files/film.mp4"
+    " models/box.xml examples/a.py",
+    "": "404.html robots.txt sitemap.xml service-worker.js llms.txt examples.zip lessons/1.1-a.zip"
+    " lessons/1.1-a.ipynb lessons/1.1-a.md assets/site.#.css.br assets/site.#.css.gz",
+}
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        *("404.html", "robots.txt", "sitemap.xml", "service-worker.js", "llms.txt"),
-        *("examples.zip", "lessons/1.1-a.zip", "lessons/1.1-a.ipynb", "lessons/1.1-a.md"),
-        *("assets/site.#.css.br", "assets/site.#.css.gz"),
-    ],
-)
-def test_copies_and_files_for_machines_are_in_no_group(path: str) -> None:
-    assert not any(listed(file(path))[name]["files"] for name in ("shell", "text", "rest"))
+def test_each_file_is_in_the_group_of_those_who_need_it() -> None:
+    for group, paths in GROUPS.items():
+        for path in paths.split():
+            found = listed(file(path))
+            groups = {name for name in ("shell", "text", "rest") if found[name]["files"]}
+            assert groups == ({group} if group else set()), path
+            if group:
+                assert found[group]["bytes"] == 100
+                wanted = "" if "#" in path else digest(path)[:12]
+                assert list(found[group]["files"].values()) == [wanted], path
 
 
-def test_what_is_large_is_for_those_who_ask_for_everything() -> None:
-    large = listed(file("all/index.html", 2_000_000), file("assets/search.#.js", 2_000_000))
-    assert list(large["rest"]["files"]) == ["all/index.html"]
-    assert len(large["text"]["files"]) == 1, "what scripts of every page need is kept with them"
-
-
-def test_a_page_is_large_from_a_mebibyte_on() -> None:
-    found = listed(file("a.html", 1 << 20), file("b.html", (1 << 20) + 1))
-    assert ([*found["text"]["files"]], [*found["rest"]["files"]]) == (["a.html"], ["b.html"])
+def test_a_page_of_more_than_a_mebibyte_is_for_those_who_ask_for_everything() -> None:
+    large = 1 << 20, (1 << 20) + 1
+    found = listed(*(file(f"{size}.html", size) for size in large), file("assets/a.#.js", 1 << 21))
+    assert [*found["rest"]["files"]] == [f"{large[1]}.html"]
+    assert len(found["text"]["files"]) == 2, "what scripts of every page need is kept with them"
 
 
 def test_a_name_with_a_hash_of_something_else_needs_one() -> None:
@@ -132,11 +110,6 @@ def test_the_list_is_json_with_a_line_for_each_file(names: list[str]) -> None:
     text = listing(SHELL, files).decode("utf-8", "surrogatepass")
     assert f"{json.dumps(json.loads(text), ensure_ascii=False, indent=0)}\n" == text
     assert [*json.loads(text)["text"]["files"]] == [one.path for one in files]
-
-
-def test_facts_of_files_are_sorted_by_path() -> None:
-    facts = list(facts_of([OutputFile("b", b"1"), OutputFile("a", b"12")]))
-    assert [(one.path, one.size) for one in facts] == [("a", 2), ("b", 1)]
 
 
 def test_the_manifest_names_what_is_there(site: dict[str, bytes]) -> None:

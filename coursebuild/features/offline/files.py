@@ -1,7 +1,7 @@
 """What makes the site an application that works without a network.
 
-Entry points: `offline_files(course, assets)`: the manifest, its icons and the service worker;
-`file_list(names)`: the list of all files by which the worker knows what there is.
+Entry point: `offline_files(site)`: the manifest, its icons and the service worker; and the list of
+all files, by which the worker knows what there is.
 
 1. The worker is the same text in every build of the same tool: what changes with a course stands in
    the list. So an edit of a page changes that page and its line in the list.
@@ -15,13 +15,14 @@ Entry points: `offline_files(course, assets)`: the manifest, its icons and the s
 from __future__ import annotations
 
 import functools
-import hashlib
 import json
 from collections.abc import Iterable, Iterator
 
+from coursebuild.core.engine.steps import step_key
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.assets import Assets, hashed_name, page_script
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.frame import Names
@@ -38,13 +39,20 @@ _COPIES = (".br", ".gz", ".zip", ".ipynb", ".md", ".imscc")
 _PICTURES = (".svg", ".png", ".jpg", ".jpeg", ".gif", ".webp", ".avif")
 _NEEDED = (".css", ".js", ".svg")
 _SHOWN = (".html", ".webmanifest", *_PICTURES)
+_SEARCH_INDEX = "search/index.js"
 _LARGE = 1 << 20
 """Bytes: a page or picture of more is kept for those only who ask for everything."""
 _MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.WORKER, "llms.txt", "llms-full.txt")
 
 
-def offline_files(course: Course, assets: Assets) -> tuple[OutputFile, ...]:
-    """The manifest, its icons, and the service worker."""
+def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:
+    """All of them."""
+    yield from _application(site.library.course, site.assets)
+    key = step_key("list of files", site.names)
+    yield FileList(urls.FILES, key, functools.partial(listing, shell_of(site.names)))
+
+
+def _application(course: Course, assets: Assets) -> tuple[OutputFile, ...]:
     large = tuple(_icon(assets, f"icon-{side}.png") for side in (192, 512))
     masked = _icon(assets, "icon-maskable.png")
     scalable = hashed_name("assets/icon.svg", assets.template("icon.svg").encode())
@@ -102,14 +110,9 @@ def _icon(assets: Assets, name: str) -> OutputFile:
 # ---------------------------------------------------------------------------------- the list
 
 
-def file_list(names: Names, key: str) -> FileList:
-    """The list; `key` is a hash of the tool, which says how it is made."""
-    return FileList(urls.FILES, key, functools.partial(listing, shell_of(names)))
-
-
 def shell_of(names: Names) -> frozenset[str]:
     """What every page needs, but for the fonts, and what is there when nothing else is."""
-    pages = {urls.HOME, urls.OFFLINE, urls.MANIFEST}
+    pages = {urls.HOME, "offline/index.html", urls.MANIFEST}
     return frozenset(pages | {path for path in names.paths() if path.endswith(_NEEDED)})
 
 
@@ -143,7 +146,7 @@ def _group(shell: frozenset[str], file: FileFacts) -> str | None:
     if path.startswith("assets/"):
         labs = path.startswith("assets/labs/") and not path.endswith(_PICTURES)
         return "rest" if labs else "text"
-    shown = path.endswith(_SHOWN) or path == urls.SEARCH_INDEX
+    shown = path.endswith(_SHOWN) or path == _SEARCH_INDEX
     return "text" if shown and file.size <= _LARGE else "rest"
 
 
@@ -151,9 +154,3 @@ def _is_lasting(file: FileFacts) -> bool:
     """Whether the name holds the content's hash."""
     digits = file.path.rpartition(".")[0].rpartition(".")[2]
     return file.path.startswith("assets/") and digits == file.digest[:8]
-
-
-def facts_of(files: Iterable[OutputFile]) -> Iterator[FileFacts]:
-    """What the list says of files whose bytes are there."""
-    for file in sorted(files, key=lambda file: file.path):
-        yield FileFacts(file.path, hashlib.sha256(file.data).hexdigest(), len(file.data))

@@ -1,6 +1,6 @@
-"""A document as sections that are searched.
+"""A page as sections that are searched.
 
-Entry point: `document_sections(document, lead, labels, measured)`.
+Entry points: `document_sections`, of a page that shows a document; `drawn_sections`, of another.
 
 1. The blocks are walked in order, what stands in containers included; a heading begins a section.
 2. Formulas become lines of plain text (`tex`); the names of their commands are kept beside.
@@ -12,7 +12,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from html import unescape
-from typing import assert_never
+from typing import Literal, assert_never
+
+from msgspec import Struct
 
 from coursebuild.core.features import kind_of_block
 from coursebuild.core.model import (
@@ -53,9 +55,29 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.inlines import CodeSpan
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
-from coursebuild.core.pages.search.tex import plain_formula
-from coursebuild.core.pages.search.values import Kind, Section, SectionPiece
 from coursebuild.core.text.patterns import pattern
+from coursebuild.features.search.tex import plain_formula
+
+
+class SectionPiece(Struct, frozen=True):
+    """A paragraph, a listing, a formula, an output."""
+
+    kind: Literal["text", "code", "formula", "output"]
+    text: str
+
+
+class Section(Struct, frozen=True):
+    """What stands between a heading and the next."""
+
+    anchor: str
+    """Of its heading; empty for what stands before the first."""
+    heading: str
+    level: int
+    """Of its heading, from 1; 0 where there is none."""
+    pieces: tuple[SectionPiece, ...]
+    also: tuple[str, ...] = ()
+    """Texts that it is found by and that are not shown: names of TeX commands, of files."""
+
 
 _TAG = pattern(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
 
@@ -64,7 +86,7 @@ def document_sections(
     document: Document,
     lead: Iterable[str],
     labels: Mapping[str, str],
-    measured: Mapping[int, str] | None = None,
+    measured: Mapping[int, str],
 ) -> tuple[Section, ...]:
     """The sections of a document.
 
@@ -74,7 +96,7 @@ def document_sections(
         labels: of the kinds of callouts, by name.
         measured: what the reports that it shows are about, by their offset.
     """
-    reader = SectionReader(labels, measured or {})
+    reader = SectionReader(labels, measured)
     for text in lead:
         reader.add("text", text)
     reader.blocks(document.blocks)
@@ -93,18 +115,17 @@ class SectionReader:
         self._begin("", "", 0)
 
     def _begin(self, anchor: str, heading: str, level: int) -> None:
-        self._anchor, self._heading, self._level = anchor, heading, level
+        self._head = anchor, heading, level
         self._pieces: list[SectionPiece] = []
         self._also: dict[str, None] = {}
 
     def ended(self) -> tuple[Section, ...]:
         """All sections; one with nothing in it only where it has a heading."""
-        if self._anchor or self._pieces or not self._done:
-            pieces, also = tuple(self._pieces), tuple(self._also)
-            self._done.append(Section(self._anchor, self._heading, self._level, pieces, also))
+        if self._head[0] or self._pieces or not self._done:
+            self._done.append(Section(*self._head, tuple(self._pieces), tuple(self._also)))
         return tuple(self._done)
 
-    def add(self, kind: Kind, text: str) -> None:
+    def add(self, kind: Literal["text", "code", "formula", "output"], text: str) -> None:
         """A piece of the section, unless there is nothing in it."""
         text = text.strip("\n").rstrip() if kind in ("code", "output") else _line(text)
         if text:
@@ -141,17 +162,6 @@ class SectionReader:
                 self.add("text", unescape(_TAG.sub(" ", block.html)))
             case ThematicBreak():
                 pass
-            case CodeBlock() | PlainCode() | Mjcf() | Script() | Recording():
-                self._code(block)
-            case Bench() | Lab():
-                self._card(block)
-            case FeatureBlock():
-                kind_of_block(block).index(self, block)
-            case _:
-                assert_never(block)
-
-    def _code(self, block: CodeBlock | PlainCode | Mjcf | Script | Recording) -> None:
-        match block:
             case CodeBlock() | PlainCode() | Mjcf():
                 self.add("code", block.code.text)
             case Script():
@@ -162,61 +172,56 @@ class SectionReader:
                     self._block(block.body)
                 else:
                     self.add("output", block.body.text)
-            case _:
-                assert_never(block)
-
-    def _card(self, block: Bench | Lab) -> None:
-        match block:
             case Bench():
                 self._also[block.model] = None
                 self.add("text", self._measured.get(block.span.start, ""))
             case Lab():
-                self.add("text", block.title)
-                self.blocks(block.note)
-                labels = [control.label for control in block.controls]
-                labels += [readout.label for readout in block.readouts]
-                self.add("text", ", ".join(filter(None, labels)))
-                if block.model is not None:
-                    self._also[block.model] = None
-                if block.xml is not None:
-                    self.add("code", block.xml.text)
+                self._lab(block)
+            case FeatureBlock():
+                kind_of_block(block).index(self, block)
             case _:
                 assert_never(block)
 
+    def _lab(self, lab: Lab) -> None:
+        self.add("text", lab.title)
+        self.blocks(lab.note)
+        labels = [control.label for control in lab.controls]
+        labels += [readout.label for readout in lab.readouts]
+        self.add("text", ", ".join(filter(None, labels)))
+        if lab.model is not None:
+            self._also[lab.model] = None
+        if lab.xml is not None:
+            self.add("code", lab.xml.text)
+
     def _formula(self, tex: str) -> str:
         text, names = plain_formula(tex)
-        for name in names:
-            self._also[name] = None
+        self._also |= dict.fromkeys(names)
         return text
 
     def text(self, inlines: Iterable[Inline]) -> str:
         """The text of inlines, as the search has it."""
-        parts: list[str] = []
-        self._gather(inlines, parts)
-        return "".join(parts)
+        return "".join(map(self._inline, inlines))
 
-    def _gather(self, inlines: Iterable[Inline], parts: list[str]) -> None:
-        for inline in inlines:
-            match inline:
-                case Text() | CodeSpan() | NumberBinding():
-                    parts.append(inline.text)
-                case Math():
-                    parts.append(self._formula(inline.tex.text))
-                    if inline.meaning is not None:
-                        self._also[inline.meaning.text] = None
-                case SoftBreak() | HardBreak():
-                    parts.append(" ")
-                case Emphasis() | Strong() | Strikethrough() | Link() | Term():
-                    self._gather(inline.children, parts)
-                case Image():
-                    parts.append(inline.alt)
-                case RawInline():
-                    if inline.html.startswith(("<br", "<BR")):
-                        parts.append(" ")
-                case FootnoteRef():
-                    pass
-                case _:
-                    assert_never(inline)
+    def _inline(self, inline: Inline) -> str:
+        match inline:
+            case Text() | CodeSpan() | NumberBinding():
+                return inline.text
+            case Math():
+                if inline.meaning is not None:
+                    self._also[inline.meaning.text] = None
+                return self._formula(inline.tex.text)
+            case SoftBreak() | HardBreak():
+                return " "
+            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+                return self.text(inline.children)
+            case Image():
+                return inline.alt
+            case RawInline():
+                return " " if inline.html.lower().startswith("<br") else ""
+            case FootnoteRef():
+                return ""
+            case _:
+                assert_never(inline)
 
 
 def _line(text: str) -> str:
@@ -233,31 +238,31 @@ _LINES = frozenset(
 
 def drawn_sections(body: str) -> tuple[Section, ...]:
     """The sections of a page's body."""
-    reader = _Reader()
+    reader = _DrawnReader()
     reader.read(parse_html(body))
     reader.end_line()
     reader.end_section()
     return tuple(reader.done)
 
 
-class _Reader:
+class _DrawnReader:
     def __init__(self) -> None:
         self.done: list[Section] = []
         self._head: tuple[str, str, int] = ("", "", 0)
         self._pieces: list[SectionPiece] = []
-        self._text: list[str] = []
+        self._text = ""
 
     def read(self, content: Iterable[HtmlContent]) -> None:
         """Headings begin sections, other blocks lines."""
         for child in content:
             if isinstance(child, str):
-                self._text.append(child)
+                self._text += child
             elif child.name in _HIDDEN:
                 continue
             elif child.name in _HEADINGS:
                 self.end_line()
                 self.read(child.children)
-                heading = self._said()
+                heading, self._text = _line(self._text), ""
                 if child.name != "h1":  # which is the page's title
                     self.end_section()
                     self._head = child.attributes.get("id", ""), heading, _HEADINGS[child.name]
@@ -268,14 +273,9 @@ class _Reader:
             else:
                 self.read(child.children)
 
-    def _said(self) -> str:
-        text = " ".join("".join(self._text).split())
-        self._text.clear()
-        return text
-
     def end_line(self) -> None:
         """What was said since the last line is one."""
-        text = self._said()
+        text, self._text = _line(self._text), ""
         if text:
             self._pieces.append(SectionPiece("text", text))
 

@@ -1,0 +1,118 @@
+"""A page as it is searched: its text for the reader's browser, and its terms for the index.
+
+Entry points: `note_page(inputs, document, body)`, both as bytes, and `text_and_terms`, which takes
+them apart; `call`, a file of the index.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+
+from coursebuild.core.model import Document
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.lesson import LessonHead
+from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, ShownDocument
+from coursebuild.features.search.sections import (
+    Section,
+    SectionPiece,
+    document_sections,
+    drawn_sections,
+)
+from coursebuild.features.search.words import count_terms
+
+_LEFT_OUT = frozenset({"home", "notfound"})
+"""Kinds of pages that nobody looks for: all that stands on them stands on others as well."""
+_LEADS = frozenset({"level", "stub"})
+"""Kinds of pages of which the title and the summary count: the rest is of other pages."""
+_TITLE, _HEADING, _TEXT, _CODE = 3, 2, 1, 0
+"""Where a term stands, by weight."""
+_FIELDS = {"text": _TEXT, "formula": _TEXT, "code": _CODE, "output": _CODE}
+
+
+def note_page(inputs: PageInputs, document: Document | None, body: str) -> bytes:
+    """What a page gives to the search; nothing where it is not searched.
+
+    Args:
+        inputs: what is drawn.
+        document: of the page, with its prose, where it has one.
+        body: as it was drawn.
+    """
+    if inputs.kind in _LEFT_OUT or not (inputs.indexed or inputs.kind in _LEADS):
+        return b""
+    head = inputs.values.get("lesson")
+    name = head.id if isinstance(head, LessonHead) else ""
+    sections = page_sections(inputs, document, body)
+    return call("page", "", packed(sections)) + b"\0" + terms([name, inputs.title], sections)
+
+
+def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
+    """The file that a browser loads to show what it found, and the page's terms."""
+    text, _, terms = note.partition(b"\0")
+    return text, terms
+
+
+def page_sections(inputs: PageInputs, document: Document | None, body: str) -> tuple[Section, ...]:
+    """What stands on a page; see `note_page`."""
+    head = inputs.values.get("lesson")
+    lead = (inputs.description, *(head.objectives if isinstance(head, LessonHead) else ()))
+    if document is not None:
+        known = inputs.shown or ShownDocument()
+        labels = {kind: shown.label for kind, shown in known.callouts.items()}
+        reports = ((at, shown.report) for at, shown in known.benches.items())
+        measured = {at: one.title or one.name for at, one in reports if one is not None}
+        return document_sections(document, lead, labels, measured)
+    code = [v.text for v in inputs.values.values() if isinstance(v, Highlighted)]
+    pieces = [SectionPiece("text", text) for text in lead if text]
+    pieces += [SectionPiece("code", text) for text in code if text]
+    drawn = () if inputs.kind in _LEADS else drawn_sections(body)
+    return (Section("", "", 0, tuple(pieces)), *drawn)
+
+
+def call(kind: str, name: str, value: object) -> bytes:
+    """A file of the index: a script that hands over a value.
+
+    Browsers load scripts from a disk, but no other data.
+    """
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    return visible(f'coursebuildSearch.take("{kind}","{name}",{text})\n').encode()
+
+
+def packed(sections: Iterable[Section]) -> object:
+    """The sections of a page as its file has them; kinds by their first letter."""
+    return [
+        [
+            section.anchor,
+            section.heading,
+            section.level,
+            [[piece.kind[0], piece.text] for piece in section.pieces],
+            " ".join(section.also),
+        ]
+        for section in sections
+    ]
+
+
+def terms(titles: list[str], sections: Iterable[Section]) -> bytes:
+    """The terms of a page with their weight: lines of a hexadecimal digit and a term, sorted.
+
+    The digit is the field (0 to 3) times four, and how often the term occurs on the page: 0 for
+    once, 1 up to three times, 2 up to nine, 3 for more.
+    """
+    fields: dict[int, list[str]] = {_CODE: [], _TEXT: [], _HEADING: [], _TITLE: titles}
+    for section in sections:
+        fields[_HEADING].append(section.heading)
+        fields[_CODE] += section.also
+        for piece in section.pieces:
+            fields[_FIELDS[piece.kind]].append(piece.text)
+    times: dict[str, int] = {}
+    best: dict[str, int] = {}
+    for field, texts in fields.items():
+        for term, count in count_terms("\n".join(texts)).items():
+            times[term] = times.get(term, 0) + count
+            best[term] = field
+    lines = [f"{best[term] << 2 | _often(times[term]):x}{term}" for term in sorted(times)]
+    return "\n".join(lines).encode("utf-8", "replace")
+
+
+def _often(times: int) -> int:
+    return 0 if times == 1 else 1 if times < 4 else 2 if times < 10 else 3
