@@ -1,5 +1,5 @@
 /**
- * The terms that a text is found by: the same rules as in coursebuild/core/pages/search/words.py, by which the index is
+ * The terms that a text is found by: the same rules as in coursebuild/features/search/words.py, by which the index is
  * made; site/tests/search-words.json holds both to them.
  */
 

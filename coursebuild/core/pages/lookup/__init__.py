@@ -1,6 +1,6 @@
-"""Pages to look things up in, and what they gather from the documents of a course.
+"""What documents define and refer to: terms, symbols, formulas and links.
 
-`lexicon` reads a document, `references` brings those of all documents together, `glossary` and
-`symbol_index` make the pages; `sentences` finds a definition's sentence, `symbols` the letters of a
-formula.
+`lexicon` reads a document, with the sentence of a definition (`sentences`) and the letters of a
+formula (`symbols`); `references` brings those of all documents together. The feature `glossary`
+makes pages of it.
 """
