@@ -1,7 +1,7 @@
-"""The interface of features: how a kind of fence, and all that belongs to it, enters the tool.
+"""The interface of features: how kinds of fences and of pages, and files of a site, enter the tool.
 
-Entry points: `Feature` and `FenceKind`, which say what a feature has; `features()`, those that
-there are; `fence_kind` and `kind_of_block`, which find one.
+Entry points: `Feature`, with `FenceKind`, `PageKind` and `PagePart`, which says what a feature has;
+`features()`, those that there are; `fence_kind`, `kind_of_block` and `page_kind`, which find one.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names

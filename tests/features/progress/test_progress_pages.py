@@ -44,18 +44,18 @@ def parsed(text: str) -> Document:
     return found
 
 
-@pytest.mark.parametrize(("text", "number"), [("", 0), ("a:x", 1), (NAMES, 3)])
-def test_the_number_of_questions(text: str, number: int) -> None:
-    assert count(text) == number
+def test_the_number_of_questions() -> None:
+    assert [count(text) for text in ("", "a:x", NAMES)] == [0, 1, 3]
 
 
-def pages(make: Make, **texts: str) -> dict[str, str]:
-    site = make(TWO, **texts).site()
+@pytest.fixture(scope="module")
+def found(make: Make) -> dict[str, str]:
+    """The pages of a course with questions in a lesson and in another page."""
+    site = make(TWO, about=quiz("about", why("Which?", id="which"))).site()
     return {path: data.decode() for path, data in site.items() if path.endswith(".html")}
 
 
-def test_lists_of_lessons_name_their_questions(make: Make) -> None:
-    found = pages(make, about=quiz("about", why("Which?", id="which")))
+def test_lists_of_lessons_name_their_questions(found: dict[str, str]) -> None:
     row = f'data-lesson="0.1" data-quizzes="{NAMES}">'
     for path in ("index.html", "levels/0.html", "progress/index.html"):
         assert found[path].count(row) == 1, path
@@ -67,9 +67,8 @@ def test_lists_of_lessons_name_their_questions(make: Make) -> None:
     ]
 
 
-def test_only_lists_of_lessons_name_questions(make: Make) -> None:
+def test_only_lists_of_lessons_name_questions(found: dict[str, str]) -> None:
     """So that an edit of a quiz draws no other page."""
-    found = pages(make)
     lists = {"index.html", "levels/0.html", "progress/index.html", "review/index.html"}
     assert {path for path, html in found.items() if "data-quizzes" in html} == lists
 
@@ -83,16 +82,15 @@ def test_a_course_without_questions_has_no_review(make: Make) -> None:
     assert "review" not in foot
 
 
-def test_what_is_kept_and_where_is_said_without_a_script(make: Make) -> None:
-    html = pages(make)["progress/index.html"]
+def test_what_is_kept_and_where_is_said_without_a_script(found: dict[str, str]) -> None:
+    html = found["progress/index.html"]
     key = re.search(r'data-course="([^"]*)"', html)
     assert key is not None
     assert f"<code>coursebuild.progress.{key[1]}</code>" in html
     assert "<noscript>" in html
 
 
-def test_each_page_carries_the_words_that_it_shows(make: Make) -> None:
-    found = pages(make)
+def test_each_page_carries_the_words_that_it_shows(found: dict[str, str]) -> None:
     words = {path: set(re.findall(r'data-key="([^"]+)"', html)) for path, html in found.items()}
 
     def groups(path: str) -> set[str]:
@@ -108,7 +106,6 @@ def test_each_page_carries_the_words_that_it_shows(make: Make) -> None:
     assert "quiz.live.check" in words["review/index.html"]
 
 
-def test_only_the_pages_about_the_reader_load_their_script(make: Make) -> None:
-    found = pages(make)
+def test_only_the_pages_about_the_reader_load_their_script(found: dict[str, str]) -> None:
     loading = {path for path, html in found.items() if "/reader." in html}
     assert loading == {"progress/index.html", "review/index.html"}
