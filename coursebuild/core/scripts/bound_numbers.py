@@ -14,8 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from msgspec import Struct
 
 from coursebuild.core.model import Recording, Table
-from coursebuild.core.scripts.celltext import plain
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.mapped_text import Side, plain
 from coursebuild.core.scripts.numbers import (
     Number,
     round_like,

@@ -25,7 +25,7 @@ from coursebuild.core.scripts.numbers import (
     scan,
     unit,
 )
-from coursebuild.core.scripts.pairing import MATCH, Keys, pair
+from coursebuild.core.scripts.pairing import MATCH, pair
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
@@ -114,7 +114,7 @@ def _tokens(text: str) -> Iterator[_Token]:
 
 
 def _token_differences(recorded: str, ran: str, matcher: LineMatcher) -> tuple[Difference, ...]:
-    left, right = tuple(_tokens(recorded)), tuple(_tokens(ran))
+    left, right = list(_tokens(recorded)), list(_tokens(ran))
 
     def weight(i: int, j: int) -> int:
         a, b = left[i], right[j]
@@ -124,43 +124,23 @@ def _token_differences(recorded: str, ran: str, matcher: LineMatcher) -> tuple[D
             return _SPACE
         return MATCH if a.text == b.text else 0
 
-    pairs = pair(
-        Keys([t.text for t in left], ["0" if t.number else t.text for t in left]),
-        Keys([t.text for t in right], ["0" if t.number else t.text for t in right]),
-        weight,
-    )
     found: list[Difference] = []
-    i = j = 0
-    for i_pair, j_pair in (*pairs, (len(left), len(right))):
-        if i < i_pair or j < j_pair:
-            found.append(_stretch(left, i, i_pair, right, j, j_pair, len(recorded), len(ran)))
-        if i_pair < len(left):
-            a, b = left[i_pair], right[j_pair]
-            if a.number is not None and b.number is not None:
-                if not matcher.same(a.number, b.number):
-                    both = (a.number, b.number)
-                    found.append(Difference(a.start, a.end, b.start, b.end, both))
-            elif a.text != b.text:
-                found.append(Difference(a.start, a.end, b.start, b.end))
-        i, j = i_pair + 1, j_pair + 1
+    at = ran_at = 0
+    pairs = pair([t.text for t in left], [t.text for t in right], weight)
+    left.append(_Token(len(recorded), len(recorded), ""))
+    right.append(_Token(len(ran), len(ran), ""))
+    for i, j in (*pairs, (-1, -1)):
+        a, b = left[i], right[j]
+        if at < a.start or ran_at < b.start:
+            found.append(Difference(at, a.start, ran_at, b.start))
+        if a.number is not None and b.number is not None:
+            if not matcher.same(a.number, b.number):
+                both = (a.number, b.number)
+                found.append(Difference(a.start, a.end, b.start, b.end, both))
+        elif a.text != b.text:
+            found.append(Difference(a.start, a.end, b.start, b.end))
+        at, ran_at = a.end, b.end
     return _merged(found, recorded, ran)
-
-
-def _stretch(
-    left: tuple[_Token, ...],
-    i: int,
-    i_stop: int,
-    right: tuple[_Token, ...],
-    j: int,
-    j_stop: int,
-    left_end: int,
-    right_end: int,
-) -> Difference:
-    start = left[i].start if i < len(left) else left_end
-    ran_start = right[j].start if j < len(right) else right_end
-    end = left[i_stop - 1].end if i_stop > i else start
-    ran_end = right[j_stop - 1].end if j_stop > j else ran_start
-    return Difference(start, end, ran_start, ran_end)
 
 
 def _merged(found: list[Difference], recorded: str, ran: str) -> tuple[Difference, ...]:

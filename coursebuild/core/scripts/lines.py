@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -25,10 +26,6 @@ MARK = "\x00"
 ELLIPSIS = "..."
 
 _CLOSING = frozenset(")]},;|")
-_PATIENCE = 2_000_000
-"""Numbers compared before a line with ellipses is taken for one that does not match."""
-_SEARCH = 32
-"""Characters searched for at the cost of comparing one number."""
 
 SameNumber = Callable[[Number, Number], bool]
 
@@ -41,20 +38,21 @@ class Canon(Struct, frozen=True):
     """Their offsets count in the whole line."""
     marks: tuple[int, ...]
     """Offsets of the numbers' marks in the skeleton."""
-    cut_before: bool = False
-    """Begins with a number whose front may be elided."""
-    cut_after: bool = False
-    """Ends with a number whose rest may be elided."""
+
+    def numbers_at(self, part: Canon, place: int) -> tuple[Number, ...]:
+        """The numbers of this line that those of a part stand for, the part standing at `place`."""
+        first = bisect_left(self.marks, place)
+        return self.numbers[first : first + len(part.numbers)]
 
 
-def canonical(text: str, offset: int = 0, *, after_cut: bool = False) -> Canon:
+def canonical(text: str, offset: int = 0) -> Canon:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)
-    if not numbers:
-        return Canon(text.replace(MARK, "\ufffd"), (), ())
     safe = text.replace(MARK, "\ufffd")
-    parts: list[str] = []
+    if not numbers:
+        return Canon(safe, (), ())
     marks: list[int] = []
+    parts: list[str] = []
     length = previous = 0
     for index, number in enumerate(numbers):
         between = _folded(safe[previous : number.start], after_number=index > 0, before_number=True)
@@ -64,12 +62,9 @@ def canonical(text: str, offset: int = 0, *, after_cut: bool = False) -> Canon:
         previous = number.end
     parts.append(_folded(safe[previous:], after_number=True, before_number=False))
     if offset:
-        numbers = tuple(
-            replace(number, start=number.start + offset, end=number.end + offset)
-            for number in numbers
-        )
-    cut_before = after_cut and parts[0] == "" and text[:1].strip() != ""
-    return Canon("".join(parts), numbers, tuple(marks), cut_before)
+        moved = ((number, number.start + offset, number.end + offset) for number in numbers)
+        numbers = tuple(replace(number, start=start, end=end) for number, start, end in moved)
+    return Canon("".join(parts), numbers, tuple(marks))
 
 
 def _folded(between: str, *, after_number: bool, before_number: bool) -> str:
@@ -115,7 +110,6 @@ class LineMatcher:
     def __init__(self, comparison: Comparison) -> None:
         self.comparison = comparison
         self._canons: dict[str, Canon] = {}
-        self._parts: dict[str, tuple[Canon, ...]] = {}
 
     def canon(self, text: str) -> Canon:
         """A line's skeleton and numbers."""
@@ -132,13 +126,6 @@ class LineMatcher:
         """Whether a recorded line has a `...` that stands for anything."""
         return self.comparison.ellipsis and ELLIPSIS in recorded
 
-    def parts(self, recorded: str) -> tuple[Canon, ...]:
-        """The parts of a recorded line between its ellipses."""
-        found = self._parts.get(recorded)
-        if found is None:
-            found = self._parts[recorded] = _cut(recorded)
-        return found
-
     def same(self, recorded: Number, ran: Number) -> bool:
         """Whether two numbers match."""
         return same_number(recorded, ran, self.comparison)
@@ -147,7 +134,7 @@ class LineMatcher:
         """Whether a line that ran is what was recorded."""
         if recorded == ran:
             return True
-        if self.elides(recorded) and _wildcard(recorded.split(ELLIPSIS), ran):
+        if self.elides(recorded) and _find_texts(recorded.split(ELLIPSIS), ran):
             return True
         if self.comparison.mode is Mode.EXACT:
             return False
@@ -155,7 +142,7 @@ class LineMatcher:
 
     def alike(self, recorded: str, ran: str) -> bool:
         """Whether two lines differ in their numbers (and the white space around them) only."""
-        return self._paired(recorded, ran, any_number) is not None
+        return self.pairs(recorded, ran) is not None
 
     def pairs(self, recorded: str, ran: str) -> tuple[tuple[Number, Number], ...] | None:
         """The numbers of two lines that are alike, pair by pair; `None` if they are not alike."""
@@ -167,99 +154,66 @@ class LineMatcher:
         line = self.canon(ran)
         if not self.elides(recorded):
             wanted = self.canon(recorded)
-            if wanted.skeleton != line.skeleton or len(wanted.numbers) != len(line.numbers):
+            if wanted.skeleton != line.skeleton:
                 return None
             pairs = tuple(zip(wanted.numbers, line.numbers, strict=True))
             return pairs if all(same(a, b) for a, b in pairs) else None
-        parts = self.parts(recorded)
-        places = find_parts(parts, line, same)
+        parts = _cut(recorded)
+        places = _find_parts(parts, line, same)
         if places is None:
             return None
         return tuple(
             pair
             for part, place in zip(parts, places, strict=True)
-            for pair in zip(part.numbers, numbers_at(part, line, place), strict=True)
+            for pair in zip(part.numbers, line.numbers_at(part, place), strict=True)
         )
 
 
+@lru_cache(maxsize=256)
 def _cut(recorded: str) -> tuple[Canon, ...]:
+    """The parts of a recorded line between its ellipses."""
     parts: list[Canon] = []
-    texts = recorded.split(ELLIPSIS)
     offset = 0
-    for index, text in enumerate(texts):
-        last = index == len(texts) - 1
-        part = canonical(text, offset, after_cut=index > 0)
-        ends = part.numbers and part.numbers[-1].end == offset + len(text)
-        parts.append(replace(part, cut_after=bool(ends) and not last))
+    for text in recorded.split(ELLIPSIS):
+        parts.append(canonical(text, offset))
         offset += len(text) + len(ELLIPSIS)
     return tuple(parts)
 
 
-def _wildcard(parts: Sequence[str], line: str) -> bool:
-    first, last = parts[0], parts[-1]
-    end = len(line) - len(last)
-    if not (line.startswith(first) and line.endswith(last)) or end < len(first):
+def _find_texts(parts: Sequence[str], line: str) -> bool:
+    """Whether texts stand in a line in order, the first at its start and the last at its end."""
+    first, *inner, last = parts
+    at, end = len(first), len(line) - len(last)
+    if not (line.startswith(first) and line.endswith(last)):
         return False
-    at = len(first)
-    for part in parts[1:-1]:
-        found = line.find(part, at, end)
-        if found < 0:
+    for part in inner:
+        at = line.find(part, at, end)
+        if at < 0:
             return False
-        at = found + len(part)
-    return True
+        at += len(part)
+    return at <= end
 
 
-def numbers_at(part: Canon, line: Canon, place: int) -> tuple[Number, ...]:
-    """The numbers of a line that those of a part stand for, the part's skeleton at `place`."""
-    first = bisect_left(line.marks, place)
-    return line.numbers[first : first + len(part.numbers)]
-
-
-def find_parts(parts: Sequence[Canon], line: Canon, same: SameNumber) -> tuple[int, ...] | None:
-    """Where the parts of a recorded line stand in a line that ran: offsets in its skeleton.
-
-    The first part stands at the start and the last at the end. `None` where they don't fit, or
-    when finding out takes too long.
-    """
-    ends = {0, len(parts) - 1}
-    stop = len(line.skeleton) - len(parts[-1].skeleton)
-    places: list[int] = []
-    at = 0
-    budget = _PATIENCE
-    for index, part in enumerate(parts):
-        place = stop if index == len(parts) - 1 else at
-        limit = place + len(part.skeleton) if index in ends else stop
-        while True:
-            if place < at or budget < 0:
-                return None
-            place = line.skeleton.find(part.skeleton, place, limit)
-            if place < 0:
-                return None
-            misfit = first_misfit(part, line, place, same)
-            if misfit is None:
-                break
-            if index in ends:
-                return None
-            budget -= misfit + 1 + len(part.skeleton) // _SEARCH
-            place += 1
+def _find_parts(parts: Sequence[Canon], line: Canon, same: SameNumber) -> list[int] | None:
+    """Where the parts of a recorded line stand in the skeleton of a line that ran, if they do."""
+    first, *inner, last = parts
+    stop = len(line.skeleton) - len(last.skeleton)
+    ends = line.skeleton.startswith(first.skeleton) and line.skeleton.endswith(last.skeleton)
+    if not (ends and fits(first, line, 0, same) and fits(last, line, stop, same)):
+        return None
+    places = [0]
+    at = len(first.skeleton)
+    for part in inner:
+        place = line.skeleton.find(part.skeleton, at, stop)
+        while place >= 0 and not fits(part, line, place, same):
+            place = line.skeleton.find(part.skeleton, place + 1, stop)
+        if place < 0:
+            return None
         places.append(place)
         at = place + len(part.skeleton)
-    return tuple(places)
+    return [*places, stop] if at <= stop else None
 
 
-def first_misfit(part: Canon, line: Canon, place: int, same: SameNumber) -> int | None:
-    """The index of the first number of a part that does not match the one of the line.
-
-    The part's skeleton stands in the line's at offset `place`.
-    """
-    first = bisect_left(line.marks, place)
-    for index, recorded in enumerate(part.numbers):
-        ran = line.numbers[first + index]
-        if same(recorded, ran):
-            continue
-        elided_after = part.cut_after and index == len(part.numbers) - 1
-        if elided_after and ran.text.startswith(recorded.text):
-            continue
-        if not (part.cut_before and index == 0 and ran.text.endswith(recorded.text)):
-            return index
-    return None
+def fits(part: Canon, line: Canon, place: int, same: SameNumber) -> bool:
+    """Whether the numbers of a part match those of a line in which its skeleton is at `place`."""
+    return all(map(same, part.numbers, line.numbers_at(part, place)))

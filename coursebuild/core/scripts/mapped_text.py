@@ -1,12 +1,12 @@
 """Texts to compare: filtered, split into lines, every part with the place that it came from.
 
-Entry points: `MappedText.of_text`, `filtered`, `Side.of`.
+Entry points: `filtered`, `Side.of`, `plain`.
 
 1. `MappedText` is a text with its origin: stretches that are copies know it character by character,
    a stretch that a filter wrote stands for all that it replaced.
 2. `filtered` applies the course's filters, one after the other, each to the whole text (`^` and `$`
    match at lines), after white space that does not count has gone.
-3. A `Side` is what one side of a comparison has: the lines without trailing white space and without
+3. A `Side` is one side of a comparison: the lines without trailing white space and without
    trailing empty lines.
 """
 
@@ -23,10 +23,13 @@ from coursebuild.core.model import Filter
 from coursebuild.core.text.patterns import pattern
 
 _LINE_END = pattern(r"\r\n?|\n")
+# Possessive, and only at the start of a run, so that long runs of white space take linear time.
+_END_OF_LINE = pattern(r"(?<![^\S\r\n])[^\S\r\n]*+(?:\r\n?|\n|\Z)")
+_EMPTY_LINES = pattern(r"(?:\A|(?<=[^\n]\n))\n++\Z")
 
 
 class MappingSegment(Struct, frozen=True):
-    """A stretch of a mapped text, up to the next piece."""
+    """A stretch of a mapped text, up to the next segment."""
 
     at: int
     """Offset in the text."""
@@ -39,10 +42,10 @@ class MappingSegment(Struct, frozen=True):
 
 
 class MappedText(Struct, frozen=True):
-    """A text whose characters know where they came from; pieces are in order, without gaps."""
+    """A text whose characters know where they came from; segments are in order, without gaps."""
 
     text: str
-    pieces: tuple[MappingSegment, ...]
+    segments: tuple[MappingSegment, ...]
 
     @classmethod
     def of_text(cls, text: str) -> MappedText:
@@ -56,30 +59,17 @@ class MappedText(Struct, frozen=True):
         Line ends are LF, the last line has one too, no line ends in white space, no empty lines
         stand at the end.
         """
-        lines = _bare_lines(text)
-        pieces: list[MappingSegment] = []
-        at = copied = copied_from = 0
-        for line, start, end in lines:
-            stop = start + len(line)
-            at += len(line) + 1
-            if end == stop + 1 and text[stop] == "\n":
-                continue
-            # The copy that began at `copied` ends before this line's end, which is made anew.
-            if at - 1 > copied:
-                pieces.append(MappingSegment(copied, copied_from, stop, True))
-            pieces.append(MappingSegment(at - 1, stop, end, False))
-            copied, copied_from = at, end
-        if at > copied:
-            pieces.append(MappingSegment(copied, copied_from, copied_from + at - copied, True))
-        joined = "".join(line + "\n" for line, _, _ in lines)
-        return cls(joined, tuple(pieces) or (MappingSegment(0, 0, 0, False),))
+        mapped = cls.of_text(text).substituted(_END_OF_LINE, "\n")
+        return mapped.substituted(_EMPTY_LINES, "")
 
-    def _piece(self, at: int) -> MappingSegment:
-        return self.pieces[max(0, bisect_right(self.pieces, at, key=lambda piece: piece.at) - 1)]
+    def _segment(self, at: int) -> int:
+        """The index of the segment that an offset is in."""
+        return max(0, bisect_right(self.segments, at, key=lambda segment: segment.at) - 1)
 
     def origin(self, start: int, end: int) -> tuple[int, int]:
         """The smallest range of the origin that `text[start:end]` came from; empty for no text."""
-        first, last = self._piece(start), self._piece(max(start, end - 1))
+        first = self.segments[self._segment(start)]
+        last = self.segments[self._segment(max(start, end - 1))]
         low = first.start + start - first.at if first.verbatim else first.start
         high = last.start + end - last.at if last.verbatim else last.end
         return low, low if start == end else max(low, high)
@@ -87,25 +77,24 @@ class MappedText(Struct, frozen=True):
     def substituted(self, pattern: re.Pattern[str], replacement: str) -> MappedText:
         """`pattern.sub(replacement, text)`, mapped."""
         parts: list[str] = []
-        pieces: list[MappingSegment] = []
+        segments: list[MappingSegment] = []
         length = copied = 0
         for found in pattern.finditer(self.text):
-            self._copy(copied, found.start(), length, pieces)
-            parts.append(self.text[copied : found.start()])
+            written = found.expand(replacement)
+            if written == found.group():
+                continue
+            self._copy(copied, found.start(), length, segments)
+            parts += (self.text[copied : found.start()], written)
             length += found.start() - copied
             copied = found.end()
-            written = found.expand(replacement)
             if written:
-                pieces.append(
-                    MappingSegment(length, *self._replaced(found.start(), found.end()), False)
-                )
-                parts.append(written)
+                replaced = self._replaced(found.start(), found.end())
+                segments.append(MappingSegment(length, *replaced, False))
                 length += len(written)
-        self._copy(copied, len(self.text), length, pieces)
+        self._copy(copied, len(self.text), length, segments)
         parts.append(self.text[copied:])
-        return MappedText(
-            "".join(parts), tuple(pieces) or (MappingSegment(0, 0, self.pieces[-1].end, False),)
-        )
+        nothing = MappingSegment(0, 0, self.segments[-1].end, False)
+        return MappedText("".join(parts), tuple(segments) or (nothing,))
 
     def _replaced(self, start: int, end: int) -> tuple[int, int]:
         """What a replacement of `text[start:end]` stands for.
@@ -113,39 +102,26 @@ class MappedText(Struct, frozen=True):
         Where nothing is replaced, inside or at the end of what was written by another replacement,
         that is what the other one stands for: there is no place between its characters.
         """
-        piece = self._piece(start)
-        if start == end and not piece.verbatim and start > piece.at:
-            return piece.start, piece.end
+        segment = self.segments[self._segment(start)]
+        if start == end and not segment.verbatim and start > segment.at:
+            return segment.start, segment.end
         return self.origin(start, end)
 
     def _copy(self, start: int, end: int, at: int, into: list[MappingSegment]) -> None:
-        """Append the pieces of `text[start:end]`, which will stand at offset `at`."""
+        """Append the segments of `text[start:end]`, which will stand at offset `at`."""
         if start == end:
             return
-        index = max(0, bisect_right(self.pieces, start, key=lambda piece: piece.at) - 1)
-        for piece in self.pieces[index:]:
-            if piece.at >= end:
+        for index in range(self._segment(start), len(self.segments)):
+            segment = self.segments[index]
+            if segment.at >= end:
                 break
-            skipped = max(0, start - piece.at)
-            new_at = at + max(piece.at, start) - start
-            if piece.verbatim:
-                stop = min(piece.end, piece.start + end - piece.at)
-                into.append(MappingSegment(new_at, piece.start + skipped, stop, True))
+            new_at = at + max(segment.at, start) - start
+            if segment.verbatim:
+                first = segment.start + max(0, start - segment.at)
+                stop = min(segment.end, segment.start + end - segment.at)
+                into.append(MappingSegment(new_at, first, stop, True))
             else:
-                into.append(MappingSegment(new_at, piece.start, piece.end, False))
-
-
-def _bare_lines(text: str) -> list[tuple[str, int, int]]:
-    """Lines without white space at their ends, where each begins, and where the next one does."""
-    lines: list[tuple[str, int, int]] = []
-    start = 0
-    for found in _LINE_END.finditer(text):
-        lines.append((text[start : found.start()].rstrip(), start, found.end()))
-        start = found.end()
-    lines.append((text[start:].rstrip(), start, len(text)))
-    while lines and not lines[-1][0]:
-        lines.pop()
-    return lines
+                into.append(MappingSegment(new_at, segment.start, segment.end, False))
 
 
 @lru_cache(maxsize=64)
@@ -160,6 +136,11 @@ def filtered(mapped: MappedText, filters: Iterable[Filter]) -> MappedText:
         if pattern.search(mapped.text):
             mapped = mapped.substituted(pattern, rule.replacement)
     return mapped
+
+
+def plain(text: str) -> str:
+    """A text with its minus signs and its white space made plain."""
+    return " ".join(text.replace("\u2212", "-").split())
 
 
 class Line(Struct, frozen=True):

@@ -12,13 +12,34 @@ Entry points: `compare_table`, `table_rows`, `match_rows`, `rows_match`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 
 from msgspec import Struct
 
-from coursebuild.core.model import Cell, Comparison, Filter, Recording, Table
+from coursebuild.core.model import (
+    Cell,
+    CodeSpan,
+    Comparison,
+    Emphasis,
+    Filter,
+    FootnoteRef,
+    HardBreak,
+    Image,
+    Inline,
+    Link,
+    Math,
+    NumberBinding,
+    RawInline,
+    Recording,
+    SoftBreak,
+    Strikethrough,
+    Strong,
+    Table,
+    Term,
+    Text,
+)
 from coursebuild.core.model.results import Change, DriftKind, Verdict
-from coursebuild.core.scripts.celltext import cell_text, plain
 from coursebuild.core.scripts.changes import number_change
 from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.lines import (
@@ -26,18 +47,16 @@ from coursebuild.core.scripts.lines import (
     SameNumber,
     any_number,
     canonical,
-    first_misfit,
-    numbers_at,
+    fits,
     same_number,
 )
-from coursebuild.core.scripts.mapped_text import MappedText, Side
+from coursebuild.core.scripts.mapped_text import MappedText, MappingSegment, Side, filtered, plain
 from coursebuild.core.scripts.numbers import Number, relative_error
-from coursebuild.core.scripts.pairing import MATCH, Keys, pair
+from coursebuild.core.scripts.pairing import MATCH, pair
+from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
 _ALIKE = 6
-_CELLS = 40_000
-_WINDOW = 1000
 _PLACES = 64
 _DIFF_ROWS = 20
 _WIDTH = 160
@@ -167,38 +186,25 @@ class _Rows:
     def stands(self, row: int, line: int, same: SameNumber) -> bool:
         return _first_places(self.rows[row], self.canon(line), same) is not None
 
-    def _next(self, row: int, start: int, stop: int, same: SameNumber) -> int:
-        """The first line in `[start, stop)` that a row stands in, or -1."""
-        lines = range(start, min(stop, len(self.lines)))
-        return next((line for line in lines if self.stands(row, line, same)), -1)
-
     def all_match(self) -> list[int] | None:
         """A line for each row, if all of them match."""
         found: list[int] = []
         line = -1
         for row in range(len(self.rows)):
             if self.rows[row]:
-                line = self._next(row, line + 1, len(self.lines), self.same)
+                below = range(line + 1, len(self.lines))
+                line = next((n for n in below if self.stands(row, n, self.same)), -1)
                 if line < 0:
                     return None
             found.append(line)
         return found
 
     def _aligned(self) -> list[int]:
+        """A line for each row that stands in one but for its numbers; -1 for the others."""
         found = [-1] * len(self.rows)
-        if len(self.rows) * len(self.lines) <= _CELLS:
-            rows, lines = range(len(self.rows)), range(len(self.lines))
-            free = [True] * (len(self.rows) + 1)
-            for row, line in pair(Keys(rows, rows), Keys(lines, lines), self._weight, free):
-                found[row] = line
-            return found
-        line = -1
-        for row in range(len(self.rows)):
-            for same in (self.same, any_number):
-                place = self._next(row, line + 1, line + 1 + _WINDOW, same)
-                if place >= 0:
-                    found[row] = line = place
-                    break
+        free = [True] * (len(self.rows) + 1)
+        for row, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight, free):
+            found[row] = line
         return found
 
     def _weight(self, row: int, line: int) -> int:
@@ -217,7 +223,7 @@ class _Rows:
             (cell, recorded, printed)
             for cell, place in zip(row, places, strict=True)
             for recorded, printed in zip(
-                cell.canon.numbers, numbers_at(cell.canon, canon, place), strict=True
+                cell.canon.numbers, canon.numbers_at(cell.canon, place), strict=True
             )
         )
         return RowMatch(row, line, pairs)
@@ -227,7 +233,7 @@ def _is_word(character: str) -> bool:
     return character.isalnum() or character == "_"
 
 
-def _places(cell: Canon, line: Canon, start: int, same: SameNumber) -> Iterable[int]:
+def _places(cell: Canon, line: Canon, start: int, same: SameNumber) -> Iterator[int]:
     """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
     text, wanted = line.skeleton, cell.skeleton
     place = text.find(wanted, start)
@@ -236,7 +242,7 @@ def _places(cell: Canon, line: Canon, start: int, same: SameNumber) -> Iterable[
         cuts = (place > 0 and _is_word(wanted[0]) and _is_word(text[place - 1])) or (
             end < len(text) and _is_word(wanted[-1]) and _is_word(text[end])
         )
-        if not cuts and first_misfit(cell, line, place, same) is None:
+        if not cuts and fits(cell, line, place, same):
             yield place
         place = text.find(wanted, place + 1)
 
@@ -246,7 +252,7 @@ def _first_places(row: Sequence[RowCell], line: Canon, same: SameNumber) -> list
     found: list[int] = []
     at = 0
     for cell in row:
-        place = next(iter(_places(cell.canon, line, at, same)), -1)
+        place = next(_places(cell.canon, line, at, same), -1)
         if place < 0:
             return None
         found.append(place)
@@ -263,7 +269,8 @@ def _nearest_places(row: Sequence[RowCell], line: Canon, same: SameNumber) -> li
     """For each place of the last cell: the cost so far, the places, the offset where it ends."""
     for cell in row:
         extended: list[tuple[float, list[int], int]] = []
-        for place in _some_places(cell.canon, line, min(end for _, _, end in best)):
+        start = min(end for _, _, end in best)
+        for place in islice(_places(cell.canon, line, start, any_number), _PLACES):
             fits = [way for way in best if way[2] <= place]
             if fits:
                 cost, places, _ = min(fits, key=lambda way: way[0])
@@ -274,20 +281,71 @@ def _nearest_places(row: Sequence[RowCell], line: Canon, same: SameNumber) -> li
     return min(best, key=lambda way: way[0])[1]
 
 
-def _some_places(cell: Canon, line: Canon, start: int) -> list[int]:
-    found: list[int] = []
-    for place in _places(cell, line, start, any_number):
-        found.append(place)
-        if len(found) == _PLACES:
-            break
-    return found
-
-
 def _cost(cell: Canon, line: Canon, place: int, same: SameNumber) -> float:
     """How far the numbers of a cell are from those of the line: relative errors, each at most 1."""
     cost = 0.0
-    for recorded, ran in zip(cell.numbers, numbers_at(cell, line, place), strict=True):
+    for recorded, ran in zip(cell.numbers, line.numbers_at(cell, place), strict=True):
         if not same(recorded, ran):
             error = relative_error(recorded.value, ran.value)
             cost += 0.01 + (1.0 if error is None else min(1.0, float(error)))
     return cost
+
+
+# --- cells
+
+_RUN = pattern(r"\s{2,}|[^\S ]")
+_ENDS = pattern(r"\A\s+|\s+\Z")
+
+
+def cell_text(cell: Cell, filters: Iterable[Filter] = ()) -> MappedText:
+    """The plain text of a cell, filtered; origins are offsets in the lesson's source.
+
+    Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
+    stretch that Markdown changed (entities, escapes) stands for all of itself.
+    """
+    texts: list[str] = []
+    segments: list[MappingSegment] = []
+    at = 0
+    for text, span in _stretches(cell.children):
+        if text:
+            segments.append(MappingSegment(at, span.start, span.end, span.text == text))
+            texts.append(text)
+            at += len(text)
+    if not segments:
+        segments.append(MappingSegment(0, cell.span.start, cell.span.end, False))
+    mapped = filtered(MappedText("".join(texts), tuple(segments)), filters)
+    folded = mapped.substituted(_RUN, " ").substituted(_ENDS, "")
+    return MappedText(folded.text.replace("\u2212", "-"), folded.segments)
+
+
+def _stretches(inlines: Iterable[Inline]) -> Iterator[tuple[str, Span]]:
+    for inline in inlines:
+        match inline:
+            case Text():
+                yield inline.text, inline.span
+            case CodeSpan():
+                yield inline.text, _inside_backticks(inline)
+            case NumberBinding():
+                yield inline.text, inline.text_span
+            case Math():
+                yield inline.tex.text, inline.tex.span()
+            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+                yield from _stretches(inline.children)
+            case Image():
+                yield inline.alt, inline.span
+            case SoftBreak() | HardBreak():
+                yield " ", inline.span
+            case RawInline():
+                yield (" " if inline.html.startswith("<br") else ""), inline.span
+            case FootnoteRef():
+                pass
+
+
+def _inside_backticks(code: CodeSpan) -> Span:
+    """The place of a code span's text: what stands between the backticks, without padding."""
+    written = code.span.text
+    ticks = len(written) - len(written.lstrip("`"))
+    inner = written[ticks : len(written) - ticks]
+    padding = 1 if len(inner) == len(code.text) + 2 else 0
+    start = code.span.start + ticks + padding
+    return Span(code.span.source, start, code.span.end - ticks - padding)

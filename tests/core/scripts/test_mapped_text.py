@@ -43,7 +43,7 @@ def test_origins_lie_in_the_text_and_grow(
     if start < end < len(mapped.text):
         later = mapped.origin(end, len(mapped.text))
         assert later[0] >= low and later[1] >= high
-    copies = [p for p in mapped.pieces if p.verbatim]
+    copies = [p for p in mapped.segments if p.verbatim]
     for piece in copies:
         length = piece.end - piece.start
         assert mapped.text[piece.at : piece.at + length] == text[piece.start : piece.end]
