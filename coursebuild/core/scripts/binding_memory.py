@@ -7,8 +7,7 @@ before.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
 from msgspec import Struct
 
@@ -34,20 +33,16 @@ class BindingEvidence(Struct, frozen=True):
     """They were those of a run, and not recorded."""
 
 
-LazyInputs: TypeAlias = Callable[[], BindingInputs]
-"""Gives what a binding leans on: not every memory asks for it."""
-
-
 class BindingMemory(Protocol):
     """Remembers bindings in which nothing is wrong."""
 
-    def holds(self, key: str, inputs: LazyInputs) -> bool:
+    def holds(self, key: str, inputs: BindingInputs) -> bool:
         """Whether nothing is wrong with a binding, by a hash of all that this depends on."""
 
-    def add(self, key: str, inputs: LazyInputs, evidence: BindingEvidence) -> None:
+    def add(self, key: str, inputs: BindingInputs, evidence: BindingEvidence) -> None:
         """That nothing is wrong; there are no lines where nothing could be looked at."""
 
-    def before(self, inputs: LazyInputs) -> BindingEvidence:
+    def before(self, inputs: BindingInputs) -> BindingEvidence:
         """By what a binding held when it was last looked at and held, if that is known."""
 
 
@@ -69,20 +64,20 @@ class BindingHistory:
         for remembered in (self._by, self._last, self._lines):
             remembered.clear()
 
-    def holds(self, key: str, inputs: LazyInputs) -> bool:
+    def holds(self, key: str, inputs: BindingInputs) -> bool:
         """See `BindingMemory`."""
         evidence = self._by.get(key)
         if evidence is not None and evidence.lines:
-            self._last[inputs()] = evidence
+            self._last[inputs] = evidence
         return evidence is not None
 
-    def add(self, key: str, inputs: LazyInputs, evidence: BindingEvidence) -> None:
+    def add(self, key: str, inputs: BindingInputs, evidence: BindingEvidence) -> None:
         """See `BindingMemory`."""
         lines = self._lines.setdefault(evidence.lines, evidence.lines)
         self._by[key] = evidence = BindingEvidence(lines, evidence.ran)
         if lines:
-            self._last[inputs()] = evidence
+            self._last[inputs] = evidence
 
-    def before(self, inputs: LazyInputs) -> BindingEvidence:
+    def before(self, inputs: BindingInputs) -> BindingEvidence:
         """See `BindingMemory`."""
-        return self._last.get(inputs(), BindingEvidence())
+        return self._last.get(inputs, BindingEvidence())

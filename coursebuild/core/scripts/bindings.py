@@ -18,19 +18,22 @@ from __future__ import annotations
 import hashlib
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
-from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
 from coursebuild.core.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
+from coursebuild.core.scripts.bound_numbers import (
+    PrintedLine,
+    Shown,
+    lines_of_run,
+    printed_lines,
+    text_places,
+)
+from coursebuild.core.scripts.mismatch import mismatch
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
-
-if TYPE_CHECKING:
-    from coursebuild.core.scripts.bound_numbers import PrintedLine
 
 _FAILED = (
     Outcome.FAILED,
@@ -39,10 +42,6 @@ _FAILED = (
     Outcome.OUTPUT_LIMIT,
     Outcome.ENCODING,
 )
-
-
-_REMEMBERED = 64
-"""Recorded outputs of which the lines are remembered."""
 
 
 class Leaning(Struct, frozen=True):
@@ -62,8 +61,7 @@ class Printed:
         scripts: Iterable[str] = (),
     ) -> None:
         """`scripts` are the paths of all scripts of the course, run or not."""
-        self._runs = {run.path: run for run in runs}
-        self._scripts = frozenset(scripts)
+        self.runs = {run.path: run for run in runs}
         self._by_script: dict[str, list[Verdict]] = {}
         self._by_document: dict[str, list[Verdict]] = {}
         self._lines: dict[tuple[str, int], tuple[PrintedLine, ...]] = {}
@@ -73,28 +71,16 @@ class Printed:
                 self._by_script.setdefault(recording.script, []).append(verdict)
                 self._by_document.setdefault(recording.span.path, []).append(verdict)
         for found in self._by_document.values():
-            found.sort(key=lambda verdict: verdict.recording.body_span.end)
-
-    def scripts(self) -> frozenset[str]:
+            found.sort(key=_end_of_body)
+        self.scripts = frozenset({*scripts, *self.runs, *self._by_script})
         """The paths of all scripts."""
-        return self._scripts | self._runs.keys() | self._by_script.keys()
-
-    def __contains__(self, path: str) -> bool:
-        """Whether there is a script of this path."""
-        return path in self._scripts or path in self._runs or path in self._by_script
-
-    def run(self, path: str) -> ScriptRun | None:
-        """The run of a script."""
-        return self._runs.get(path)
 
     def recorded(self, binding: NumberBinding) -> list[Verdict]:
         """The recorded outputs that a binding leans on."""
         if binding.script is not None:
             return self._by_script.get(binding.script, [])
         found = self._by_document.get(binding.span.path, [])
-        after = bisect_left(
-            found, binding.span.start + 1, key=lambda verdict: verdict.recording.body_span.end
-        )
+        after = bisect_left(found, binding.span.start + 1, key=_end_of_body)
         return found[after - 1 : after] if after else []
 
     def inputs(self, binding: NumberBinding) -> BindingInputs:
@@ -104,20 +90,24 @@ class Printed:
             return BindingInputs(binding.text, binding.script or "", "", 0, len(recorded))
         (verdict,) = recorded
         path, script = binding.span.path, verdict.recording.script or ""
-        same = [v for v in self._by_document[path] if v.recording.script == script]
-        nth = next(nth for nth, one in enumerate(same) if one is verdict)
-        return BindingInputs(binding.text, script, path, nth, len(same))
+        same = [_key(v) for v in self._by_document[path] if v.recording.script == script]
+        return BindingInputs(binding.text, script, path, same.index(_key(verdict)), len(same))
 
     def lines(self, verdict: Verdict) -> tuple[PrintedLine, ...]:
         """The lines of a recorded output."""
-        key = (verdict.recording.span.path, verdict.recording.body_span.start)
+        key = _key(verdict)
         if key not in self._lines:
-            if len(self._lines) >= _REMEMBERED:
-                self._lines.clear()
-            from coursebuild.core.scripts.bound_numbers import printed_lines
-
             self._lines[key] = printed_lines(verdict.recording)
         return self._lines[key]
+
+
+def _end_of_body(verdict: Verdict) -> int:
+    return verdict.recording.body_span.end
+
+
+def _key(verdict: Verdict) -> tuple[str, int]:
+    """Tells the recorded outputs of a course apart."""
+    return verdict.recording.span.path, verdict.recording.body_span.start
 
 
 def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
@@ -135,39 +125,42 @@ def check_bindings(
     """
     found: list[Diagnostic] = []
     for binding in document_bindings(document):
-        checked: Diagnostic | BindingEvidence
-        if memory is None:
-            checked = _check(binding, printed, BindingEvidence())
-        else:
-            key, inputs = _fingerprint(binding, printed), partial(printed.inputs, binding)
+        before = BindingEvidence()
+        if memory is not None:
+            key, inputs = _fingerprint(binding, printed), printed.inputs(binding)
             if memory.holds(key, inputs):
                 continue
-            checked = _check(binding, printed, memory.before(inputs))
-            if isinstance(checked, BindingEvidence):
-                memory.add(key, inputs, checked)
+            before = memory.before(inputs)
+        checked = _check(binding, printed, before)
         if isinstance(checked, Diagnostic):
             found.append(checked)
+        elif memory is not None:
+            memory.add(key, inputs, checked)
     return tuple(found)
 
 
 def _fingerprint(binding: NumberBinding, printed: Printed) -> str:
     """A hash of everything that decides whether a binding holds."""
-    verdicts = printed.recorded(binding)
-    path = binding.script or (verdicts[0].recording.script if verdicts else None)
-    run = printed.run(path) if path is not None else None
-    parts = [binding.text, binding.script or "", str(path is not None and path in printed)]
+    path, run, verdicts = _leans_on(binding, printed)
+    parts = [binding.text, binding.script or "", str(path in printed.scripts)]
     parts += ["-"] if run is None else [run.outcome.value, run.stdout]
     for verdict in verdicts:
-        recording = verdict.recording
-        body = recording.body
-        if isinstance(body, Table):
-            parts += [recording.prefix, recording.body_span.text]
+        recording, how = verdict.recording, verdict.comparison
+        if isinstance(recording.body, Table):
+            parts += ["table", recording.prefix, recording.body_span.text]
         else:
-            parts.append(body.text)
-        how = verdict.comparison
-        parts += [how.mode.value, str(how.rtol), str(how.atol), str(how.ellipsis)]
-        parts += [str(isinstance(body, Table)), verdict.status]
+            parts += ["text", recording.body.text]
+        parts += [how.mode.value, str(how.rtol), str(how.atol), str(how.ellipsis), verdict.status]
     return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _leans_on(
+    binding: NumberBinding, printed: Printed
+) -> tuple[str | None, ScriptRun | None, list[Verdict]]:
+    """The path and the run of the script that a binding leans on, and its recorded outputs."""
+    verdicts = printed.recorded(binding)
+    path = binding.script or (verdicts[0].recording.script if verdicts else None)
+    return path, printed.runs.get(path or ""), verdicts
 
 
 def _check(
@@ -177,39 +170,37 @@ def _check(
 
     `before` are those by which it held before, if that is known.
     """
-    from coursebuild.core.scripts.bound_numbers import lines_of_run
-
-    verdicts = printed.recorded(binding)
-    path = binding.script or (verdicts[0].recording.script if verdicts else None)
-    run = printed.run(path) if path is not None else None
-    if path is None or path not in printed:
+    path, run, verdicts = _leans_on(binding, printed)
+    if path is None or path not in printed.scripts:
         return _orphan(binding, printed)
-    if run is not None and (run.outcome in _FAILED or (verdicts and _silent(run))):
+    ran_well = run is not None and run.outcome is Outcome.OK
+    if run is not None and (
+        run.outcome in _FAILED or (verdicts and ran_well and not run.stdout.strip())
+    ):
         return BindingEvidence()
-    if not verdicts:
-        return _unrecorded(binding, path, run, before)
+    if not verdicts and not ran_well:
+        return _never_run(binding, path, run)
     steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
-    if not steady:
+    if verdicts and not steady:
         return diagnose(
             "binding-volatile",
             binding.text_span,
             f"`{binding.text}` is bound to an output that differs by machine",
             help="take `{out}` away, or compare the output by another key than `volatile`",
         )
+    shown = Shown.of(binding.text)
     lines = [line for verdict in steady for line in printed.lines(verdict)]
-    if _holds(binding, lines):
+    if _holds(shown, lines):
         return _evidence(lines)
-    counted, now = lines, lines
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
     drifted = any(v.status == "drift" for v in steady)
-    if (partial or drifted) and run is not None and run.outcome is Outcome.OK:
-        ran = list(lines_of_run(run.stdout))
-        counted = ([] if drifted else lines) + ran
-        if _holds(binding, counted):
-            return _evidence(ran, ran=True)
-        now = ran if drifted or before.ran else lines
-    from coursebuild.core.scripts.mismatch import mismatch  # in most courses nobody asks for it
-
+    if not ((partial or drifted or not steady) and run is not None and ran_well):
+        return mismatch(binding, path, lines, before.lines, lines)
+    ran = lines_of_run(run.stdout)
+    counted = ran if drifted else (*lines, *ran)
+    if _holds(shown, counted):
+        return _evidence(ran, ran=True)
+    now = ran if drifted or before.ran or not steady else lines
     return mismatch(binding, path, counted, before.lines, now)
 
 
@@ -217,45 +208,24 @@ def _evidence(lines: Sequence[PrintedLine], *, ran: bool = False) -> BindingEvid
     return BindingEvidence(tuple(line.text for line in lines), ran)
 
 
-def _silent(run: ScriptRun) -> bool:
-    return run.outcome is Outcome.OK and not run.stdout.strip()
-
-
-def _unrecorded(
-    binding: NumberBinding, path: str, run: ScriptRun | None, before: BindingEvidence
-) -> Diagnostic | BindingEvidence:
-    """A binding to a script without a recorded output: what it printed in this run counts."""
-    if run is None:
-        return BindingEvidence()
-    if run.outcome is Outcome.NORUN:
-        return diagnose(
-            "binding-orphan",
-            binding.text_span,
-            f"`{binding.text}` is bound to `{path}`, which has no recorded output and is not run",
-            help="record its output below it",
-        )
-    if run.outcome is not Outcome.OK:
-        return BindingEvidence()
-    from coursebuild.core.scripts.bound_numbers import lines_of_run
-
-    lines = lines_of_run(run.stdout)
-    if _holds(binding, lines):
-        return _evidence(lines, ran=True)
-    from coursebuild.core.scripts.mismatch import mismatch
-
-    return mismatch(binding, path, lines, before.lines, lines)
-
-
-def _holds(binding: NumberBinding, lines: Sequence[PrintedLine]) -> bool:
-    from coursebuild.core.scripts.bound_numbers import (  # of bindings that nobody remembers
-        Shown,
-        text_places,
-    )
-
-    shown = Shown.of(binding.text)
+def _holds(shown: Shown, lines: Sequence[PrintedLine]) -> bool:
     if not shown.numbers:
         return bool(shown.before) and any(True for _ in text_places(shown.before, lines))
     return shown.is_in(lines)
+
+
+def _never_run(
+    binding: NumberBinding, path: str, run: ScriptRun | None
+) -> Diagnostic | BindingEvidence:
+    """A binding to a script without a recorded output and without a run that could count."""
+    if run is None or run.outcome is not Outcome.NORUN:
+        return BindingEvidence()
+    return diagnose(
+        "binding-orphan",
+        binding.text_span,
+        f"`{binding.text}` is bound to `{path}`, which has no recorded output and is not run",
+        help="record its output below it",
+    )
 
 
 def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:
@@ -270,7 +240,7 @@ def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:
         "binding-orphan",
         binding.text_span,
         f"`{binding.text}` is bound to `{binding.script}`, which is no script of the course",
-        help=did_you_mean(binding.script, printed.scripts()),
+        help=did_you_mean(binding.script, printed.scripts),
     )
 
 
@@ -278,34 +248,25 @@ def leaning_on(
     verdict: Verdict, documents: Iterable[Document], printed: Printed
 ) -> tuple[Leaning, ...]:
     """The bindings of the course that lean on a value of a recording that changed, in order."""
-    key = (verdict.recording.span.path, verdict.recording.body_span.start)
     changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
     found: list[Leaning] = []
     for document in documents:
         for binding in document_bindings(document):
             for candidate in printed.recorded(binding):
-                recording = candidate.recording
-                if (recording.span.path, recording.body_span.start) == key:
-                    change = _changed(binding, printed.lines(candidate), changes)
+                if _key(candidate) == _key(verdict):
+                    places = _leans_at(binding, printed.lines(candidate))
+                    change = next((c for p in places for c in changes if _overlap(p, c.span)), None)
                     if change is not None:
                         found.append(Leaning(binding, change))
     return tuple(found)
 
 
-def _changed(
-    binding: NumberBinding, lines: Sequence[PrintedLine], changes: Sequence[Change]
-) -> Change | None:
-    """The first change of a value that a binding leans on."""
-    for span in _leans_at(binding, lines):
-        for change in changes:
-            if span.start < change.span.end and change.span.start < span.end:
-                return change
-    return None
+def _overlap(one: Span, other: Span) -> bool:
+    return one.start < other.end and other.start < one.end
 
 
 def _leans_at(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
-    from coursebuild.core.scripts.bound_numbers import Shown, text_places
-
+    """Where the numbers or the text of a binding stand in a recorded output."""
     shown = Shown.of(binding.text)
     if not shown.numbers:
         for line, start, end in text_places(shown.before, lines) if shown.before else ():

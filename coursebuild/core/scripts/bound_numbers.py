@@ -6,7 +6,6 @@ Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of
 
 from __future__ import annotations
 
-import functools
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -32,23 +31,19 @@ class PrintedLine(Struct, frozen=True):
     """A line of output, or a row of a recorded table with its cells joined."""
 
     text: str
-    locate: Locate | None
+    numbers: tuple[Number, ...]
+    locate: Locate | None = None
     """Where `text[start:end]` stands in the lesson; `None` for what is not recorded."""
 
-    @property
-    def numbers(self) -> tuple[Number, ...]:
-        """Its numbers: of most lines nobody asks for them."""
-        return _numbers(self.text)
-
-
-@functools.lru_cache(maxsize=512)
-def _numbers(text: str) -> tuple[Number, ...]:
-    return scan(text)
+    @classmethod
+    def of(cls, text: str, locate: Locate | None = None) -> PrintedLine:
+        """A line with its numbers."""
+        return cls(text, scan(text), locate)
 
 
 def lines_of_run(stdout: str) -> tuple[PrintedLine, ...]:
     """The lines of an output that is not recorded."""
-    return tuple(PrintedLine(text, None) for text in Side.of(stdout).texts)
+    return tuple(map(PrintedLine.of, Side.of(stdout).texts))
 
 
 def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
@@ -57,7 +52,7 @@ def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
         return tuple(_row_line(row) for row in table_rows(recording.body) if row)
     side = Side.of(recording.body.text)
     return tuple(
-        PrintedLine(line.text, _in_fence(recording.body, side, index))
+        PrintedLine.of(line.text, _in_fence(recording.body, side, index))
         for index, line in enumerate(side.lines)
     )
 
@@ -72,7 +67,6 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
     for cell in row:
         starts.append(at)
         at += len(cell.mapped.text) + 1
-    text = " ".join(cell.mapped.text for cell in row)
 
     def locate(start: int, end: int) -> Span:
         first = bisect_right(starts, start) - 1
@@ -81,7 +75,7 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
         _, high = row[last].mapped.origin(0, min(end - starts[last], len(row[last].mapped.text)))
         return Span(row[first].cell.span.source, low, max(low, high))
 
-    return PrintedLine(text, locate)
+    return PrintedLine.of(" ".join(cell.mapped.text for cell in row), locate)
 
 
 def shows(shown: Number, printed: Number) -> bool:
@@ -122,8 +116,7 @@ class Shown(Struct, frozen=True):
 
     def shows(self, window: Window) -> bool:
         """Whether the printed numbers are those shown, rounded."""
-        pairs = zip(self.numbers, window.numbers, strict=True)
-        return all(shows(shown, printed) for shown, printed in pairs)
+        return all(map(shows, self.numbers, window.numbers))
 
     def rewritten(self, text: str, window: Window) -> str | None:
         """The binding's text with printed numbers in it, rounded to the digits that it shows.
@@ -142,44 +135,32 @@ class Shown(Struct, frozen=True):
 
     def is_in(self, lines: Sequence[PrintedLine]) -> bool:
         """Whether printed numbers that may be meant are those shown, rounded."""
-        if self.before or self.after:
-            return any(map(self.shows, self.windows(lines)))
-        # Any number may be meant. Most stand in a line as they are shown, which comes first here.
-        first = self.numbers[0].text
-        likeliest = sorted(lines, key=lambda line: first not in line.text)
-        return any(self.shows(window) for line in likeliest for window in self._in(line))
-
-    def _in(self, line: PrintedLine) -> Iterator[Window]:
-        count, numbers = len(self.numbers), line.numbers
-        for first in range(len(numbers) - count + 1):
-            yield Window(line, numbers[first : first + count])
+        return any(map(self.shows, self.windows(lines)))
 
     def windows(self, lines: Iterable[PrintedLine]) -> list[Window]:
         """The printed numbers that may be meant, by number and by the text around them."""
-        windows = [window for line in lines for window in self._in(line)]
-        for pattern, side in self._sides():
-            windows = [w for w in windows if side(w, pattern)] or windows
+        count = len(self.numbers)
+        windows = [
+            Window(line, line.numbers[first : first + count])
+            for line in lines
+            for first in range(len(line.numbers) - count + 1)
+        ]
+        for stands_beside in (self._after_stands, self._before_stands):
+            windows = [window for window in windows if stands_beside(window)] or windows
         return windows
 
     def stands_beside(self, window: Window) -> bool:
         """Whether the text around the numbers stands around the printed ones as well."""
-        return all(side(window, pattern) for pattern, side in self._sides())
+        return self._before_stands(window) and self._after_stands(window)
 
-    def _sides(self) -> Iterator[tuple[str, Callable[[Window, str], bool]]]:
-        for pattern, side in ((self.after, _followed), (self.before, _preceded)):
-            if pattern:
-                yield pattern, side
+    def _before_stands(self, window: Window) -> bool:
+        start = window.numbers[0].start
+        before = plain(window.line.text[max(0, start - 4 * len(self.before) - 200) : start])
+        return re.search(_whole_words(self.before) + r"\Z", before) is not None
 
-
-def _followed(window: Window, text: str) -> bool:
-    rest = window.line.text[window.numbers[-1].end :].lstrip().replace("\u2212", "-")
-    return re.match(_whole_words(text), rest) is not None
-
-
-def _preceded(window: Window, text: str) -> bool:
-    start = window.numbers[0].start
-    before = plain(window.line.text[max(0, start - 4 * len(text) - 200) : start])
-    return re.search(_whole_words(text) + r"\Z", before) is not None
+    def _after_stands(self, window: Window) -> bool:
+        rest = window.line.text[window.numbers[-1].end :].lstrip().replace("\u2212", "-")
+        return re.match(_whole_words(self.after), rest) is not None
 
 
 def _whole_words(text: str) -> str:

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 from coursebuild.core.model.results import Change, DriftKind
+from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.numbers import (
     Number,
@@ -25,7 +26,6 @@ from coursebuild.core.scripts.numbers import (
     scan,
     unit,
 )
-from coursebuild.core.scripts.pairing import MATCH, pair
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 

@@ -14,7 +14,8 @@ A recorded table has its own way of matching: see `tables`.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 
 from msgspec import Struct
 
@@ -82,31 +83,23 @@ def compare(
     recording: Recording, comparison: Comparison, filters: tuple[Filter, ...], stdout: str
 ) -> Verdict:
     """The verdict on one recording, given what its script printed."""
+    body = recording.body
     if comparison.mode is Mode.VOLATILE:
         return Verdict(recording, comparison, "volatile")
-    if not isinstance(recording.body, Table):
-        body = recording.body.text
-        if stdout in (body, f"{body}\n"):  # as it nearly always is
-            return Verdict(recording, comparison, "verified")
-    return compare_closely(recording, comparison, filters, stdout)
-
-
-def compare_closely(
-    recording: Recording, comparison: Comparison, filters: tuple[Filter, ...], stdout: str
-) -> Verdict:
-    """The verdict on an output that its lesson does not call volatile."""
-    ran = Side.of(stdout, filters)
-    if isinstance(recording.body, Table):
-        return compare_table(recording, recording.body, comparison, filters, ran)
-    recorded = Side.of(recording.body.text, filters)
+    if isinstance(body, Table):
+        return compare_table(recording, body, comparison, filters, Side.of(stdout, filters))
+    if stdout in (body.text, f"{body.text}\n"):  # as it nearly always is
+        return Verdict(recording, comparison, "verified")
+    recorded, ran = Side.of(body.text, filters), Side.of(stdout, filters)
     if same_lines(recorded, ran, comparison):
         return Verdict(recording, comparison, "verified")
     matcher = LineMatcher(comparison)
     steps = align(recorded, ran, matcher)
-    changes = _Changes(recording, recording.body, recorded, ran, matcher).of(steps)
-    if not changes:
+    changes = _Changes(recording, body, recorded, ran, matcher, ran.line_starts())
+    found = tuple(changes.of(steps))
+    if not found:
         return Verdict(recording, comparison, "verified")
-    return Verdict(recording, comparison, "drift", changes, diff_text(steps, recorded, ran))
+    return Verdict(recording, comparison, "drift", found, diff_text(steps, recorded, ran))
 
 
 class _Changes(Struct, frozen=True):
@@ -117,65 +110,54 @@ class _Changes(Struct, frozen=True):
     recorded: Side
     ran: Side
     matcher: LineMatcher
+    line_starts: Sequence[int]
 
-    def of(self, steps: Sequence[Step]) -> tuple[Change, ...]:
-        line_starts = self.ran.line_starts()
-        changes: list[Change] = []
-        index = 0
-        while index < len(steps):
-            step = steps[index]
-            stop = index + 1
-            if step.kind is StepKind.DIFFERS:
-                changes += self._line(step, line_starts)
-            elif step.kind in (StepKind.MISSING, StepKind.EXTRA):
-                while stop < len(steps) and steps[stop].kind is step.kind:
-                    stop += 1
-                changes.append(self._lines(steps[index:stop], line_starts))
-            index = stop
-        return tuple(changes)
+    def of(self, steps: Sequence[Step]) -> Iterator[Change]:
+        """A change for each difference in a line, and for each run of missing or extra lines."""
+        for kind, group in groupby(steps, key=lambda step: step.kind):
+            match kind:
+                case StepKind.DIFFERS:
+                    for step in group:
+                        yield from self._line(step)
+                case StepKind.MISSING:
+                    yield self._missing(list(group))
+                case StepKind.EXTRA:
+                    yield self._extra(list(group))
+                case _:
+                    pass
 
-    def _line(self, step: Step, line_starts: Sequence[int]) -> list[Change]:
+    def _line(self, step: Step) -> Iterator[Change]:
         """The changes inside one line."""
-        changes: list[Change] = []
         recorded, ran = self.recorded.lines[step.recorded].text, self.ran.lines[step.ran].text
         for d in differences(recorded, ran, self.matcher):
             start, end = self.recorded.origin(step.recorded, d.start, d.end)
             ran_start, ran_end = self.ran.origin(step.ran, d.ran_start, d.ran_end)
             span = self._span(start, end)
             texts = self.recorded.raw[start:end], self.ran.raw[ran_start:ran_end]
-            ran_line = bisect_right(line_starts, ran_start)
+            ran_line = bisect_right(self.line_starts, ran_start)
             if d.numbers is not None:
-                changes.append(number_change(span, *texts, ran_line, d.numbers))
+                yield number_change(span, *texts, ran_line, d.numbers)
             else:
-                changes.append(Change(DriftKind.TEXT, span, *texts, ran_line))
-        return changes
+                yield Change(DriftKind.TEXT, span, *texts, ran_line)
 
-    def _lines(self, steps: Sequence[Step], line_starts: Sequence[int]) -> Change:
-        """A run of missing or of extra lines."""
-        first, last = steps[0], steps[-1]
-        if first.kind is StepKind.MISSING:
-            start, _ = self.recorded.origin(first.recorded, 0, 0)
-            _, end = self.recorded.origin(
-                last.recorded, 0, len(self.recorded.lines[last.recorded].text)
-            )
-            texts = [self.recorded.lines[step.recorded].text for step in steps]
-            span = self._span(start, end)
-            return Change(DriftKind.MISSING, span, "\n".join(texts), "", 0)
-        texts = [self.ran.lines[step.ran].text for step in steps]
-        ran_start, _ = self.ran.origin(first.ran, 0, 0)
-        ran_line = bisect_right(line_starts, ran_start)
-        return Change(DriftKind.EXTRA, self._before(first.recorded), "", "\n".join(texts), ran_line)
+    def _missing(self, steps: Sequence[Step]) -> Change:
+        start, _ = self.recorded.origin(steps[0].recorded, 0, 0)
+        text = "\n".join(self.recorded.lines[step.recorded].text for step in steps)
+        span = self._span(start, self._end_of(steps[-1].recorded))
+        return Change(DriftKind.MISSING, span, text, "", 0)
 
-    def _before(self, line: int) -> Span:
-        """The place before a recorded line, or after the last one."""
-        if line < len(self.recorded.lines):
-            start, _ = self.recorded.origin(line, 0, 0)
-        elif self.recorded.lines:
-            last = len(self.recorded.lines) - 1
-            _, start = self.recorded.origin(last, 0, len(self.recorded.lines[last].text))
-        else:
-            start = 0
-        return self._span(start, start)
+    def _extra(self, steps: Sequence[Step]) -> Change:
+        text = "\n".join(self.ran.lines[step.ran].text for step in steps)
+        before, lines = steps[0].recorded, len(self.recorded.lines)
+        place = self.recorded.origin(before, 0, 0)[0] if before < lines else self._end_of(lines - 1)
+        ran_line = self.ran.raw_line(steps[0].ran, self.line_starts)
+        return Change(DriftKind.EXTRA, self._span(place, place), "", text, ran_line)
+
+    def _end_of(self, line: int) -> int:
+        """Where a recorded line ends; 0 where none is recorded."""
+        if line < 0:
+            return 0
+        return self.recorded.origin(line, 0, len(self.recorded.lines[line].text))[1]
 
     def _span(self, start: int, end: int) -> Span:
         if not self.body.text:

@@ -11,7 +11,8 @@ Entry points: `diff_text`, `diff_rows(recording, verdict, filters, stdout)`; `sh
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Literal, TypeAlias, TypeVar
+from itertools import groupby
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -26,13 +27,7 @@ Mark: TypeAlias = Literal[" ", "-", "+"]
 _CONTEXT = 2
 _LINES = 40
 _WIDTH = 160
-
-
-class _Row(Struct, frozen=True):
-    mark: Mark
-    text: str
-    recorded: int
-    ran: int
+_CHANGED = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
 
 
 class DiffPiece(Struct, frozen=True):
@@ -49,9 +44,6 @@ class DiffRow(Struct, frozen=True):
     pieces: tuple[DiffPiece, ...]
 
 
-_AnyRow = TypeVar("_AnyRow", _Row, DiffRow)
-
-
 def shortened(text: str, width: int) -> str:
     """The text, cut to a width with an ellipsis sign at its end."""
     return text if len(text) <= width else text[: width - 1] + "…"
@@ -60,26 +52,20 @@ def shortened(text: str, width: int) -> str:
 def diff_text(steps: Sequence[Step], recorded: Side, ran: Side) -> str:
     """The diff with two lines of context, at most 40 lines of at most 160 characters."""
     lines: list[str] = []
-    more = 0
-    for chunk in _chunks(steps):
-        rows = _gone_first(row for step in chunk for row in _rows(step, recorded, ran))
-        header = _header(rows)
-        for line in (header, *(row.mark + shortened(row.text, _WIDTH) for row in rows)):
-            if len(lines) < _LINES:
-                lines.append(line)
-            else:
-                more += 1
-    if more:
-        lines.append(f"… and {more} more lines")
+    for hunk in _hunks(steps):
+        rows = _gone_first(row for step in hunk for row in _rows(step, recorded, ran))
+        lines.append(_header(hunk))
+        lines += (row.mark + shortened(row.pieces[0].text, _WIDTH) for row in rows)
+    if len(lines) > _LINES:
+        lines[_LINES:] = [f"… and {len(lines) - _LINES} more lines"]
     return "\n".join(("--- recorded", "+++ this run", *lines)) if lines else ""
 
 
-def _chunks(steps: Sequence[Step]) -> list[list[Step]]:
+def _hunks(steps: Sequence[Step]) -> list[list[Step]]:
     """Stretches of steps around changes, with their context."""
-    changed = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
     shown: set[int] = set()
     for index, step in enumerate(steps):
-        if step.kind in changed:
+        if step.kind in _CHANGED:
             shown.add(index)
             for way in (-1, 1):
                 near = index + way
@@ -90,49 +76,42 @@ def _chunks(steps: Sequence[Step]) -> list[list[Step]]:
                 ):
                     shown.add(near)
                     near += way
-    chunks: list[list[Step]] = []
+    hunks: list[list[Step]] = []
     for index in sorted(shown):
         if index - 1 not in shown:
-            chunks.append([])
-        chunks[-1].append(steps[index])
-    return chunks
+            hunks.append([])
+        hunks[-1].append(steps[index])
+    return hunks
 
 
-def _rows(step: Step, recorded: Side, ran: Side) -> list[_Row]:
-    i, j = step.recorded, step.ran
-    match step.kind:
-        case StepKind.SAME:
-            return [_Row(" ", recorded.lines[i].text, i, j)]
-        case StepKind.DIFFERS:
-            return [_Row("-", recorded.lines[i].text, i, j), _Row("+", ran.lines[j].text, i, j)]
-        case StepKind.MISSING:
-            return [_Row("-", recorded.lines[i].text, i, j)]
-        case StepKind.EXTRA:
-            return [_Row("+", ran.lines[j].text, i, j)]
-        case StepKind.ELLIPSIS | StepKind.ELIDED:
-            return []
+def _rows(step: Step, recorded: Side, ran: Side) -> Iterator[DiffRow]:
+    """The rows of a step: one for a line on either side, none for what an ellipsis stands for."""
+    if step.kind is StepKind.SAME:
+        yield _row(" ", recorded.lines[step.recorded].text)
+    if step.kind in (StepKind.DIFFERS, StepKind.MISSING):
+        yield _row("-", recorded.lines[step.recorded].text)
+    if step.kind in (StepKind.DIFFERS, StepKind.EXTRA):
+        yield _row("+", ran.lines[step.ran].text)
 
 
-def _gone_first(rows: Iterable[_AnyRow]) -> list[_AnyRow]:
+def _row(mark: Mark, text: str) -> DiffRow:
+    return DiffRow(mark, (DiffPiece(text, mark != " "),))
+
+
+def _gone_first(rows: Iterable[DiffRow]) -> list[DiffRow]:
     """All that goes before all that comes, as far as no common line lies between."""
-    done: list[_AnyRow] = []
-    gone: list[_AnyRow] = []
-    come: list[_AnyRow] = []
-    for row in rows:
-        if row.mark == " ":
-            done = done + gone + come + [row]
-            gone, come = [], []
-        else:
-            (gone if row.mark == "-" else come).append(row)
-    return done + gone + come
+    done: list[DiffRow] = []
+    for _, group in groupby(rows, key=lambda row: row.mark == " "):
+        done += sorted(group, key=lambda row: row.mark, reverse=True)
+    return done
 
 
-def _header(rows: Sequence[_Row]) -> str:
-    recorded = [row for row in rows if row.mark in " -"]
-    ran = [row for row in rows if row.mark in " +"]
-    first_recorded = min(row.recorded for row in rows) + (1 if recorded else 0)
-    first_ran = min(row.ran for row in rows) + (1 if ran else 0)
-    return f"@@ -{first_recorded},{len(recorded)} +{first_ran},{len(ran)} @@"
+def _header(hunk: Sequence[Step]) -> str:
+    """Where a hunk begins on both sides, and how many lines of each it has."""
+    recorded = sum(step.kind is not StepKind.EXTRA for step in hunk)
+    ran = sum(step.kind is not StepKind.MISSING for step in hunk)
+    first = hunk[0].recorded + (recorded > 0), hunk[0].ran + (ran > 0)
+    return f"@@ -{first[0]},{recorded} +{first[1]},{ran} @@"
 
 
 def diff_rows(
@@ -155,28 +134,20 @@ def diff_rows(
 
 
 def _whole(recorded: str, ran: str) -> Iterator[DiffRow]:
-    for text in recorded.split("\n") if recorded else ():
-        yield DiffRow("-", (DiffPiece(text, True),))
-    for text in ran.split("\n") if ran else ():
-        yield DiffRow("+", (DiffPiece(text, True),))
+    yield from (_row("-", text) for text in recorded.split("\n") if recorded)
+    yield from (_row("+", text) for text in ran.split("\n") if ran)
 
 
 def _page_rows(step: Step, recorded: Side, ran: Side, matcher: LineMatcher) -> Iterator[DiffRow]:
-    match step.kind:
-        case StepKind.SAME | StepKind.ELLIPSIS:
-            for text in recorded.raw_lines(step.recorded):
-                yield DiffRow(" ", (DiffPiece(text, False),))
-        case StepKind.DIFFERS:
-            one, two = recorded.lines[step.recorded].text, ran.lines[step.ran].text
-            found = differences(one, two, matcher)
-            yield DiffRow("-", _pieces(one, [(d.start, d.end) for d in found]))
-            yield DiffRow("+", _pieces(two, [(d.ran_start, d.ran_end) for d in found]))
-        case StepKind.MISSING:
-            yield DiffRow("-", (DiffPiece(recorded.lines[step.recorded].text, True),))
-        case StepKind.EXTRA:
-            yield DiffRow("+", (DiffPiece(ran.lines[step.ran].text, True),))
-        case StepKind.ELIDED:
-            return
+    if step.kind in (StepKind.SAME, StepKind.ELLIPSIS):
+        yield from (_row(" ", text) for text in recorded.raw_lines(step.recorded))
+    elif step.kind is StepKind.DIFFERS:
+        one, two = recorded.lines[step.recorded].text, ran.lines[step.ran].text
+        found = differences(one, two, matcher)
+        yield DiffRow("-", _pieces(one, [(d.start, d.end) for d in found]))
+        yield DiffRow("+", _pieces(two, [(d.ran_start, d.ran_end) for d in found]))
+    else:
+        yield from _rows(step, recorded, ran)
 
 
 def _pieces(text: str, changed: Sequence[tuple[int, int]]) -> tuple[DiffPiece, ...]:

@@ -36,7 +36,7 @@ class Succession(Struct, frozen=True):
 
 def succession(shown: Shown, before: tuple[str, ...], now: Sequence[PrintedLine]) -> Succession:
     """What became of the numbers that a binding shows; `before` are the lines by which it held."""
-    lines = [PrintedLine(text, None) for text in before]
+    lines = list(map(PrintedLine.of, before))
     at = {id(line): index for index, line in enumerate(lines)}
     places = tuple(w for w in shown.windows(lines) if shown.shows(w))
     same = _same_lines(before, tuple(line.text for line in now))

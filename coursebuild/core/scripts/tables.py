@@ -40,6 +40,7 @@ from coursebuild.core.model import (
     Text,
 )
 from coursebuild.core.model.results import Change, DriftKind, Verdict
+from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.changes import number_change
 from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.lines import (
@@ -52,7 +53,6 @@ from coursebuild.core.scripts.lines import (
 )
 from coursebuild.core.scripts.mapped_text import MappedText, MappingSegment, Side, filtered, plain
 from coursebuild.core.scripts.numbers import Number, relative_error
-from coursebuild.core.scripts.pairing import MATCH, pair
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
