@@ -172,7 +172,7 @@ def explain_command(arguments: argparse.Namespace) -> int:
     """Say why something would run again, and what depends on it."""
     from coursebuild.pipeline.explain import explain
     from coursebuild.report.explained import explained_text
-    from coursebuild.report.plain import json_text
+    from coursebuild.report.values import json_text
 
     explanation = explain(options_of(arguments), arguments.path)
     if arguments.format == "json":

@@ -61,9 +61,8 @@ def _benched(options: Options, arguments: argparse.Namespace) -> Benched:
 
 def stability(arguments: argparse.Namespace) -> int:
     """Measure MuJoCo on hard cases, beside theory."""
-    from coursebuild.report.measuring import measured_json, measured_text
-    from coursebuild.report.plain import json_text
-    from coursebuild.report.stability import stability_text
+    from coursebuild.report.measuring import measured_json, measured_text, stability_text
+    from coursebuild.report.values import json_text
 
     options = options_of(arguments)
     try:

@@ -26,7 +26,7 @@ from coursebuild.core.features import check_runs
 from coursebuild.core.model import Course, FeatureBlock, Lab, document_blocks, document_has
 from coursebuild.core.model.results import CompileResult, LabResult, Results, ScriptRun
 from coursebuild.core.run.versions import engine_version, python_version
-from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingMemory, LazyInputs
+from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
 from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
@@ -161,18 +161,18 @@ class KeptBindings:
         self._before = frozenset(known or ())
         self._now: set[str] = set()
 
-    def holds(self, key: str, inputs: LazyInputs) -> bool:
+    def holds(self, key: str, inputs: BindingInputs) -> bool:
         """Whether nothing was wrong in the last run."""
         if key in self._before:
             self._now.add(key)
             return True
         return False
 
-    def add(self, key: str, inputs: LazyInputs, evidence: BindingEvidence) -> None:
+    def add(self, key: str, inputs: BindingInputs, evidence: BindingEvidence) -> None:
         """That nothing is wrong."""
         self._now.add(key)
 
-    def before(self, inputs: LazyInputs) -> BindingEvidence:
+    def before(self, inputs: BindingInputs) -> BindingEvidence:
         """Not kept: what is said of a course does not depend on what was said of it before."""
         return BindingEvidence()
 

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 from msgspec import Struct
 
 from coursebuild.core.model.results import Change, DriftKind
+from coursebuild.core.scripts.findings import closeness
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.report.plain import json_text, plain
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,
@@ -23,7 +23,7 @@ from coursebuild.report.terminal import (
     visible_lines,
 )
 from coursebuild.report.text import location
-from coursebuild.report.values import plural
+from coursebuild.report.values import json_text, plain, plural
 
 _COLOURS = {"same": GREEN, "changed": RED, "fails": RED}
 _NAMED = 20
@@ -147,9 +147,10 @@ def _script(script: ScriptAgainst, other: str, style: Style) -> list[str]:
 
 def _change(change: Change, who: str) -> str:
     recorded, printed = (_shown(text) for text in (change.recorded, change.ran))
+    told = closeness(change)
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
-            return f"recorded {recorded}; {who} printed {printed}{_closeness(change)}"
+            return f"recorded {recorded}; {who} printed {printed}{told and f' ({told})'}"
         case DriftKind.TEXT:
             return f"recorded `{recorded}`; {who} printed `{printed}`"
         case DriftKind.MISSING:
@@ -163,16 +164,6 @@ def _change(change: Change, who: str) -> str:
 def _shown(text: str) -> str:
     first = text.strip().split("\n")[0]
     return first if len(first) <= _WIDTH else first[: _WIDTH - 1] + "…"
-
-
-def _closeness(change: Change) -> str:
-    if change.relative_error is None:
-        return ""
-    error = f"relative error {change.relative_error:.1e}"
-    if change.digits is None:
-        return f" ({error})"
-    agree = {0: "no digit agrees", 1: "1 digit agrees"}
-    return f" ({error}, {agree.get(change.digits, f'{change.digits} digits agree')})"
 
 
 def _sum(report: AgainstReport, lost: int) -> str:

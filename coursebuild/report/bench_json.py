@@ -10,19 +10,31 @@ models are made of.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.points import quantities
+from coursebuild.report.values import plain
 
 _QUANTITIES = ("position", "attitude", "velocity")
+_OF_ROW = (
+    *("status", "reasons", "energy_drift", "mean_energy", "momentum_drift", "penetration", "slip"),
+    *("model_error", "refsafe", "steps", "cost", "cost_uncertainty", "growth"),
+    *("own", "front", "dominated_by"),
+)
+_RENAMED = {"visible_error": "seen", "real_time_factor": "realtime", "timing_spread": "spread"}
 
 
 def bench_values(scenes: Sequence[SceneReport]) -> dict[str, object]:
     """What was measured, see above. What is not known is `None`, or no finite number."""
+    scenarios = [(scene, one) for scene in scenes for one in scene.scenarios]
     return {
-        "rows": [row for scene in scenes for row in _rows(scene)],
-        "scenarios": [_scenario(scene, one) for scene in scenes for one in scene.scenarios],
+        "rows": [
+            {**_context(scene, scenario, number), **_row(scenario, row)}
+            for scene, scenario in scenarios
+            for number, row in enumerate(scenario.rows)
+        ],
+        "scenarios": [_scenario(scene, scenario) for scene, scenario in scenarios],
         "scenes": [
             {"scene": one.model, "digest": one.digest, "quick": one.quick, "card": one.card}
             for one in scenes
@@ -30,19 +42,8 @@ def bench_values(scenes: Sequence[SceneReport]) -> dict[str, object]:
     }
 
 
-def _rows(scene: SceneReport) -> Iterator[dict[str, object]]:
-    for scenario in scene.scenarios:
-        for number, row in enumerate(scenario.rows):
-            yield {
-                **_where(scene, scenario, number),
-                **_setting(scenario, row),
-                **_errors(scenario, row),
-                **_cost(row),
-                **_judged(scenario, row),
-            }
-
-
-def _where(scene: SceneReport, scenario: ScenarioReport, number: int) -> dict[str, object]:
+def _context(scene: SceneReport, scenario: ScenarioReport, number: int) -> dict[str, object]:
+    """What is the same for all rows of a scenario, but for their number."""
     machine = scene.machine
     return {
         "scene": scene.model,
@@ -54,68 +55,33 @@ def _where(scene: SceneReport, scenario: ScenarioReport, number: int) -> dict[st
         "system": machine.system,
         "cpu": machine.cpu,
         "quick": scene.quick,
-    }
-
-
-def _setting(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, object]:
-    setting = row.setting
-    return {
-        "integrator": setting.integrator,
-        "timestep": setting.timestep,
-        "solver": setting.solver,
-        "iterations": setting.iterations,
-        "cone": setting.cone,
         "control_hold": scenario.hold,
         "duration": scenario.duration,
         "horizon": scenario.horizon,
         "reference_kind": scenario.reference,
         "reference_floor": scenario.floor,
         "velocity_floor": scenario.velocity_floor,
+        "figure": scenario.figure,
     }
 
 
-def _errors(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, object]:
-    value: dict[str, object] = {"figure": scenario.figure}
+def _row(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, object]:
+    value: dict[str, object] = plain(row.setting)
     least = {one.name: one.least for one in quantities(scenario)}
     for name in (*_QUANTITIES, "figure"):
         pair: tuple[float, float] = getattr(row, name) or (math.nan, math.nan)
         told = [max(one, least.get(name, 0.0)) for one in pair]  # what is no number stays so
         value[f"{name}_error"], value[f"{name}_error_end"] = told
-    order = next((o for o in scenario.orders if o.integrator == row.setting.integrator), None)
-    for name in _QUANTITIES:
-        value[f"order_{name}"] = getattr(order, name, None)
-    return value
-
-
-def _cost(row: WorkPrecisionRow) -> dict[str, object]:
+    integrator = row.setting.integrator
+    order = next((one for one in scenario.orders if one.integrator == integrator), None)
+    stable = next((one for one in scenario.stable if one.integrator == integrator), None)
     return {
-        "visible_error": row.seen,
-        "mean_energy": row.mean_energy,
-        "energy_drift": row.energy_drift,
-        "momentum_drift": row.momentum_drift,
-        "penetration": row.penetration,
-        "slip": row.slip,
-        "model_error": row.model_error,
-        "steps": row.steps,
-        "cost": row.cost,
-        "cost_uncertainty": row.cost_uncertainty,
-        "real_time_factor": row.realtime,
-        "timing_spread": row.spread,
-    }
-
-
-def _judged(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, object]:
-    stable = next((s for s in scenario.stable if s.integrator == row.setting.integrator), None)
-    return {
-        "status": row.status,
-        "reasons": row.reasons,
-        "growth": row.growth,
+        **value,
+        **{f"order_{name}": getattr(order, name, None) for name in _QUANTITIES},
+        **{name: getattr(row, name) for name in _OF_ROW},
+        **{name: getattr(row, field) for name, field in _RENAMED.items()},
         "largest_stable_timestep": None if stable is None else stable.largest,
         "monotone": None if stable is None else stable.monotone,
-        "refsafe": row.refsafe,
-        "front": row.front,
-        "own": row.own,
-        "dominated_by": row.dominated_by,
     }
 
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coursebuild.numerics.reports.diet import IDENTICAL, DietReport, Finding, Saving, TextEdit
-from coursebuild.report.plain import plain
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
-from coursebuild.report.values import plural
+from coursebuild.report.values import plain, plural
 
 _NAMES = 6
 """Names that a message lists."""

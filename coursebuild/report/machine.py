@@ -9,14 +9,13 @@ import json
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from coursebuild.core.model.sensitivity import Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
-from coursebuild.report.plain import json_text, plain
-from coursebuild.report.sensitivity import sensitivity_value
 from coursebuild.report.terminal import Style
 from coursebuild.report.text import diagnostic_text, location
-from coursebuild.report.values import LabLine, Report, ScriptLine
+from coursebuild.report.values import LabLine, Report, ScriptLine, json_text, plain
 
 
 def to_json(report: Report) -> str:
@@ -33,13 +32,24 @@ def to_json(report: Report) -> str:
         "summary": summary,
     }
     if report.sensitivity is not None:
-        value["sensitivity"] = sensitivity_value(report.sensitivity)
+        value["sensitivity"] = [_sensitivity(one) for one in report.sensitivity]
     return json_text(value)
 
 
 def _timed(line: ScriptLine | LabLine) -> dict[str, Any]:
     value: dict[str, Any] = plain(line, unexported="no_python_export")
     return value | {"seconds": round(line.seconds, 3)}
+
+
+def _sensitivity(one: Sensitivity) -> dict[str, Any]:
+    """What is known of a script; an amplification without bounds is `null`."""
+    value: dict[str, Any] = plain(one, standing="status")
+    rows = {"doubts": one.doubts, "flips": one.flips}
+    told = {
+        name: [{"file": row.span.path, **plain(row)} for row in found]
+        for name, found in rows.items()
+    }
+    return {**value, "chaotic": one.chaotic, **told}
 
 
 # --- JUnit

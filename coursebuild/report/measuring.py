@@ -1,6 +1,6 @@
-"""What `bench`, `stability` and `diet` print around what they measured.
+"""What `bench`, `stability` and `diet` print around what they measured; the tables of `stability`.
 
-Entry points: `measured_text`, `measured_json`; `checked_text`, `failure_text`.
+Entry points: `measured_text`, `measured_json`; `checked_text`, `failure_text`; `stability_text`.
 """
 
 from __future__ import annotations
@@ -8,9 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.numerics.reports.cases import (
+    BoundaryLine,
+    CaseReport,
+    FigureLine,
+    ReferenceLine,
+)
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
-from coursebuild.report.plain import json_text
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,
@@ -23,7 +28,7 @@ from coursebuild.report.terminal import (
     visible,
 )
 from coursebuild.report.text import diagnostic_text
-from coursebuild.report.values import plural
+from coursebuild.report.values import json_text, plural
 
 
 def measured_text(
@@ -98,3 +103,110 @@ def _rows(found: Sequence[Departure]) -> list[str]:
             Column("band", tuple(one.band for one in found), left=True),
         ]
     )
+
+
+# --- stability
+
+_ORDERS = ("order of position", "order of attitude", "order of velocity")
+_BOUNDARY = ("largest stable", "theory", "difference", "beyond", "growth a step")
+
+
+def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
+    """As text: for each case its reference, boundaries, known quantities and orders."""
+    return "\n".join(_case(report, style) for report in reports)
+
+
+def _case(report: CaseReport, style: Style) -> str:
+    head = style.paint(f"{report.name}", BOLD) + f"  case {report.case}: {report.title}"
+    lines = [head]
+    if report.reference is not None:
+        lines += [f"  {line}" for line in _reference(report.reference)]
+    if report.note:
+        lines.append(f"  {report.note}")
+    if report.boundaries:
+        rows = [(line.integrator, _boundary(line)) for line in report.boundaries]
+        lines += _table(_BOUNDARY, _merged(rows))
+        lines += [f"  {_islands(one, style)}" for one in report.boundaries if not one.monotone]
+    for name in dict.fromkeys(line.name for line in report.figures):
+        found = [line for line in report.figures if line.name == name]
+        rows = [(line.integrator, _figure(line)) for line in found]
+        lines += _table((name, "exact", "difference"), _merged(rows))
+    fitted: list[tuple[str, tuple[str, ...]]] = [
+        (o.integrator, (_order(o.position), _order(o.attitude), _order(o.velocity)))
+        for o in report.orders
+        if (o.position, o.attitude, o.velocity) != (None, None, None)
+    ]
+    if fitted:
+        lines += _table(_ORDERS, _merged(fitted))
+    softened = sorted({line.timestep for line in report.errors if line.refsafe})
+    if softened:
+        shown = ", ".join(f"{h:g}" for h in softened)
+        lines.append(f"  refsafe softens constraints at {shown} s: that is another model")
+    lost = [line for line in report.errors if line.status != "ok"]
+    for line in lost:
+        why = "; ".join(line.reasons)
+        told = f"  {line.integrator} at {line.timestep:g} s: {line.status}: {why}"
+        lines.append(style.paint(told, YELLOW))
+    return "\n".join(lines) + "\n"
+
+
+def _reference(line: ReferenceLine) -> list[str]:
+    said = [f"reference ({line.kind}, known to {line.floor:.0e}): {line.source}"]
+    if line.second:
+        off = "" if line.agreement is None else f", which differs by {line.agreement:.1e}"
+        said.append(f"second: {line.second}{off}")
+    return said
+
+
+def _boundary(line: BoundaryLine) -> tuple[str, ...]:
+    theory = _seconds(line.theory) if line.theory else ""
+    if line.formula and not line.theory:
+        theory = "all" if line.theory is None else "none"
+    growth = "" if line.growth is None else f"{line.growth:.9f}"
+    difference = "" if line.difference is None else f"{100 * line.difference:+.3f} %"
+    return _largest(line), theory, difference, line.beyond, growth
+
+
+def _islands(line: BoundaryLine, style: Style) -> str:
+    shown = ", ".join(f"{h:.4g}" for h in line.islands)
+    return style.paint(f"{line.integrator} is not monotone: stable again at {shown} s", RED)
+
+
+def _largest(line: BoundaryLine) -> str:
+    if line.largest is None:
+        return f"all to {_seconds(line.searched[1])}"
+    if line.largest == 0:
+        return f"none from {_seconds(line.searched[0])}"
+    return _seconds(line.largest)
+
+
+def _figure(line: FigureLine) -> tuple[str, ...]:
+    unit = f" {line.unit}" if line.unit else ""
+    measured = "not finite" if line.measured is None else f"{line.measured:.10g}{unit}"
+    exact = "" if line.exact is None else f"{line.exact:.10g}{unit}"
+    difference = ""
+    if line.exact is not None and line.measured is not None:
+        difference = f"{line.measured - line.exact:+.1e}"
+    return measured, exact, difference
+
+
+def _order(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.6g} s"
+
+
+def _merged(rows: Sequence[tuple[str, tuple[str, ...]]]) -> list[tuple[str, ...]]:
+    """Rows with the integrators behind, those of equal rows together."""
+    together: dict[tuple[str, ...], list[str]] = {}
+    for integrator, cells in rows:
+        together.setdefault(cells, []).append(integrator)
+    return [(*cells, ", ".join(names)) for cells, names in together.items()]
+
+
+def _table(titles: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Rows under their titles, in columns."""
+    columns = zip((*titles, ""), zip(*rows, strict=True), strict=True)
+    return [f"  {line}" for line in table([Column(t, cells, left=True) for t, cells in columns])]

@@ -1,6 +1,6 @@
 """Diagnostics as text for people: message, place, the line with the wrong part marked, help.
 
-Entry points: `to_text(report, style)`, `diagnostic_text(diagnostic, style)`.
+Entry points: `to_text(report, style)`, `diagnostic_text(diagnostic, style)`; `sensitivity_text`.
 
 1. The frame shows the first line of the span; carets mark the part of it that is wrong.
 2. Columns are those of a terminal: tabs are expanded, wide characters take two cells, control
@@ -10,6 +10,11 @@ Entry points: `to_text(report, style)`, `diagnostic_text(diagnostic, style)`.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from typing import assert_never
+
+from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.core.text.source import Span
 from coursebuild.report.terminal import (
@@ -35,8 +40,6 @@ def to_text(report: Report, style: Style) -> str:
     if lines:
         parts.append("".join(line + "\n" for line in lines))
     if report.sensitivity:
-        from coursebuild.report.sensitivity import sensitivity_text
-
         parts.append(sensitivity_text(report.sensitivity, style))
     if report.remarks:
         parts.append("".join(visible_lines(remark) + "\n" for remark in report.remarks))
@@ -133,3 +136,65 @@ def _window(line: str, start: int, end: int, room: int) -> tuple[int, int]:
     if end <= room - room // 4:
         first = 0
     return first, min(len(line), first + room)
+
+
+# --- sensitivity
+
+_WHY = {
+    Standing.NO_MUJOCO: "it does not use MuJoCo",
+    Standing.NOT_MOVED: "no simulation of it has an initial state to move",
+    Standing.UNRECORDED: "nothing that it prints is recorded and compared",
+    Standing.DRIFTED: "it does not print what is recorded, or does not run to its end",
+    Standing.FAILED: "it does not run to its end when its initial states are moved",
+}
+
+
+def sensitivity_text(found: Sequence[Sensitivity], style: Style) -> str:
+    """A line for each script, and one for each number of which not all digits hold."""
+    lines = [f"digits that hold when initial states are moved by {PERTURBATION:.0e} (relative):"]
+    for one in found:
+        lines += _sensitivity(one, style)
+    return "".join(line + "\n" for line in lines)
+
+
+def _sensitivity(one: Sensitivity, style: Style) -> list[str]:
+    if one.standing is not Standing.MEASURED:
+        return [f"{style.paint('not asked', FAINT)} {one.path}  {_WHY[one.standing]}"]
+    whole = one.numbers - len(one.doubts)
+    verdict = "chaotic" if one.chaotic else "some" if one.doubts or one.flips else "all"
+    colour = GREEN if verdict == "all" else YELLOW
+    numbers = plural(one.numbers, "number")
+    said = f"{whole} of {numbers}" if whole < one.numbers else numbers
+    parts = [f"{said} in full"]
+    if one.amplification is not None:
+        parts.append(f"states end {_times(one.amplification)} times as far apart as they began")
+    head = f"{style.paint(f'{verdict:<9}', colour)} {one.path}  {', '.join(parts)}"
+    rows: list[Doubt | Flip] = [*one.doubts, *one.flips]
+    rows.sort(key=lambda row: (row.span.path, row.span.start))
+    return [head, *(f"  {_doubt(row)}" for row in rows)]
+
+
+def _times(size: float) -> str:
+    if not math.isfinite(size):
+        return "without bounds, many"
+    return f"{size:.0e}" if size >= 1e3 else f"{size:.2g}"
+
+
+def _doubt(row: Doubt | Flip) -> str:
+    match row:
+        case Doubt():
+            what = f"{row.printed}  {row.trusted} of {plural(row.digits, 'digit')}"
+            what += f", print {row.instead}" if row.instead else ""
+            what += f"  ({row.least} to {row.most})"
+        case Flip():
+            what = _flip(row)
+        case _:
+            assert_never(row)
+    return f"{location(row.span)}  {what}" + ("" if row.compared else "  (allowed for)")
+
+
+def _flip(row: Flip) -> str:
+    printed, other = (" ".join(text.split()) for text in (row.printed, row.other))
+    if not other:
+        return f"`{printed}` is not always printed"
+    return f"`{other}` is printed {f'in place of `{printed}`' if printed else 'here as well'}"

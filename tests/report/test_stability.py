@@ -13,8 +13,8 @@ from coursebuild.numerics.reports.cases import (
     ReferenceLine,
 )
 from coursebuild.report import Style
-from coursebuild.report.plain import json_text
-from coursebuild.report.stability import stability_text
+from coursebuild.report.measuring import stability_text
+from coursebuild.report.values import json_text
 
 TRIED = (1e-3, 10.0)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
@@ -23,18 +23,19 @@ from coursebuild.core.text.source import Span
 class Extraction(Struct, frozen=True):
     """A script and the file that it becomes."""
 
-    path: str
-    """POSIX path relative to the project root."""
-    text: str
-    """LF line ends, ending in exactly one newline."""
     script: Script
     owner: str
     """The id of the lesson or page that it stands in."""
 
-    @classmethod
-    def of(cls, script: Script, owner: str) -> Extraction:
-        """That of a script."""
-        return cls(script.path, _text(script), script, owner)
+    @property
+    def path(self) -> str:
+        """POSIX path relative to the project root."""
+        return self.script.path
+
+    @property
+    def text(self) -> str:
+        """LF line ends, ending in exactly one newline."""
+        return self.script.code.text.rstrip("\n") + "\n"
 
     @property
     def data(self) -> bytes:
@@ -49,16 +50,11 @@ class Extraction(Struct, frozen=True):
     def line_span(self, line: int) -> Span | None:
         """Where a line of the file (from 1) stands in the lesson; `None` if it has no such line."""
         code = self.script.code
-        start = 0
-        for _ in range(line - 1):
-            newline = code.text.find("\n", start)
-            if newline < 0:
-                return None
-            start = newline + 1
-        if line < 1 or start >= len(code.text):
+        lines = code.text.split("\n")
+        if not 1 <= line <= len(lines) or (line == len(lines) and not lines[-1]):
             return None
-        end = code.text.find("\n", start)
-        return code.span(start, len(code.text) if end < 0 else end)
+        start = sum(len(text) + 1 for text in lines[: line - 1])
+        return code.span(start, start + len(lines[line - 1]))
 
 
 def owners(course: Course) -> Iterator[tuple[str, Document]]:
@@ -73,35 +69,32 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     """The scripts of a course in order, no two of which clash."""
     kept: list[Extraction] = []
     found: list[Diagnostic] = []
-    paths = _Paths()
+    files: dict[str, Extraction] = {}
+    folders: dict[str, Extraction] = {}
     for owner, document in owners(course):
         for script in document_scripts(document):
-            extraction = Extraction.of(script, owner)
-            clash = paths.clash(extraction)
+            extraction, key = Extraction(script, owner), _key(script.path)
+            clash = _clash(extraction, files, folders)
             if clash is None:
-                paths.add(extraction)
+                files[key] = extraction
+                folders |= dict.fromkeys(_folders(key), extraction)
                 kept.append(extraction)
             else:
                 found.append(clash)
     return Parsed(tuple(kept), tuple(found))
 
 
-def _text(script: Script) -> str:
-    return script.code.text.rstrip("\n") + "\n"
+_PATIENCE = 3.0
+"""How many times as long a script may take whose initial states are moved."""
 
 
 def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[ScriptJob, ...]:
     """What to run; with initial states moved, which takes longer, in the direction of a number."""
     patience = _PATIENCE if perturbation else 1.0
-    scripts = ((e.path, e.script) for e in extractions)
     return tuple(
-        ScriptJob(p, s.args, s.timeout * patience, s.requires, s.norun, perturbation)
-        for p, s in scripts
+        ScriptJob(s.path, s.args, s.timeout * patience, s.requires, s.norun, perturbation)
+        for s in (extraction.script for extraction in extractions)
     )
-
-
-_PATIENCE = 3.0
-"""How many times as long a script may take whose initial states are moved."""
 
 
 def _key(path: str) -> str:
@@ -115,40 +108,24 @@ def _folders(key: str) -> Iterator[str]:
         yield key
 
 
-class _Paths:
-    """The paths taken so far."""
-
-    def __init__(self) -> None:
-        self._files: dict[str, Extraction] = {}
-        self._folders: dict[str, Extraction] = {}
-
-    def add(self, extraction: Extraction) -> None:
-        key = _key(extraction.path)
-        self._files[key] = extraction
-        for folder in _folders(key):
-            self._folders.setdefault(folder, extraction)
-
-    def clash(self, new: Extraction) -> Diagnostic | None:
-        key = _key(new.path)
-        same = self._files.get(key)
-        if same is not None and same.path == new.path:
-            return _clash(new, same, f"`{new.path}` is written by two blocks", "written here first")
-        if same is not None:
-            message = f"`{new.path}` and `{same.path}` are one file where case does not count"
-            return _clash(new, same, message, f"`{same.path}` is written here")
-        inside = self._folders.get(key)
-        if inside is not None:
-            message = f"`{new.path}` is a file here and a folder of `{inside.path}`"
-            return _clash(new, inside, message, f"`{inside.path}` is written here")
-        for folder in _folders(key):
-            file = self._files.get(folder)
-            if file is not None:
-                message = f"`{file.path}` is a file and cannot be a folder of `{new.path}`"
-                return _clash(new, file, message, f"`{file.path}` is written here")
+def _clash(
+    new: Extraction, files: Mapping[str, Extraction], folders: Mapping[str, Extraction]
+) -> Diagnostic | None:
+    """What a path clashes with, of files and folders before it, by their keys."""
+    key = _key(new.path)
+    above = next((files[folder] for folder in _folders(key) if folder in files), None)
+    old = files.get(key) or folders.get(key) or above
+    if old is None:
         return None
-
-
-def _clash(new: Extraction, old: Extraction, message: str, note: str) -> Diagnostic:
+    note = f"`{old.path}` is written here"
+    if old.path == new.path:
+        message, note = f"`{new.path}` is written by two blocks", "written here first"
+    elif key in files:
+        message = f"`{new.path}` and `{old.path}` are one file where case does not count"
+    elif key in folders:
+        message = f"`{new.path}` is a file here and a folder of `{old.path}`"
+    else:
+        message = f"`{old.path}` is a file and cannot be a folder of `{new.path}`"
     return diagnose(
         "script-repeated",
         new.script.path_span,

@@ -1,22 +1,27 @@
-"""What to say about a script that did not run to its end.
+"""What to say about a script that did not run to its end, or in which a simulation was lost.
 
 Entry points: `failure` (a run), `silence` (an output is recorded and nothing was printed),
-`in_lessons` (a text with the paths of extracted files made places of lessons).
+`divergence` (simulations), `is_lost`; `in_lessons` (a text with the paths of extracted files made
+places of lessons).
 
-A traceback's frames are read out of the standard error: each line of an extracted file is the line
-of a lesson, and the innermost such line is what the diagnostic points at. Of a script that does not
-parse nothing is said: the reader of its lesson has told it.
+1. A traceback's frames are read out of the standard error: each line of an extracted file is the
+   line of a lesson, and the innermost such line is what the diagnostic points at. Of a script that
+   does not parse nothing is said: the reader of its lesson has told it.
+2. A warning of MuJoCo's and a state that is not finite are errors, unless the fence says
+   `diverges`; bodies deep in each other are a warning, unless it says `deep`. A script that says
+   either and does not is wrong about itself.
 """
 
 from __future__ import annotations
 
 import re
+import signal
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import assert_never
 
 from coursebuild.core.model import Recording
-from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.results import Divergence, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
@@ -32,26 +37,6 @@ _ABORTED = "Fatal Python error: Aborted\n\n"
 """What Python says when it is asked, at the end of its time, where it is."""
 _LIBRARIES = ("site-packages", "dist-packages")
 
-_SIGNALS = {
-    1: "SIGHUP",
-    2: "SIGINT",
-    3: "SIGQUIT",
-    4: "SIGILL",
-    5: "SIGTRAP",
-    6: "SIGABRT",
-    7: "SIGBUS",
-    8: "SIGFPE",
-    9: "SIGKILL",
-    11: "SIGSEGV",
-    13: "SIGPIPE",
-    14: "SIGALRM",
-    15: "SIGTERM",
-    24: "SIGXCPU",
-    25: "SIGXFSZ",
-    31: "SIGSYS",
-}
-"""As Linux numbers them (signal(7))."""
-
 _TAIL_LINES = 30
 _TAIL_CHARACTERS = 4000
 _LABEL = 120
@@ -66,11 +51,11 @@ class _Lessons:
     def innermost(self, stderr: str) -> tuple[Extraction, Span] | None:
         """The script and the lesson's line where a traceback or a crash dump ends."""
         dump = stderr.rfind(_CRASH)
-        for found in _FRAME.finditer(stderr, dump) if dump >= 0 else reversed(_frames(stderr)):
+        frames = list(_FRAME.finditer(stderr, max(0, dump)))
+        for found in frames if dump >= 0 else reversed(frames):
             extraction, span = self._find(found)
             if extraction is not None and span is not None:
-                lead = len(span.text) - len(span.text.lstrip())
-                return extraction, Span(span.source, span.start + lead, span.end)
+                return extraction, _without_indentation(span)
         return None
 
     def place(self, found: re.Match[str]) -> Span | None:
@@ -88,8 +73,9 @@ class _Lessons:
         return None, None
 
 
-def _frames(stderr: str) -> list[re.Match[str]]:
-    return list(_FRAME.finditer(stderr))
+def _without_indentation(span: Span) -> Span:
+    lead = len(span.text) - len(span.text.lstrip())
+    return Span(span.source, span.start + lead, span.end)
 
 
 def in_lessons(text: str, extractions: Iterable[Extraction]) -> str:
@@ -114,7 +100,6 @@ def failure(
 ) -> Diagnostic | None:
     """What is wrong with a run; `None` for one that ended well or was not to be made."""
     path = f"`{extraction.path}`"
-    fence = extraction.script.span.first_line()
     match run.outcome:
         case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN:
             return None
@@ -129,23 +114,16 @@ def failure(
             message = f"{path} was stopped after {limit} s, its time limit"
             return _crash("script-timeout", extraction, run, extractions, message)
         case Outcome.OUTPUT_LIMIT:
-            return diagnose(
-                "script-output-limit",
-                fence,
-                f"{path} printed more than 1 MiB",
-                help="print less: a recorded output is to be read",
-                notes=_stderr_notes(run, _Lessons(extractions)),
-            )
+            rule, message = "script-output-limit", f"{path} printed more than 1 MiB"
+            help = "print less: a recorded output is to be read"
         case Outcome.ENCODING:
-            return diagnose(
-                "script-encoding",
-                fence,
-                f"{path} printed bytes that are not UTF-8",
-                help="print text; `sys.stdout.buffer` takes bytes as they are",
-                notes=_stderr_notes(run, _Lessons(extractions)),
-            )
+            rule, message = "script-encoding", f"{path} printed bytes that are not UTF-8"
+            help = "print text; `sys.stdout.buffer` takes bytes as they are"
         case _:
             assert_never(run.outcome)
+    fence = extraction.script.span.first_line()
+    notes = _stderr_notes(run, _Lessons(extractions))
+    return diagnose(rule, fence, message, help=help, notes=notes)
 
 
 def silence(recording: Recording, path: str) -> Diagnostic:
@@ -159,7 +137,10 @@ def silence(recording: Recording, path: str) -> Diagnostic:
 
 
 def _signal_name(number: int) -> str:
-    return _SIGNALS.get(number, f"signal {number}")
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _crash(
@@ -179,21 +160,17 @@ def _crash(
         return None
     if where.path != extraction.path:
         notes.append(Note(f"`{extraction.path}` was running", fence))
+    label = "" if span is fence else "it was here"
+    if rule == "script-failed":
+        label = _last_words(stderr)
     return diagnose(
         rule,
         span,
         message,
-        label=_beside(rule, stderr, span is not fence),
+        label=label,
         help=_help(rule, run),
         notes=[*notes, *_stderr_notes(run, lessons)],
     )
-
-
-def _beside(rule: str, stderr: str, found: bool) -> str:
-    """What stands beside the marked line."""
-    if rule == "script-failed":
-        return _last_words(stderr)
-    return "it was here" if found else ""
 
 
 def _help(rule: str, run: ScriptRun) -> str:
@@ -216,7 +193,7 @@ def _parses(extraction: Extraction) -> bool:
 
 def _last_words(stderr: str) -> str:
     """The exception's line of the last traceback, else the last line that was written."""
-    frames = _frames(stderr)
+    frames = list(_FRAME.finditer(stderr))
     if frames:
         after = stderr[frames[-1].end() :].split("\n")[1:]
         lines = [line for line in after if line and not line[0].isspace()]
@@ -239,3 +216,101 @@ def _stderr_notes(run: ScriptRun, lessons: _Lessons) -> list[Note]:
     cut = len(lines) > _TAIL_LINES or len(tail) > _TAIL_CHARACTERS
     lead = "its standard error ended with" if cut else "its standard error"
     return [Note(f"{lead}:\n{tail[-_TAIL_CHARACTERS:]}")]
+
+
+# --- simulations
+
+_SHOWN = 4
+"""Further simulations that are named."""
+_DIVERGES = (
+    "try a smaller timestep or another integrator; if it is to diverge, say so by `diverges` on "
+    "its fence"
+)
+_DEEP = (
+    "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), or look at "
+    "where they start; if they are to, say so by `deep` on its fence"
+)
+
+
+def is_lost(extraction: Extraction, run: ScriptRun) -> bool:
+    """Whether a simulation was lost, without the script's saying so."""
+    return not extraction.script.diverges and bool(_lost(run))
+
+
+def divergence(
+    extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
+) -> Iterator[Diagnostic]:
+    """What is wrong with the simulations of a script that was run."""
+    found = () if run.trace is None else run.trace.divergences
+    script = extraction.script
+    deep = [each for each in found if each.sign is Sign.CONTACT]
+    if run.outcome is Outcome.OK and run.trace is not None:
+        if script.diverges and not found:
+            yield _unlike(extraction, "script-stable", "diverges", "none of its simulations did")
+        if script.deep and not deep:
+            what = "no bodies lay deep in each other"
+            yield _unlike(extraction, "script-shallow", "deep", what)
+    if script.diverges or not found:
+        return
+    lost = _lost(run)
+    if lost:
+        said = f"a simulation of `{script.path}` diverged"
+        yield _found("script-diverged", extraction, lost, extractions, said, _DIVERGES)
+    elif deep and not script.deep:  # what is lost may as well lie anywhere
+        said = f"bodies of `{script.path}` lie deep in each other"
+        yield _found("script-penetration", extraction, deep, extractions, said, _DEEP)
+
+
+def _lost(run: ScriptRun) -> tuple[Divergence, ...]:
+    found = () if run.trace is None else run.trace.divergences
+    return tuple(each for each in found if each.sign is not Sign.CONTACT)
+
+
+def _unlike(extraction: Extraction, rule: str, key: str, what: str) -> Diagnostic:
+    fence = extraction.script.span.first_line()
+    message = f"`{extraction.path}` says `{key}`, and {what}"
+    return diagnose(rule, fence, message, help=f"take `{key}` away")
+
+
+def _found(
+    rule: str,
+    extraction: Extraction,
+    found: Sequence[Divergence],
+    extractions: Iterable[Extraction],
+    said: str,
+    help: str,
+) -> Diagnostic:
+    """The first of what was found, where it was found, and some more in notes."""
+    by_path = {each.path: each for each in extractions}
+    fence = extraction.script.span.first_line()
+    further, left = found[1 : _SHOWN + 1], len(found) - 1 - _SHOWN
+    notes = [Note(_noticed(each), _place(each, by_path)) for each in further]
+    if found[0].path not in ("", extraction.path):
+        notes.insert(0, Note(f"`{extraction.path}` was running", fence))
+    if left > 0:
+        notes.append(Note(f"and {left} more like these"))
+    place = _place(found[0], by_path) or fence
+    return diagnose(rule, place, f"{said}: {_noticed(found[0])}", help=help, notes=notes)
+
+
+def _place(found: Divergence, by_path: Mapping[str, Extraction]) -> Span | None:
+    """The lesson's line where it was noticed."""
+    where = by_path.get(found.path)
+    span = None if where is None else where.line_span(found.line)
+    return None if span is None else _without_indentation(span)
+
+
+def _noticed(found: Divergence) -> str:
+    """What was noticed, in words."""
+    of = f" of model `{found.model}`" if found.model else ""
+    at = f" at t = {found.time} s" if found.time else ""
+    match found.sign:
+        case Sign.POSITIONS | Sign.VELOCITIES | Sign.ACCELERATIONS:
+            return f"MuJoCo warned of bad {found.sign.value}{of}{at}"
+        case Sign.STATE:
+            return f"the state{of} is not finite{at}"
+        case Sign.CONTACT:
+            one, other = (*found.geoms, "", "")[:2]
+            return f"{one} and {other}{of} by {found.depth} m{at}"
+        case _:
+            assert_never(found.sign)

@@ -5,14 +5,14 @@ Entry point: `mismatch`.
 1. Where it is known by which lines the binding held before, what is printed in their place now is
    proposed. Where that is not certain, the nearest number is named, and nothing is proposed: it may
    be another quantity.
-2. Else the number is proposed that was most probably meant (`meant`). It may be written without a
-   look at the output only where no other one can be meant.
+2. Else the number is proposed that was most probably meant: the same but for the sign, else the
+   relatively nearest, where another sign or another power of ten counts as a second mistake. It may
+   be written without a look at the output only where no other one can be meant.
 """
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from decimal import Context, Decimal
 
 from msgspec import Struct
@@ -24,120 +24,10 @@ from coursebuild.core.scripts.numbers import Number, difference, unit, within_ha
 from coursebuild.core.scripts.successors import Succession, succession
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 
-_SLIP = 10
-"""How many times as far away a number counts that needs a second mistake, beside its digits."""
+_SECOND_MISTAKE = 10
+"""How many times as far away a number counts that needs another mistake beside its digits."""
 _QUOTIENT = Context(prec=34)
 _EXACT = Context(prec=40_000)
-
-
-class Likeness(enum.Enum):
-    """In what printed numbers are not those of a binding."""
-
-    SIGN = "sign"
-    POWER = "power"
-    """Of ten."""
-    DIGITS = "digits"
-
-
-class Meant(Struct, frozen=True):
-    """Printed numbers that a binding most probably means."""
-
-    window: Window
-    likeness: Likeness
-
-    @property
-    def label(self) -> str:
-        """In words."""
-        several = len(self.window.numbers) > 1
-        text = self.window.text
-        match self.likeness:
-            case Likeness.SIGN if several:
-                return f"the same numbers are printed with other signs: {text}"
-            case Likeness.SIGN:
-                return f"the same number is printed with the other sign: {text}"
-            case Likeness.POWER:
-                return f"the same digits are printed with another power of ten: {text}"
-            case Likeness.DIGITS:
-                return f"the nearest printed value{'s are' if several else ' is'} {text}"
-
-    def rewritten(self, shown: Shown, text: str) -> str:
-        """The binding's text with these numbers in it; empty where digits would be lost."""
-        better = shown.rewritten(text, self.window) or ""
-        new = Shown.of(better).numbers if better else ()
-        if any(p.value and not n.value for n, p in zip(new, self.window.numbers, strict=False)):
-            return ""
-        if self.likeness is Likeness.POWER and better:
-            pairs = zip(Shown.of(better).numbers, shown.numbers, strict=True)
-            if any(_digits(new) < _digits(old) for new, old in pairs):
-                return ""
-        return better
-
-
-def meant(shown: Shown, windows: Sequence[Window]) -> Meant:
-    """The likeliest of some printed numbers, at least one; the first of those alike."""
-    return of_window(shown, min(windows, key=lambda window: _unlikeness(shown, window)))
-
-
-def of_window(shown: Shown, window: Window) -> Meant:
-    """Some printed numbers as what a binding means."""
-    pairs = list(zip(shown.numbers, window.numbers, strict=True))
-    if all(_same_size(one, other) for one, other in pairs):
-        return Meant(window, Likeness.SIGN)
-    if all(_same_size(one, other) or _same_digits(one, other) for one, other in pairs):
-        return Meant(window, Likeness.POWER)
-    return Meant(window, Likeness.DIGITS)
-
-
-def _unlikeness(shown: Shown, window: Window) -> tuple[bool, Decimal, Decimal]:
-    pairs = list(zip(shown.numbers, window.numbers, strict=True))
-    exact = all(_same_size(one, other) for one, other in pairs)
-    return not exact, sum((_far(*p) for p in pairs), Decimal()), sum(map(_gap, pairs), Decimal())
-
-
-def _far(shown: Number, printed: Number) -> Decimal:
-    """How unlikely a printed number is meant: 0 if it is shown, about 1 if it is another."""
-    if shows(shown, printed):
-        return Decimal(0)
-    if not (shown.finite and printed.finite):
-        return Decimal("Infinity")
-    one, other = shown.value.copy_abs(), printed.value.copy_abs()
-    far = _QUOTIENT.divide(difference(one, other), max(one, other))
-    if _same_digits(shown, printed):
-        by_chance = _QUOTIENT.divide(unit(shown.place), _EXACT.add(one, one))
-        far = min(far, _SLIP * by_chance)
-    turned = shown.value.is_signed() != printed.value.is_signed() and one and other
-    return far * _SLIP if turned else far
-
-
-def _gap(pair: tuple[Number, Number]) -> Decimal:
-    shown, printed = pair
-    finite = shown.finite and printed.finite
-    return difference(shown.value, printed.value) if finite else Decimal(0)
-
-
-def _same_size(shown: Number, printed: Number) -> bool:
-    """Whether they are the same but for the sign."""
-    return shows(_unsigned(shown), _unsigned(printed))
-
-
-def _same_digits(shown: Number, printed: Number) -> bool:
-    """Whether they are the same but for a power of ten, and the sign."""
-    if not (shown.finite and printed.finite and shown.value and printed.value):
-        return False
-    shift = shown.value.adjusted() - printed.value.adjusted()
-    scaled = printed.value.copy_abs().scaleb(shift, _EXACT)
-    return within_half_unit(_unsigned(shown), scaled)
-
-
-def _unsigned(number: Number) -> Number:
-    return replace(number, value=number.value.copy_abs())
-
-
-def _digits(number: Number) -> int:
-    """Significant digits as written."""
-    return number.value.adjusted() - number.place + 1 if number.value else 0
-
-
 _NAMED = 4
 """Numbers of which one may be meant that are named."""
 _YOURS = "write the number that the sentence is about"
@@ -190,6 +80,9 @@ def mismatch(
     )
 
 
+# --- by place
+
+
 def _by_place(
     shown: Shown,
     text: str,
@@ -203,9 +96,9 @@ def _by_place(
     was = found.before[0].text
     now = [window for window in found.now if window is not None]
     if len(now) < len(found.now):
-        near = meant(shown, windows).label
+        near = _label(shown, _likeliest(shown, windows))
         return _Proposal(f"it is not certain what is printed in place of {was} now; {near}", _YOURS)
-    written = {of_window(shown, window).rewritten(shown, text) for window in now}
+    written = {_rewritten(shown, text, window) for window in now}
     different = list(dict.fromkeys(window.text for window in now))
     if len(written) > 1 or ("" in written and len(different) > 1):
         places = f"it was printed in {len(now)} places"
@@ -218,23 +111,110 @@ def _by_place(
     return _Proposal(label, f"write `{better}`" if better else "", better)
 
 
-def _by_likeness(shown: Shown, text: str, windows: Sequence[Window]) -> _Proposal:
-    """What is most probably meant."""
-    likeliest = meant(shown, windows)
-    better = likeliest.rewritten(shown, text)
-    if not better:
-        return _Proposal(likeliest.label)
-    only = shown.stands_beside(likeliest.window) and all(
-        shown.rewritten(text, window) == shown.rewritten(text, likeliest.window)
-        for window in windows
-    )
-    if only:
-        return _Proposal(likeliest.label, f"write `{better}`", better)
-    return _Proposal(likeliest.label, f"write `{better}`, if that is what is meant")
-
-
 def _listed(texts: Sequence[str]) -> str:
     named = [*texts[:_NAMED]]
     if len(texts) > _NAMED:
         named.append(f"{len(texts) - _NAMED} more")
     return f"{'; '.join(named[:-1])} and {named[-1]}"
+
+
+# --- by likeness
+
+
+def _by_likeness(shown: Shown, text: str, windows: Sequence[Window]) -> _Proposal:
+    """What is most probably meant."""
+    likeliest = _likeliest(shown, windows)
+    label = _label(shown, likeliest)
+    better = _rewritten(shown, text, likeliest)
+    if not better:
+        return _Proposal(label)
+    others = {shown.rewritten(text, window) for window in windows}
+    if shown.stands_beside(likeliest) and others == {better}:
+        return _Proposal(label, f"write `{better}`", better)
+    return _Proposal(label, f"write `{better}`, if that is what is meant")
+
+
+def _likeliest(shown: Shown, windows: Sequence[Window]) -> Window:
+    """The likeliest of some printed numbers, at least one; the first of those alike."""
+
+    def unlikeness(window: Window) -> tuple[bool, Decimal, Decimal]:
+        pairs = list(zip(shown.numbers, window.numbers, strict=True))
+        far, gap = sum((_far(*p) for p in pairs), Decimal()), sum(map(_gap, pairs), Decimal())
+        return not _all(shown, window, _same_size), far, gap
+
+    return min(windows, key=unlikeness)
+
+
+def _all(shown: Shown, window: Window, same: Callable[[Number, Number], bool]) -> bool:
+    return all(map(same, shown.numbers, window.numbers))
+
+
+def _label(shown: Shown, window: Window) -> str:
+    """In what printed numbers are not those of a binding, in words."""
+    several = len(window.numbers) > 1
+    if _all(shown, window, _same_size):
+        what = "same numbers are printed with other signs"
+        one = "same number is printed with the other sign"
+    elif _all(shown, window, _same_digits):
+        what = one = "same digits are printed with another power of ten"
+    else:
+        return f"the nearest printed value{'s are' if several else ' is'} {window.text}"
+    return f"the {what if several else one}: {window.text}"
+
+
+def _rewritten(shown: Shown, text: str, window: Window) -> str:
+    """The binding's text with printed numbers in it; empty where digits would be lost."""
+    better = shown.rewritten(text, window) or ""
+    new = Shown.of(better).numbers if better else ()
+    if any(p.value and not n.value for n, p in zip(new, window.numbers, strict=False)):
+        return ""
+    scaled = _all(shown, window, _same_digits) and not _all(shown, window, _same_size)
+    if scaled and any(_digits(n) < _digits(o) for n, o in zip(new, shown.numbers, strict=False)):
+        return ""
+    return better
+
+
+def _far(shown: Number, printed: Number) -> Decimal:
+    """How unlikely a printed number is meant: 0 if it is shown, about 1 if it is another."""
+    if shows(shown, printed):
+        return Decimal(0)
+    if not (shown.finite and printed.finite):
+        return Decimal("Infinity")
+    one, other = shown.value.copy_abs(), printed.value.copy_abs()
+    far = _QUOTIENT.divide(difference(one, other), max(one, other))
+    if _same_digits(shown, printed):
+        by_chance = _QUOTIENT.divide(unit(shown.place), _EXACT.add(one, one))
+        far = min(far, _SECOND_MISTAKE * by_chance)
+    turned = shown.value.is_signed() != printed.value.is_signed() and one and other
+    return far * _SECOND_MISTAKE if turned else far
+
+
+def _gap(pair: tuple[Number, Number]) -> Decimal:
+    shown, printed = pair
+    finite = shown.finite and printed.finite
+    return difference(shown.value, printed.value) if finite else Decimal(0)
+
+
+def _same_size(shown: Number, printed: Number) -> bool:
+    """Whether they are the same but for the sign."""
+    return shows(_unsigned(shown), _unsigned(printed))
+
+
+def _same_digits(shown: Number, printed: Number) -> bool:
+    """Whether they are the same but for the sign and a power of ten."""
+    if _same_size(shown, printed):
+        return True
+    if not (shown.finite and printed.finite and shown.value and printed.value):
+        return False
+    shift = shown.value.adjusted() - printed.value.adjusted()
+    scaled = printed.value.copy_abs().scaleb(shift, _EXACT)
+    return within_half_unit(_unsigned(shown), scaled)
+
+
+def _unsigned(number: Number) -> Number:
+    return replace(number, value=number.value.copy_abs())
+
+
+def _digits(number: Number) -> int:
+    """Significant digits as written."""
+    return number.value.adjusted() - number.place + 1 if number.value else 0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Divergence, Outcome, ScriptRun, Sign, Trace
-from coursebuild.core.scripts.divergence import divergence, is_lost
 from coursebuild.core.scripts.extract import Extraction, extract
+from coursebuild.core.scripts.failures import divergence, is_lost
 from support.sample_lessons import course, document, ran
 
 LESSON = "```python file=examples/a.py\nprint(1)\n```\n"

@@ -5,7 +5,7 @@ import pytest
 from coursebuild.core.model import Comparison
 from coursebuild.core.scripts.bindings import Printed, leaning_on
 from coursebuild.core.scripts.compare import compare, verify
-from coursebuild.core.scripts.drift import classes, drift_diagnostic
+from coursebuild.core.scripts.findings import classes, drift_diagnostic
 from coursebuild.core.text.diagnostics import Diagnostic
 from support.sample_lessons import DIGITS, EXACT, course, document, ran, recording, table, told
 
