@@ -84,14 +84,6 @@ def test_integration(rng: np.random.Generator) -> None:
             close(spatial.quat_integrate(q, v, dt), quat)
 
 
-def test_many_small_steps_integrate_as_mujoco_does(rng: np.random.Generator) -> None:
-    quat, ours = np.array([1.0, 0, 0, 0]), np.array([1.0, 0, 0, 0])
-    for v in rng.normal(size=(1000, 3)):
-        mujoco.mju_quatIntegrate(quat, v, 0.01)
-        ours = spatial.quat_integrate(ours, v, 0.01)
-    assert spatial.angular_distance(ours, quat) < 1e-14
-
-
 def test_euler_sequences(rng: np.random.Generator) -> None:
     quat = np.zeros(4)
     for letters in itertools.product("xyz", repeat=3):
@@ -146,17 +138,6 @@ def test_velocities_of_two_frames_of_one_body(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(
         spatial.motion_transform(*a_in_b) @ velocities[0], velocities[1], rtol=0, atol=1e-13
     )
-
-
-def test_principal_axes(rng: np.random.Generator) -> None:
-    values, vectors, quat = np.zeros(3), np.zeros(9), np.zeros(4)
-    for base in rng.normal(size=(COUNT, 3, 3)):
-        tensor = base @ base.T
-        mujoco.mju_eig3(values, vectors, quat, tensor.ravel())
-        moments, axes = spatial.principal_axes(tensor)
-        np.testing.assert_allclose(moments, values[::-1], rtol=0, atol=1e-10)
-        theirs = vectors.reshape(3, 3)[:, ::-1]
-        np.testing.assert_allclose(np.abs((axes * theirs).sum(axis=0)), 1, atol=1e-9)
 
 
 GEOMS = {
@@ -225,26 +206,6 @@ def test_inertia_of_a_composed_body(rng: np.random.Generator) -> None:
         assert spatial.is_physical_inertia(inertia)
 
 
-def test_an_l_shape_of_two_boxes() -> None:
-    masses, centres = [2.0, 1.0], np.array([[0.1, 0, 0], [0.02, 0.08, 0]])
-    halves = np.array([[0.1, 0.02, 0.02], [0.02, 0.06, 0.02]])
-    mass, com, inertia = spatial.compose_inertia(
-        masses, centres, spatial.box_inertia(masses, halves)
-    )
-    assert mass == 3
-    assert np.round(com, 6).tolist() == [0.073333, 0.026667, 0]
-    moments, _ = spatial.principal_axes(inertia)
-    assert np.round(moments, 8).tolist() == [0.00376854, 0.01383146, 0.0168]
-    one = np.array([1.0, 0, 0, 0])
-    model = compiled(
-        *(
-            geom("box", m, half, centre, one)
-            for m, half, centre in zip(masses, halves, centres, strict=True)
-        )
-    )
-    np.testing.assert_allclose(np.sort(model.body_inertia[1]), moments, rtol=1e-13)
-
-
 def test_spatial_inertia_is_the_mass_matrix_of_a_free_body(rng: np.random.Generator) -> None:
     model = compiled(
         geom("box", 2.0, np.array([0.3, 0.2, 0.1]), rng.normal(size=3), unit_quats(rng, 1)[0]),
@@ -263,39 +224,3 @@ def test_spatial_inertia_is_the_mass_matrix_of_a_free_body(rng: np.random.Genera
     # A free joint has its linear velocity first, in the world's axes: here the body's.
     order = [3, 4, 5, 0, 1, 2]
     np.testing.assert_allclose(ours[np.ix_(order, order)], columns, rtol=0, atol=2e-14)
-
-
-def test_a_composite_of_two_links_is_what_mujoco_adds_up() -> None:
-    xml = """<mujoco><worldbody><body pos="0.1 0.2 0.3"><freejoint/>
-      <geom type="box" size="0.1 0.2 0.3" mass="2"/>
-      <body pos="0.5 -0.3 0.2" quat="0.8 0.2 -0.4 0.4"><joint axis="0 0 1"/>
-        <geom type="capsule" size="0.1 0.2" pos="0.1 0 0.3" euler="20 30 40" mass="1.5"/>
-      </body></body></worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(xml)
-    data = mujoco.MjData(model)
-    data.qpos[7] = 0.7
-    mujoco.mj_forward(model, data)
-    world = sum(
-        spatial.transform_spatial_inertia(
-            spatial.spatial_inertia(
-                model.body_mass[k], np.zeros(3), np.diag(model.body_inertia[k])
-            ),
-            data.ximat[k].reshape(3, 3),
-            data.xipos[k],
-        )
-        for k in (1, 2)
-    )
-    mass, com, inertia = spatial.split_spatial_inertia(world)
-    np.testing.assert_allclose(mass, model.body_subtreemass[1], rtol=1e-15)
-    np.testing.assert_allclose(com, data.subtree_com[1], rtol=0, atol=1e-15)
-    # data.crb: the tensor about the tree's centre of mass (xx, yy, zz, xy, xz, yz), m c, m.
-    composite = data.crb[1]
-    theirs = [
-        inertia[0, 0],
-        inertia[1, 1],
-        inertia[2, 2],
-        inertia[0, 1],
-        inertia[0, 2],
-        inertia[1, 2],
-    ]
-    np.testing.assert_allclose(theirs, composite[:6], rtol=0, atol=1e-14)

@@ -2,7 +2,6 @@ import concurrent.futures
 import multiprocessing
 import os
 import pickle
-import runpy
 import subprocess
 import sys
 import threading
@@ -80,13 +79,6 @@ def test_from_anywhere_in_the_course(course: Path, folder: str) -> None:
     assert ask(course / folder / "x.py") == course / "models" / "box.xml"
 
 
-def test_the_nearest_course_counts(course: Path) -> None:
-    inner = course / "tests" / "courses" / "small"
-    write(inner / "content" / "course.toml")
-    write(inner / "models" / "box.xml")
-    assert ask(inner / "examples" / "x.py") == inner / "models" / "box.xml"
-
-
 def test_a_downloaded_course_has_no_content(tmp_path: Path) -> None:
     root = tmp_path / "unpacked"
     write(root / "models" / "box.xml")
@@ -141,14 +133,6 @@ def test_a_missing_model_lists_near_names(course: Path, name: str, tail: str) ->
     assert str(caught.value) == f"no model {name!r} in {course / 'models'}{tail}"
 
 
-def test_of_many_near_names_three_are_proposed(course: Path) -> None:
-    for k in range(5):
-        write(course / "models" / f"scene_{k}.xml")
-    with pytest.raises(ModelNotFoundError) as caught:
-        ask(course / "examples" / "x.py", "scene_x")
-    assert str(caught.value).endswith("; did you mean 'scene_0', 'scene_1' or 'scene_2'?")
-
-
 def test_a_missing_model_lists_no_more_than_eight_names(course: Path) -> None:
     for k in range(10):
         write(course / "models" / f"scene_{k}.xml")
@@ -169,12 +153,6 @@ def test_a_course_without_models(course: Path) -> None:
     with pytest.raises(ModelNotFoundError) as caught:
         ask(course / "x.py")
     assert str(caught.value) == f"no model 'box': there is no folder {course / 'models'}"
-
-
-def test_a_folder_is_no_model(course: Path) -> None:
-    (course / "models" / "dir.xml").mkdir()
-    with pytest.raises(ModelNotFoundError, match="no model 'dir'"):
-        ask(course / "x.py", "dir")
 
 
 @pytest.mark.parametrize(
@@ -201,33 +179,17 @@ def test_names_that_are_none(course: Path, name: str, why: str) -> None:
     assert str(caught.value) == f"model name {name!r} {why}"
 
 
-def test_a_name_is_a_string(course: Path) -> None:
-    with pytest.raises(TypeError) as caught:
-        ask(course / "x.py", Path("box"))
-    assert str(caught.value).startswith("the name of a model must be a string, got ")
-
-
-def test_an_overlong_name_is_missing(course: Path) -> None:
-    with pytest.raises(ModelNotFoundError, match=r"^no model 'zzz"):
-        ask(course / "x.py", "z" * 5000)
-
-
-def test_a_link_inside_models_is_fine(course: Path) -> None:
-    (course / "models" / "same.xml").symlink_to("box.xml")
-    assert ask(course / "x.py", "same") == course / "models" / "same.xml"
-
-
-@pytest.mark.parametrize("kind", ["file", "folder"])
-def test_a_link_out_of_models_is_not(course: Path, tmp_path: Path, kind: str) -> None:
+def test_links_may_not_lead_out_of_models(course: Path, tmp_path: Path) -> None:
+    models = course / "models"
     secret = write(tmp_path / "outside" / "secret.xml")
-    if kind == "file":
-        (course / "models" / "link.xml").symlink_to(secret)
-    else:
-        (course / "models" / "link").symlink_to(secret.parent, target_is_directory=True)
-    name = "link" if kind == "file" else "link/secret"
-    with pytest.raises(ValueError) as caught:
-        ask(course / "x.py", name)
-    assert str(caught.value) == f"model {name!r} is a link that leads out of {course / 'models'}"
+    (models / "same.xml").symlink_to("box.xml")
+    (models / "file.xml").symlink_to(secret)
+    (models / "folder").symlink_to(secret.parent, target_is_directory=True)
+    assert ask(course / "x.py", "same") == models / "same.xml"
+    for name in ("file", "folder/secret"):
+        with pytest.raises(ValueError) as caught:
+            ask(course / "x.py", name)
+        assert str(caught.value) == f"model {name!r} is a link that leads out of {models}"
 
 
 def test_broken_and_circular_links_are_missing(course: Path) -> None:
@@ -236,12 +198,6 @@ def test_broken_and_circular_links_are_missing(course: Path) -> None:
     for name in ("gone", "loop"):
         with pytest.raises(ModelNotFoundError):
             ask(course / "x.py", name)
-
-
-def test_models_may_be_a_link_itself(course: Path, tmp_path: Path) -> None:
-    (course / "models").rename(tmp_path / "shared")
-    (course / "models").symlink_to(tmp_path / "shared", target_is_directory=True)
-    assert ask(course / "x.py", "arms/ur5") == course / "models" / "arms" / "ur5.xml"
 
 
 def test_a_linked_script_belongs_where_it_lies_or_where_it_leads(
@@ -265,18 +221,6 @@ def test_the_error_survives_pickling(course: Path) -> None:
     assert str(again) == str(caught.value)
 
 
-def test_installed_code_belongs_to_no_course(course: Path, tmp_path: Path) -> None:
-    helper = course / ".venv" / "lib" / "python3.11" / "site-packages" / "helper" / "__init__.py"
-    other = tmp_path / "other"
-    write(other / "content" / "course.toml")
-    write(other / "models" / "box.xml")
-    library: dict[str, object] = {"__name__": "helper", "__file__": str(helper)}
-    exec("from mjcourse import model_path\ndef load(): return model_path('box')", library)
-    script = {"__name__": "__main__", "__file__": str(other / "x.py"), "load": library["load"]}
-    exec("found = load()", script)
-    assert script["found"] == other / "models" / "box.xml"
-
-
 def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path: Path) -> None:
     helper: dict[str, object] = {"__name__": "helper", "__file__": str(tmp_path / "lib" / "h.py")}
     exec("from mjcourse import model_path\ndef load(): return model_path('box')", helper)
@@ -287,20 +231,6 @@ def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path:
     }
     exec("found = load()", script)
     assert script["found"] == course / "models" / "box.xml"
-
-
-def test_runpy_with_a_relative_path(
-    course: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    write(course / "examples" / "x.py", ASK)
-    monkeypatch.chdir(course)
-    runpy.run_path("examples/x.py", run_name="__main__")
-    runpy.run_path("examples/x.py")
-    runpy.run_path(str(course / "content" / ".." / "examples" / "x.py"), run_name="__main__")
-    assert capsys.readouterr().out.split() == [str(course / "models" / "box.xml")] * 3
 
 
 def test_threads_and_pools_of_the_script(course: Path) -> None:
@@ -353,14 +283,10 @@ def load_named(name):
 
 
 @pytest.mark.site
-@pytest.mark.parametrize("relative", [True, False])
-def test_a_real_script_from_any_folder(course: Path, tmp_path: Path, relative: bool) -> None:
-    script = write(course / "examples" / "x.py", SCRIPT)
+def test_a_real_script_from_any_folder(course: Path) -> None:
+    write(course / "examples" / "x.py", SCRIPT)
     write(course / "examples" / "sibling.py", SIBLING)
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    cwd = course if relative else elsewhere
-    out = run("examples/x.py" if relative else script, cwd=cwd)
+    out = run("examples/x.py", cwd=course)
     asked = 6 + 2 * len(multiprocessing.get_all_start_methods())
     assert out.split() == [str(course / "models" / "box.xml")] * asked
 
@@ -368,24 +294,11 @@ def test_a_real_script_from_any_folder(course: Path, tmp_path: Path, relative: b
 @pytest.mark.site
 def test_modules_code_and_prompts(course: Path, tmp_path: Path) -> None:
     want = str(course / "models" / "box.xml")
-    write(course / "examples" / "x.py", ASK)
+    script = write(course / "examples" / "x.py", ASK)
     assert run("-m", "examples.x", cwd=course) == want
-    assert run("-c", ASK, cwd=course / "examples") == want
     assert run("-", cwd=course, code=ASK) == want
-    prompt = run("-i", "-c", "", cwd=course, code=ASK)
-    assert want in prompt
-    after = run(
-        "-i", str(course / "examples" / "x.py"), cwd=tmp_path, code="print(model_path('v1.2'))\n"
-    )
+    after = run("-i", str(script), cwd=tmp_path, code="print(model_path('v1.2'))\n")
     assert str(course / "models" / "v1.2.xml") in after
-
-
-def test_a_stray_script_run_by_a_course_s_is_in_no_course(
-    course: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sys, "argv", [str(write(course / "examples" / "x.py"))])
-    with pytest.raises(ModelNotFoundError, match="no course for model 'box'"):
-        ask(tmp_path / "stray.py")
 
 
 @pytest.mark.site
@@ -398,13 +311,6 @@ def test_a_shell_inside_a_course_s_environment_works_on_the_current_folder(
     write(other / "examples" / "y.py")
     code = f"import sys; sys.ps1 = '> '; sys.argv = [{str(shell)!r}]\n{ASK}"
     assert run("-c", code, cwd=other / "examples") == str(other / "models" / "box.xml")
-
-
-@pytest.mark.site
-def test_a_script_of_a_relative_path_may_change_folder(course: Path) -> None:
-    write(course / "examples" / "x.py", "import os\nos.chdir('/')\n" + ASK)
-    code = "import mjcourse, runpy; runpy.run_path('examples/x.py', run_name='__main__')"
-    assert run("-c", code, cwd=course) == str(course / "models" / "box.xml")
 
 
 @pytest.mark.site

@@ -15,15 +15,6 @@ def rotvec_of(axis: tuple[float, ...], angle: float) -> np.ndarray:
     return np.array(axis) / max(map(abs, axis)) * angle
 
 
-def test_exp_to_three_ulp_of_one() -> None:
-    errors = {}
-    for axis, angle in itertools.product(hp.AXES, ALL_ANGLES):
-        rotvec = rotvec_of(axis, angle)
-        want = hp.exp(hp.exact(rotvec))
-        errors[axis, angle] = hp.ulps_of(ONE, spatial.rotvec_to_quat(rotvec), want)
-    assert hp.beyond(3, errors) == []
-
-
 def test_exp_to_four_ulp_of_each_component() -> None:
     errors = {}
     angles = (*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, hp.PI)
@@ -43,18 +34,6 @@ def test_exp_of_an_absurd_angle_about_one_axis_is_still_right() -> None:
             want = hp.exp(hp.exact([0, angle, 0]))
         errors[angle] = hp.ulps_of(ONE, spatial.rotvec_to_quat([0, angle, 0]), want)
     assert hp.beyond(3, errors) == []
-
-
-def test_exp_of_an_absurd_angle_is_a_rotation() -> None:
-    for rotvec in ([1e300, 1e300, -3e299], [1.7e308] * 3, [1e20, 1e-300, 5e-324]):
-        assert abs(np.linalg.norm(spatial.rotvec_to_quat(rotvec)) - 1) < 1e-15
-
-
-def test_exp_of_nothing_and_of_turns() -> None:
-    assert spatial.rotvec_to_quat([0, 0, 0]).tolist() == [1, 0, 0, 0]
-    assert spatial.rotvec_to_quat([4, 0, 0])[0] < 0
-    assert spatial.rotvec_to_quat([7, 0, 0])[0] < 0
-    assert spatial.rotvec_to_quat([10, 0, 0])[0] > 0
 
 
 @pytest.mark.site
@@ -119,15 +98,6 @@ def test_difference_of_rotations_keeps_its_digits() -> None:
     assert hp.beyond(4, errors) == []
 
 
-def test_distance_of_one_bit() -> None:
-    quat = np.array([0.5, 0.5, 0.5, 0.5])
-    other = quat.copy()
-    other[2] = np.nextafter(0.5, 1)
-    want = hp.length(hp.log(hp.mul(hp.conj(hp.exact(quat)), hp.exact(other))))
-    assert hp.own_ulps(spatial.angular_distance(quat, other), [want]) <= 4
-    assert 1e-16 < want < 2e-16
-
-
 def test_distance_of_equal_and_opposite_rotations() -> None:
     rng = np.random.default_rng(1)
     quats = rng.normal(size=(50, 4))
@@ -175,21 +145,3 @@ def test_integrate_to_four_ulp() -> None:
             got = spatial.quat_integrate(quat, angvel, dt)
             errors[angle, dt, k] = hp.ulps_of(ONE, got, want)
     assert hp.beyond(4, errors) == []
-
-
-def test_integrate_does_not_drift_in_length() -> None:
-    quat = np.array([1.0, 0.0, 0.0, 0.0])
-    for _ in range(5000):
-        quat = spatial.quat_integrate(quat, [1.0, 2.0, -3.0], 0.01)
-    assert abs(np.linalg.norm(quat) - 1) < 4e-16
-    want = spatial.rotvec_to_quat([50.0, 100.0, -150.0])
-    assert spatial.angular_distance(quat, want) < 1e-13
-
-
-def test_nan_in_a_rotation_vector_stays_in_its_entry() -> None:
-    got = spatial.rotvec_to_quat([[0, np.nan, 0], [0, 0, 0], [np.inf, 0, 0], [7, 0, 0]])
-    assert np.isnan(got[[0, 2]]).all()
-    assert np.isfinite(got[[1, 3]]).all()
-    slid = spatial.quat_slerp([1, 0, 0, 0], [0, 1, 0, 0], [np.nan, 0.5])
-    assert np.isnan(slid[0]).all()
-    assert np.isfinite(slid[1]).all()

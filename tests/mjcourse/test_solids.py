@@ -1,7 +1,6 @@
 import itertools
 
 import mpmath
-import numpy as np
 import pytest
 
 from mjcourse import spatial
@@ -62,21 +61,6 @@ def exact_capsule(m: mpmath.mpf, r: mpmath.mpf, h: mpmath.mpf) -> hp.Vector:
     across = middle * (r**2 / 4 + h**2 / 3) + height + spread
     along = middle * r**2 / 2 + 2 * spread
     return diagonal(*(m * moment / (middle + ends) for moment in (across, across, along)))
-
-
-def test_masses_and_sizes_broadcast() -> None:
-    got = spatial.box_inertia([[1.0], [2.0]], [[0.1, 0.2, 0.3], [1, 1, 1], [0, 0, 1]])
-    assert got.shape == (2, 3, 3, 3)
-    assert (got[1, 2] == spatial.box_inertia(2.0, [0, 0, 1])).all()
-    assert spatial.capsule_inertia(1.0, [0.1, 0.2], [[0.3], [0.4], [0.5]]).shape == (3, 2, 3, 3)
-    assert spatial.sphere_inertia([1, 2], 0.1).shape == (2, 3, 3)
-
-
-def test_nan_stays_in_its_entry() -> None:
-    got = spatial.capsule_inertia(1.0, [np.nan, 0.1, 0.1], [0.1, np.nan, 0.1])
-    assert np.isnan(got[0].diagonal()).all()
-    assert np.isnan(got[1].diagonal()).all()
-    assert (got[2].diagonal() > 0).all()
 
 
 def test_negative_sizes_are_errors() -> None:
