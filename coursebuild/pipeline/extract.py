@@ -13,8 +13,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course
-from coursebuild.core.scripts.edit import apply_edits
-from coursebuild.core.scripts.extract import adopted, block_text
+from coursebuild.core.scripts.edit import adopted, apply_edits, block_text
 from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity
 from coursebuild.core.text.source import Source

@@ -1,6 +1,7 @@
 """A new output, put into the lesson by span.
 
-Entry points: `updated_body` (what to write into one recorded output), `apply_edits`.
+Entry points: `updated_body` (what to write into one recorded output), `adopted` (an extracted file
+that was edited), `apply_edits`.
 
 1. A recording that matches is left alone; it must match both of two runs. A volatile one takes the
    text of the first run.
@@ -18,7 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from coursebuild.core.model import Comparison, Filter, Mode, Recording, Table
+from coursebuild.core.model import Comparison, Filter, Mode, Recording, Script, Table
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
@@ -208,47 +209,79 @@ def _beside_elided(steps: Sequence[Step], index: int) -> bool:
 
 
 def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic:
-    """Replace the lines between the fences."""
-    source = recording.body_span.source
-    start = _line_start(recording.body_span, recording.body_span.start)
-    end = _line_start(recording.body_span, recording.body_span.end)
-    found = _FENCE.search(source.text, _line_start(recording.body_span, start - 1), start)
-    fence = found.group() if found else "```"
-    fence_span = Span(source, *found.span()) if found else recording.caption_span
-    trouble = _unholdable(lines, fence, fence_span)
-    if trouble is not None:
-        return trouble
-    before = source.text[:start]
-    line_end = "\r\n" if before.endswith("\r\n") else "\r" if before.endswith("\r") else "\n"
-    blank = recording.prefix.rstrip()
-    text = "".join((recording.prefix + line if line else blank) + line_end for line in lines)
-    return Edit(Span(source, start, end), text)
-
-
-def _line_start(span: Span, offset: int) -> int:
-    """The offset at which the line of an offset begins."""
-    source = span.source
-    line, _ = source.position(max(offset, 0))
-    return source.line_starts[line - 1]
-
-
-def _unholdable(lines: Sequence[str], fence: str, fence_span: Span) -> Diagnostic | None:
-    """Why a fence cannot hold these lines."""
+    """Replace the lines between the fences; refused where a fence cannot hold them."""
+    fence = _opening_fence(recording.body_span)
     for number, line in enumerate(lines, start=1):
         if "\x00" in line:
             return refused(
-                fence_span,
+                fence,
                 f"line {number} of the output has a NUL character, which Markdown cannot hold",
                 "print text only",
             )
-    mark = re.escape(fence[0])
-    closing = re.compile(rf" {{0,3}}({mark}{{{len(fence)},}})[ \t]*")
-    runs = [len(found[1]) for line in lines if (found := closing.fullmatch(line))]
-    if not runs:
+    longest = _longest_closing(lines, fence.text)
+    if longest:
+        marks = "backticks" if fence.text[0] == "`" else "tildes"
+        return refused(
+            fence,
+            "the output has a line that would close this fence",
+            f"open and close it with {longest + 1} {marks}, then update again",
+        )
+    return _whole_lines(recording.body_span, recording.prefix, lines)
+
+
+def adopted(script: Script, data: bytes) -> Edit | Diagnostic:
+    """What to write into the block so that it extracts to `data`; a diagnostic where it cannot be.
+
+    The lesson's line ends and what stands before each line of the block are kept.
+    """
+
+    def impossible(why: str) -> Diagnostic:
+        message = f"{script.path} cannot be brought into the lesson: {why}"
+        return diagnose("example-edited", script.path_span, message, help="bring it over by hand")
+
+    text = block_text(data)
+    if text is None:
+        return impossible("it is not UTF-8")
+    if text == "\n":
+        return impossible("it is empty")
+    lines = text.removesuffix("\n").split("\n")
+    if _longest_closing(lines, _opening_fence(script.body_span).text):
+        return impossible("one of its lines would close the fence")
+    if "\0" in text:
+        return impossible("it holds a NUL")
+    return _whole_lines(script.body_span, script.prefix, lines)
+
+
+def block_text(data: bytes) -> str | None:
+    """A file as a block can hold it; `None` where it is not UTF-8.
+
+    Without a byte order mark, with LF line ends, and one at the end.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
         return None
-    marks = "backticks" if fence[0] == "`" else "tildes"
-    return refused(
-        fence_span,
-        "the output has a line that would close this fence",
-        f"open and close it with {max(runs) + 1} {marks}, then update again",
-    )
+    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n") + "\n"
+
+
+def _opening_fence(body: Span) -> Span:
+    """The marks that open the fence whose lines these are."""
+    line = body.source.position(body.start - 1)[0]
+    found = _FENCE.search(body.source.text, body.source.line_starts[line - 1], body.start)
+    assert found is not None
+    return Span(body.source, *found.span())
+
+
+def _longest_closing(lines: Sequence[str], fence: str) -> int:
+    """The number of marks of the longest line that would close a fence; 0 where none would."""
+    closing = re.compile(rf" {{0,3}}({re.escape(fence[0])}{{{len(fence)},}})[ \t]*")
+    found = (closing.fullmatch(line) for line in lines)
+    return max((len(one[1]) for one in found if one), default=0)
+
+
+def _whole_lines(body: Span, prefix: str, lines: Sequence[str]) -> Edit:
+    """New lines in a fence, with the line ends of the lesson and what stands before each line."""
+    before = body.source.text[: body.start]
+    line_end = "\r\n" if before.endswith("\r\n") else "\r" if before.endswith("\r") else "\n"
+    written = (prefix + line if line else prefix.rstrip() for line in lines)
+    return Edit(body, "".join(line + line_end for line in written))

@@ -26,7 +26,7 @@ from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import Comparison, Course, Filter, Mode, Recording
+from coursebuild.core.model import Comparison, Course, Mode, Recording
 from coursebuild.core.model.results import Change, Outcome, ScriptRun
 from coursebuild.core.model.sensitivity import (
     PERTURBATION,
@@ -63,40 +63,35 @@ def sensitivity(
     `base` is its run with states that were not moved; `moved` are none where there was no point in
     them.
     """
-    compared = [r for r in recordings if _mode(r, course) is not Mode.VOLATILE]
+    compared = _compared(course, recordings)
     standing = _standing(course, compared, base, moved)
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
-    doubts: list[Doubt] = []
-    flips: list[Flip] = []
-    for recording in compared:
-        comparison = recording.comparison or course.comparison
-        for one in _doubtful(recording, comparison, course.filters, base, moved):
-            if isinstance(one, Doubt):
-                doubts.append(one)
-            else:
-                flips.append(one)
-    numbers = sum(len(line.numbers) for r in compared for line in printed_lines(r))
-    return Sensitivity(
-        path, owner, standing, numbers, amplification(moved), tuple(doubts), tuple(flips)
-    )
+    found = [one for each in compared for one in _doubtful(course, *each, base, moved)]
+    numbers = sum(len(line.numbers) for r, _ in compared for line in printed_lines(r))
+    doubts = tuple(one for one in found if isinstance(one, Doubt))
+    flips = tuple(one for one in found if isinstance(one, Flip))
+    return Sensitivity(path, owner, standing, numbers, amplification(moved), doubts, flips)
 
 
 def worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
     """Whether runs of a script with moved states can say anything."""
-    compared = [r for r in recordings if _mode(r, course) is not Mode.VOLATILE]
-    return _standing(course, compared, base, None) is Standing.MEASURED
+    return _standing(course, _compared(course, recordings), base) is Standing.MEASURED
 
 
-def _mode(recording: Recording, course: Course) -> Mode:
-    return (recording.comparison or course.comparison).mode
+def _compared(
+    course: Course, recordings: Iterable[Recording]
+) -> list[tuple[Recording, Comparison]]:
+    """The recorded outputs that are compared, and how."""
+    both = ((recording, recording.comparison or course.comparison) for recording in recordings)
+    return [(r, comparison) for r, comparison in both if comparison.mode is not Mode.VOLATILE]
 
 
 def _standing(
     course: Course,
-    compared: Sequence[Recording],
+    compared: Sequence[tuple[Recording, Comparison]],
     base: ScriptRun,
-    moved: Sequence[ScriptRun] | None,
+    moved: Sequence[ScriptRun] | None = None,
 ) -> Standing:
     if base.trace is not None and "mujoco" not in base.trace.modules:
         return Standing.NO_MUJOCO
@@ -104,10 +99,8 @@ def _standing(
         return Standing.DRIFTED
     if not compared:
         return Standing.UNRECORDED
-    for recording in compared:
-        comparison = recording.comparison or course.comparison
-        if compare(recording, comparison, course.filters, base.stdout).status == "drift":
-            return Standing.DRIFTED
+    if any(compare(*each, course.filters, base.stdout).status == "drift" for each in compared):
+        return Standing.DRIFTED
     if moved is None:
         return Standing.MEASURED
     if any(run.outcome is not Outcome.OK for run in moved):
@@ -121,9 +114,9 @@ def _standing(
 
 
 def _doubtful(
+    course: Course,
     recording: Recording,
     comparison: Comparison,
-    filters: tuple[Filter, ...],
     base: ScriptRun,
     moved: Sequence[ScriptRun],
 ) -> Iterator[Doubt | Flip]:
@@ -131,7 +124,7 @@ def _doubtful(
     exact = Comparison(Mode.EXACT, ellipsis=comparison.ellipsis)
 
     def changes(stdout: str) -> dict[tuple[int, int], Change]:
-        found = compare(recording, exact, filters, stdout).changes
+        found = compare(recording, exact, course.filters, stdout).changes
         return {(change.span.start, change.span.end): change for change in found}
 
     unmoved = changes(base.stdout)
@@ -150,33 +143,23 @@ def _doubtful(
 def _judged(
     span: Span, recorded: str, printed: str, values: Sequence[str], comparison: Comparison
 ) -> Doubt | Flip:
-    number = _number(printed)
-    held_against = _number(recorded)
-    moved = [_number(value) for value in values]
-    numbers = [each for each in moved if each is not None]
-    if number is None or held_against is None or len(numbers) < len(moved):
-        other = next(value for value in values if value != printed)
+    number, held_against = _number(printed), _number(recorded)
+    numbers = [each for value in values if (each := _number(value)) is not None]
+    other = next(value for value in values if value != printed)
+    if number is None or held_against is None or len(numbers) < len(values):
         return Flip(span, printed, other, compared=True)
     compared = any(not same_number(held_against, each, comparison) for each in numbers)
-    all_finite = number.finite and all(each.finite for each in numbers)
-    spread = (
-        max(difference(number.value, each.value) for each in numbers)
-        if all_finite
-        else Decimal("inf")
-    )
-    if spread == 0:  # the same value in another form, such as -0.0
-        other = next(value for value in values if value != printed)
-        return Flip(span, printed, other, compared)
+    finite = sorted((each for each in (number, *numbers) if each.finite), key=lambda n: n.value)
     digits = _digits(number)
+    if len(finite) <= len(numbers):
+        return Doubt(span, number.text, digits, 0, number.text, "no number", "", compared=compared)
+    spread = max(difference(number.value, each.value) for each in numbers)
+    if spread == 0:  # the same value in another form, such as -0.0
+        return Flip(span, printed, other, compared)
     trusted = min(digits, _trusted(number, spread))
-    ordered = sorted((each for each in (number, *numbers) if each.finite), key=_value)
-    ends = (ordered[0].text, ordered[-1].text) if all_finite else (number.text, "no number")
     instead = "" if number.integer else rounded(number, trusted)  # a count is not rounded
+    ends = finite[0].text, finite[-1].text
     return Doubt(span, number.text, digits, trusted, *ends, instead, compared=compared)
-
-
-def _value(number: Number) -> Decimal:
-    return number.value
 
 
 def _number(text: str) -> Number | None:
@@ -196,7 +179,7 @@ def _digits(number: Number) -> int:
 
 def _trusted(number: Number, spread: Decimal) -> int:
     """How many digits hold: the spread is at most half a unit of the last of them."""
-    if not number.finite or not spread.is_finite() or number.value == 0:
+    if number.value == 0:
         return 0
     place = (spread * 2).adjusted()
     if unit(place) < spread * 2:
@@ -265,13 +248,9 @@ def _growth(
 
 def noise(found: Sensitivity) -> Iterator[Diagnostic]:
     """A warning where the verification compares what moved states change."""
-    doubts = [doubt for doubt in found.doubts if doubt.compared and _is_noise(doubt)]
-    flips = [flip for flip in found.flips if flip.compared]
-    told = sorted(
-        [(doubt.span, _doubt(doubt)) for doubt in doubts]
-        + [(flip.span, _flip(flip)) for flip in flips],
-        key=lambda each: (each[0].path, each[0].start),
-    )
+    told = [(d.span, _doubt(d)) for d in found.doubts if d.compared and _is_noise(d)]
+    told += [(flip.span, _flip(flip)) for flip in found.flips if flip.compared]
+    told.sort(key=lambda each: (each[0].path, each[0].start))
     if not told:
         return
     (span, label), *others = told

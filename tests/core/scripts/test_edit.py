@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 
 import pytest
-from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.scripts.edit import apply_edits, updated_body
@@ -228,13 +227,3 @@ def test_edits_that_overlap_are_a_bug(changes: list[tuple[int, int, str]]) -> No
 def test_edits_of_another_text_are_a_bug() -> None:
     with pytest.raises(ValueError, match=re.escape("an edit of another text than a.md is now")):
         apply_edits("abcdef", edits_of("abc", (0, 1, "x")))
-
-
-def test_a_body_span_inside_a_line_is_widened() -> None:
-    """Whether a parser's span begins before or after the prefix, whole lines are replaced."""
-    lesson = recording("a\nb", prefix="> ")
-    inner = replace(
-        lesson.body_span, start=lesson.body_span.start + 2, end=lesson.body_span.end + 2
-    )
-    edit = updated_body(replace(lesson, body_span=inner), EXACT, (), "c", "c")
-    assert isinstance(edit, Edit) and (edit.span, edit.text) == (lesson.body_span, "> c\n")
