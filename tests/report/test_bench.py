@@ -14,16 +14,15 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports.bench import RowVerdict, SceneCard, SceneReport, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import RowVerdict, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.departures import Checked, Departure
-from coursebuild.numerics.reports.points import seconds_text, setting_text
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report import Style
 from coursebuild.report.bench import bench_text
 from coursebuild.report.bench_json import bench_values
 from coursebuild.report.measuring import checked_text, failure_text, measured_json, measured_text
 from coursebuild.report.terminal import Column, cells, table
-from support.bench_reports import awkward, lost, row, scenario, scene, setting, swing
+from support.bench_reports import awkward, row, scenario, scene, swing
 
 EXPECTED = Path(__file__).parent
 
@@ -88,12 +87,6 @@ def test_a_verdict_is_green_where_the_own_setting_is_as_good_as_any(
     assert f"\x1b[{colour}m    So it is." in text
 
 
-def test_how_far_errors_are_measured_is_told_where_it_is_not_the_whole_duration() -> None:
-    for horizon, told in ((2.0, "    2 s\n"), (1.5, "    2 s, errors to 1.5 s\n")):
-        one = scenario([row()], duration=2.0, horizon=horizon, hold=0.0)
-        assert told in bench_text([scene(one)], Style(width=80))
-
-
 def test_where_nothing_was_measured() -> None:
     text = bench_text([scene(scenario([])), replace(scene(), scenarios=())], Style(width=80))
     assert "    no setting was measured\n" in text
@@ -103,45 +96,12 @@ def test_where_nothing_was_measured() -> None:
     assert measured_text(bench_text([], Style()), Style()) == ""
 
 
-def test_where_every_run_was_lost_the_reasons_are_told() -> None:
-    text = bench_text([scene(scenario([lost(), lost("RK4")]))], Style(width=80))
-    assert "Euler at 100 ms; RK4 at 100 ms: diverged; the state is not finite" in text
-
-
 def test_names_cannot_change_the_terminal() -> None:
     name = "a\x1b[31m\u202e\n\t名前"
     odd = scenario([row(name)], name=name, title=name, source=name, notes=(name,))
     text = bench_text([scene(odd, model=name)], Style(width=80))
     assert "\x1b" not in text and "\u202e" not in text
     assert "名前" in text
-
-
-def test_huge_and_tiny_numbers() -> None:
-    rows = [
-        row("Euler", 1e-9, position=(1e300, 1e-300), energy_drift=1e200, cost=1e-12, realtime=1e15),
-        row("RK4", 1e9, position=(0.0, 0.0), energy_drift=-1e-300, cost=1e12, realtime=1e-15),
-    ]
-    text = bench_text([scene(scenario(rows, floor=0.0))], Style(width=80))
-    assert "1.00e+300" in text and "0.00e+00" in text
-    assert "1e-09 s" in text and "1e+09 s" in text
-
-
-@pytest.mark.parametrize(
-    ("seen", "shown"),
-    [(0.0012345, "0.0012"), (3.21, "3.2"), (99.4, "99"), (180.2, "180"), (1e5, "1e+05")],
-)
-def test_numbers_that_people_read(seen: float, shown: str) -> None:
-    text = bench_text([scene(scenario([row(seen=seen)]))], Style(width=80))
-    assert re.search(rf" {re.escape(shown)}  1.00e-03 ", text)
-
-
-def test_settings_and_seconds_in_words() -> None:
-    newton = setting(solver="Newton", iterations=100, cone="elliptic")
-    assert setting_text(newton) == "Euler at 2 ms, Newton, 100 iterations, elliptic cone"
-    assert setting_text(replace(newton, iterations=5), newton) == "Euler at 2 ms, 5 iterations"
-    assert [seconds_text(x) for x in (20.0, 1.0, 0.5, 1 / 60, 1e-3, 2.5e-5, 1e-9)] == [
-        *("20 s", "1 s", "500 ms", "16.6667 ms", "1 ms", "25 µs", "1e-09 s")
-    ]
 
 
 # --- tables
@@ -232,17 +192,6 @@ def test_json_gives_no_error_below_ten_floors() -> None:
     assert (found["velocity_error"], found["velocity_error_end"]) == (1e-9, 1e-9)
 
 
-def test_a_large_model_error_is_shown_even_where_there_is_little_room() -> None:
-    both = [row("RK4", 0.01, position=(1e-3, 1e-3), model_error=error) for error in (0.5, None)]
-    assert "model error" in bench_text([scene(scenario(both, floor=1e-6))], Style(width=80))
-
-
-def test_where_nothing_has_a_cost_speeds_are_shown() -> None:
-    fast = row("RK4", 0.01, cost=None, realtime=1234.0)
-    text = bench_text([scene(scenario([fast]))], Style(width=60))
-    assert "× real time" in text and "1,234" in text
-
-
 def test_json_says_what_holds_for_a_whole_scenario() -> None:
     (found,) = json.loads(bench_json([scene()]))["scenarios"]
     assert found["scene"] == "arm" and found["reference_source"] == swing().source
@@ -253,13 +202,6 @@ def test_json_says_what_holds_for_a_whole_scenario() -> None:
         "monotone": True,
         "searched": [0.001, 0.1],
     }
-
-
-def test_json_says_what_a_model_is_made_of() -> None:
-    card = SceneCard(1, 2, 6, 1, 1, 213, 5143, None)
-    first, second = json.loads(bench_json([scene(), scene(card=card)]))["scenes"]
-    assert first == {"scene": "arm", "digest": "0" * 64, "quick": False, "card": None}
-    assert second["card"]["freedom"] == 6 and second["card"]["browser"] is None
 
 
 def test_json_says_what_is_wrong() -> None:

@@ -10,7 +10,6 @@ from coursebuild.numerics.reports.bench import Machine
 from coursebuild.numerics.reports.diet import (
     EQUAL,
     IDENTICAL,
-    UNTOUCHED,
     DietReport,
     DietScenario,
     Finding,
@@ -95,27 +94,6 @@ def test_a_saving_that_is_none_or_uncertain_is_said_to_be_so() -> None:
     assert text in lines(replace(REPORT, findings=(more,)))
 
 
-def test_savings_of_several_findings_are_told_together() -> None:
-    """Those of what `--fix` does only where that is more than one of them, and not all."""
-    other = replace(FINDING, fixable=False)
-    for findings, all_told, fixed_told in (
-        ((FINDING,), False, False),
-        ((FINDING, other), True, False),
-        ((FINDING, FINDING), True, False),
-        ((FINDING, FINDING, other), True, True),
-    ):
-        told = "\n".join(lines(replace(REPORT, findings=findings)))
-        assert ("  without all of them: ×2.2" in told) is all_told, findings
-        assert ("  after --fix: ×2.2" in told) is fixed_told, findings
-
-
-def test_why_fix_leaves_something_is_told_of_findings_that_count() -> None:
-    left = replace(FINDING, fixable=False, unfixed="it stands in two files")
-    text = "    not for --fix: it stands in two files"
-    assert text in lines(replace(REPORT, findings=(left,)))
-    assert text not in lines(replace(REPORT, findings=(replace(left, setting=True),)))
-
-
 def test_what_is_kept_lost_or_kept_for_nothing() -> None:
     report = replace(
         REPORT,
@@ -132,16 +110,6 @@ def test_what_is_kept_lost_or_kept_for_nothing() -> None:
     assert not report.ok and "- <gyro" not in "\n".join(told)
     good = replace(report, scenarios=REPORT.scenarios, stale=())
     assert good.ok and "  nothing in it is in vain" in lines(good)
-
-
-def test_what_was_untouched_is_a_setting_or_has_a_reason_is_no_fault() -> None:
-    for finding in (
-        replace(FINDING, label=UNTOUCHED),
-        replace(FINDING, setting=True),
-        replace(FINDING, kept="a reason"),
-    ):
-        assert replace(REPORT, findings=(finding,)).ok
-    assert not replace(REPORT, findings=(replace(FINDING, label=EQUAL),)).ok
 
 
 def test_what_was_tried_and_many_changes() -> None:

@@ -82,12 +82,6 @@ def test_text_puts_integrators_with_equal_figures_together() -> None:
     assert stability_text([REPORT], Style()) == TEXT
 
 
-def test_colour_marks_what_is_not_well() -> None:
-    text = stability_text([REPORT], Style(colour=True))
-    assert "\x1b[1;31mRK4 is not monotone" in text
-    assert "\x1b[1;33m  RK4 at 0.5 s: diverged" in text
-
-
 def test_json_has_every_column_and_no_number_that_is_none() -> None:
     (found,) = json.loads(json_text([REPORT, REPORT]))[:1]
     assert found["boundaries"][3]["largest"] is None

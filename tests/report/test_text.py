@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, sort_diagnostics
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.report import (
     LabLine,
@@ -81,14 +81,6 @@ def test_a_long_line_is_cut_around_the_marked_part() -> None:
     assert lines[3].endswith("y…")
 
 
-def test_a_line_that_just_fits_is_not_cut() -> None:
-    """Beside the number of the line there are 74 of 80 cells; these letters take two each."""
-    for line, cut in (("量" * 36 + "ab", ""), ("量" * 36 + "abc", "…")):
-        source, a, b = at(line, "量")
-        shown_line = shown(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")[3]
-        assert shown_line.endswith(cut or line), line
-
-
 def test_a_file_without_text_has_no_frame() -> None:
     diagnostic = diagnose(
         "map-missing", Source("content/course.toml", "").span(), "there is no content/course.toml"
@@ -96,12 +88,6 @@ def test_a_file_without_text_has_no_frame() -> None:
     assert shown(diagnostic) == (
         "error[map-missing]: there is no content/course.toml\n  --> content/course.toml:1:1"
     )
-
-
-def test_diagnostics_are_sorted_by_place_and_told_once() -> None:
-    source, _, _ = at("abc def", "abc")
-    first, second = (diagnose("math-syntax", source.span(i, i + 1), "m") for i in (0, 4))
-    assert sort_diagnostics([second, first, second]) == (first, second)
 
 
 def test_report_lists_scripts_and_ends_with_a_summary() -> None:

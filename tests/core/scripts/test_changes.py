@@ -18,15 +18,6 @@ conservation over 20 s:
   implicit      kinetic energy  -6.040 %   6.4e-04"""
 
 
-def test_a_drifted_number_is_that_number_in_that_line() -> None:
-    found = verdict(ENERGY, ENERGY.replace("+6.641", "+6.702"))
-    (change,) = found.changes
-    assert seen(change) == ("numeric", "+6.641", "+6.702", 3)
-    assert (change.span.line, change.span.column) == (9, 33)
-    assert f"{change.relative_error:.1e}" == "9.2e-03"
-    assert change.digits == 2
-
-
 @pytest.mark.parametrize("prefix", ["> ", "   ", ">   "])
 @pytest.mark.parametrize("eol", ["\n", "\r\n"])
 def test_places_in_nested_fences(prefix: str, eol: str) -> None:
@@ -58,11 +49,6 @@ def test_places_in_nested_fences(prefix: str, eol: str) -> None:
 def test_classes_of_numbers(recorded: str, printed: str, kind: DriftKind) -> None:
     found = verdict(f"E {recorded} J", f"E {printed} J")
     assert [(c.kind, c.recorded, c.ran) for c in found.changes] == [(kind, recorded, printed)]
-
-
-def test_zero_recorded_has_no_relative_error() -> None:
-    (change,) = verdict("E 0.0", "E 0.5").changes
-    assert (change.relative_error, change.digits) == (None, None)
 
 
 def test_enormous_errors_stay_finite() -> None:
@@ -106,12 +92,6 @@ def test_missing_and_extra_lines() -> None:
     )
 
 
-def test_extra_lines_at_the_end_stand_after_the_last() -> None:
-    (change,) = verdict("a one", "a one\nb two").changes
-    assert seen(change) == ("extra lines", "", "b two", 2)
-    assert (change.span.line, change.span.column) == (7, 6)
-
-
 def test_an_empty_recording() -> None:
     (change,) = verdict("", "a\nb").changes
     assert seen(change) == ("extra lines", "", "a\nb", 1)
@@ -140,54 +120,24 @@ def test_changes_beside_an_ellipsis() -> None:
 
 
 def test_the_diff_is_unified() -> None:
-    found = verdict("a\nb\nc 1.5\nd\ne\nf\ng 2\nh", "a\nb\nc 1.6\nd\ne\nf\nh\ni")
+    rows = "\n".join(f"{letter} 1" for letter in "abcdefghij")
+    found = verdict(rows, rows.replace("c 1", "c 1.5").replace("j 1", "j 1\nk"), DIGITS)
     assert (
         found.diff
         == """\
 --- recorded
 +++ this run
 @@ -1,5 +1,5 @@
- a
- b
--c 1.5
-+c 1.6
- d
- e
-@@ -5,4 +5,4 @@
- e
- f
--g 2
- h
-+i"""
-        or found.diff
-        == """\
---- recorded
-+++ this run
-@@ -1,8 +1,8 @@
- a
- b
--c 1.5
-+c 1.6
- d
- e
- f
--g 2
- h
-+i"""
-    )
-
-
-def test_lines_that_match_by_value_are_context_in_the_diff() -> None:
-    found = verdict("a 1.5\nb 2.5", "a 1.51\nb 3.5", DIGITS)
-    assert (
-        found.diff
-        == """\
---- recorded
-+++ this run
-@@ -1,2 +1,2 @@
- a 1.5
--b 2.5
-+b 3.5"""
+ a 1
+ b 1
+-c 1
++c 1.5
+ d 1
+ e 1
+@@ -9,2 +9,3 @@
+ i 1
+ j 1
++k"""
     )
 
 

@@ -1,11 +1,9 @@
 from __future__ import annotations
 
-import pytest
-
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.failures import failure, in_lessons, silence
-from support.sample_lessons import course, document, ran, recording, told
+from coursebuild.core.scripts.failures import failure, in_lessons
+from support.sample_lessons import course, document, ran, told
 
 
 def extractions() -> tuple[Extraction, ...]:
@@ -97,22 +95,6 @@ script-failed at 5:7 `raise ValueError`
     )
 
 
-def test_chained_exceptions_end_with_the_last() -> None:
-    stderr = (
-        OWN
-        + "\nDuring handling of the above exception, another exception occurred:\n\n"
-        + (
-            'Traceback (most recent call last):\n  File "/x/examples/a.py", line 1, in <module>\n'
-            "    import helper\nKeyError: 'a'\n"
-        )
-    )
-    assert said(stderr).split("\n")[1:4] == [
-        "script-failed at 4:1 `import helper`",
-        "  `examples/a.py` exited with status 1",
-        "  ^ KeyError: 'a'",
-    ]
-
-
 def test_an_exception_group_ends_with_its_last_exception() -> None:
     stderr = (
         "  + Exception Group Traceback (most recent call last):\n"
@@ -188,33 +170,10 @@ def test_a_long_standard_error_shows_its_end() -> None:
     assert f"  ^ {'x' * 119}…" in text
 
 
-def test_timeout() -> None:
-    assert (
-        said("step 5\n", Outcome.TIMEOUT, -9)
-        == """\
-content/lessons/4.2-mass.md
-script-timeout at 3:1 ````python file=examples/a.py timeout=2.5`
-  `examples/a.py` was stopped after 2.5 s, its time limit
-  note: its standard error:
-    step 5
-  help: make it do less, or set `timeout=SECONDS` on its fence to a higher limit"""
-    )
-
-
-@pytest.mark.parametrize(
-    ("status", "message", "help_text"),
-    [
-        (11, "`examples/a.py` was ended by SIGSEGV", []),
-        (
-            9,
-            "`examples/a.py` was ended by SIGKILL",
-            ["  help: the system ends a process that takes too much memory"],
-        ),
-        (63, "`examples/a.py` was ended by signal 63", []),
-    ],
-)
-def test_killed(status: int, message: str, help_text: list[str]) -> None:
-    assert said("", Outcome.KILLED, status).split("\n")[2:] == [f"  {message}", *help_text]
+def test_a_script_ended_by_a_signal_names_it() -> None:
+    for status, name in ((11, "SIGSEGV"), (9, "SIGKILL"), (63, "signal 63")):
+        message = f"`examples/a.py` was ended by {name}"
+        assert message in said("", Outcome.KILLED, status).split("\n")[2], status
 
 
 def test_a_crash_dump_has_its_innermost_line_first() -> None:
@@ -223,43 +182,3 @@ def test_a_crash_dump_has_its_innermost_line_first() -> None:
         '  File "/x/examples/a.py", line 4 in go\n  File "/x/examples/a.py", line 5 in <module>\n'
     )
     assert said(stderr, Outcome.KILLED, 11).split("\n")[1] == "script-killed at 7:5 `helper.fall()`"
-
-
-@pytest.mark.parametrize(
-    ("outcome", "rule", "message", "help_text"),
-    [
-        (
-            Outcome.OUTPUT_LIMIT,
-            "script-output-limit",
-            "`examples/a.py` printed more than 1 MiB",
-            "print less: a recorded output is to be read",
-        ),
-        (
-            Outcome.ENCODING,
-            "script-encoding",
-            "`examples/a.py` printed bytes that are not UTF-8",
-            "print text; `sys.stdout.buffer` takes bytes as they are",
-        ),
-    ],
-)
-def test_wrong_outputs(outcome: Outcome, rule: str, message: str, help_text: str) -> None:
-    assert said("", outcome) == (
-        f"content/lessons/4.2-mass.md\n{rule} at 3:1 ````python file=examples/a.py timeout=2.5`\n"
-        f"  {message}\n  help: {help_text}"
-    )
-
-
-@pytest.mark.parametrize("outcome", [Outcome.OK, Outcome.SKIPPED, Outcome.NORUN])
-def test_nothing_is_said_of_the_others(outcome: Outcome) -> None:
-    found = extractions()
-    assert failure(found[0], ran("x", outcome=outcome), found) is None
-
-
-def test_silence() -> None:
-    assert (
-        told(silence(recording("a"), "examples/a.py"))
-        == """\
-script-silent at 4:1 `Output:`
-  an output is recorded here and `examples/a.py` printed nothing
-  help: print what is recorded, or take the recorded output away"""
-    )

@@ -49,14 +49,6 @@ def test_origins_lie_in_the_text_and_grow(
         assert mapped.text[piece.at : piece.at + length] == text[piece.start : piece.end]
 
 
-def test_a_copied_character_is_traced_to_itself() -> None:
-    mapped = filtered(MappedText.of_text("aa 17 bb 25 cc"), [Filter("a+", "<A>"), Filter("b", "")])
-    at = mapped.text.index("25")
-    assert mapped.origin(at, at + 2) == (9, 11)
-    assert mapped.origin(0, 1) == (0, 2)
-    assert mapped.origin(1, 8) == (0, 9)
-
-
 OUTPUTS = st.text(alphabet="ab \t\r\n", max_size=20)
 
 
@@ -73,23 +65,6 @@ def test_an_output_loses_what_does_not_count(text: str) -> None:
             assert text[low:high] == character
         else:
             assert re.fullmatch(r"[ \t]*(\r\n?|\n|\Z)", text[low:high])
-
-
-def test_windows_line_ends_are_traced() -> None:
-    mapped = MappedText.of_output("a\r\nb \rc\n\n")
-    assert mapped.text == "a\nb\nc\n"
-    assert mapped.origin(4, 5) == (6, 7)
-
-
-def test_lines_know_their_raw_text() -> None:
-    side = Side.of("#0\na 0x1  \n#1\nb\n\n#2\nc \n\n", [Filter(r"^#.*\n", ""), Filter("0x1", "X")])
-    assert side.texts == ("a X", "b", "", "c")
-    assert [side.raw_lines(i) for i in range(4)] == [
-        ("#0", "a 0x1", "#1"),
-        ("b",),
-        ("", "#2"),
-        ("c",),
-    ]
 
 
 @given(TEXTS, st.lists(PATTERNS, max_size=3))

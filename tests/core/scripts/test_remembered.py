@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Divergence, Outcome, Sign
 from coursebuild.core.scripts.dependencies import Dependency, Inputs, Kind
-from coursebuild.core.scripts.remembered import REMEMBERED, BindingRecord, from_bytes, to_bytes
+from coursebuild.core.scripts.remembered import BindingRecord, from_bytes, to_bytes
 
 HERE = (("course", "/home/me/course"), ("prefix", "/opt/venv"), ("home", "/home/me"))
 THERE = (("course", "/ci/build"), ("prefix", "/usr"), ("home", "/root"))
@@ -77,10 +77,6 @@ def test_json_that_is_no_record(data: st.DataObject) -> None:
         assert from_bytes(json.dumps(value).encode()) is None
 
 
-def test_deep_json() -> None:
-    assert from_bytes(b"[" * 100_000) is None
-
-
 def test_a_traceback_is_moved_to_another_machine() -> None:
     stderr = (
         'File "/home/me/course/examples/a.py", line 2\n'
@@ -100,35 +96,3 @@ def test_a_traceback_is_moved_to_another_machine() -> None:
         "/ci/build/examples/a.py:3: UserWarning: ~ is /root and /home/mexico\n"
         "a/home/me/course stays, /root/courses is in the home folder\n"
     )
-
-
-def test_the_run_of_a_record() -> None:
-    depends = (
-        Dependency(Kind.FILE, "models/a.xml", "1"),
-        Dependency(Kind.LISTING, "models", "1"),
-        Dependency(Kind.MODULE, "numpy", "numpy 2.3.1"),
-        Dependency(Kind.OUTSIDE, "/etc/hosts", "1"),
-    )
-    run = replace(RECORD, dependencies=depends).run(HERE)
-    assert (run.path, run.outcome, run.stdout, run.seconds) == (
-        "examples/a.py",
-        Outcome.OK,
-        "out\n",
-        0.25,
-    )
-    assert run.cached
-    assert run.trace is not None
-    assert run.trace.files == ("models/a.xml",)
-    assert run.trace.folders == ("models",)
-    assert run.trace.outside == ("/etc/hosts",)
-    assert run.trace.modules == ("numpy",)
-    assert run.trace.opaque == ""
-
-
-def test_failures_are_remembered_and_ends_by_chance_are_not() -> None:
-    assert set(REMEMBERED) == {
-        Outcome.OK,
-        Outcome.FAILED,
-        Outcome.OUTPUT_LIMIT,
-        Outcome.ENCODING,
-    }

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from decimal import Decimal
 
 import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
-from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity, Standing
-from coursebuild.core.scripts.numbers import scan
-from coursebuild.core.scripts.sensitivity import noise, rounded, sensitivity, worth_moving
+from coursebuild.core.model.sensitivity import Sensitivity, Standing
+from coursebuild.core.scripts.sensitivity import noise, sensitivity, worth_moving
 from support.sample_lessons import (
     DIGITS,
     ELLIPSIS,
@@ -106,19 +104,6 @@ def test_digits_that_hold(
     text = "value {} m"
     found = measured(text.format(recorded), *(text.format(value) for value in moved))
     assert digits(found) == [expected]
-
-
-def test_the_furthest_of_all_runs_counts() -> None:
-    [one] = measured("1.000", "1.001", "0.98", "1.003").doubts
-    assert (one.least, one.most, one.trusted) == ("0.98", "1.003", 2)
-
-
-def test_each_number_has_its_place_in_the_lesson() -> None:
-    found = measured("a 1.25 b 2.5\nc 3.75", "a 1.25 b 2.6\nc 3.85")
-    assert [(d.span.text, d.span.line, d.span.column) for d in found.doubts] == [
-        ("2.5", 7, 10),
-        ("3.75", 8, 3),
-    ]
 
 
 def test_in_a_table() -> None:
@@ -259,17 +244,3 @@ def test_what_a_warning_says() -> None:
         "  note at 9:1 `d`: not always printed",
         "  help: print fewer digits, or say how to compare: `digits`, or `rtol` and `atol`",
     ]
-
-
-def test_a_rounded_number_is_written_as_the_printed_one() -> None:
-    for text in ("1.25", "-0.0125", "+1.25e-07", "\u22121.25E+10", "125000", ".125"):
-        [number] = scan(text)
-        for count in range(1, 4):
-            value = Decimal(rounded(number, count).replace("\u2212", "-"))
-            assert abs(value - number.value) <= abs(number.value) * Decimal(10) ** (1 - count)
-    assert rounded(scan("1.25")[0], 0) == ""
-
-
-def test_kinds() -> None:
-    found = measured("x 1.5 heads", "x 1.6 tails")
-    assert {type(one) for one in (*found.doubts, *found.flips)} == {Doubt, Flip}

@@ -46,10 +46,6 @@ def test_rows_stand_in_order() -> None:
     assert verdict("\n".join([lines[1], lines[1]])).status == "drift"
 
 
-def test_cells_stand_in_order() -> None:
-    assert verdict("| 6.9e-04 | Euler | |").status == "drift"
-
-
 @pytest.mark.parametrize(
     "row",
     [
@@ -91,12 +87,6 @@ def test_the_number_that_drifted_is_named() -> None:
     )
 
 
-def test_a_minus_sign_keeps_its_place() -> None:
-    (change,) = verdict(ROWS.replace("−6.040", "−6.041")).changes
-    assert (change.kind.value, change.recorded, change.ran) == ("rounding", "−6.041", "-6.040")
-    assert change.span.text == "−6.041"
-
-
 def test_of_several_numbers_the_nearest_is_meant() -> None:
     (change,) = verdict("| Euler | | 6.8e-04 |").changes
     assert (change.recorded, change.ran) == ("6.8e-04", "6.9e-04")
@@ -126,13 +116,6 @@ def test_filters_apply_to_cells_and_lines() -> None:
     rows = "| run 17 | took 1.00 s | 1.5 |\n| run 18 | took … s | 2.6 |"
     (change,) = verdict(rows, printed, EXACT, (seconds,)).changes
     assert (change.recorded, change.ran, change.span.text) == ("2.6", "2.5", "2.6")
-
-
-def test_crlf_and_white_space_in_the_output() -> None:
-    assert (
-        verdict(ROWS, PRINTED.replace("\n", "\r\n").replace(" kinetic", "\tkinetic")).status
-        == "verified"
-    )
 
 
 def test_a_large_table() -> None:
