@@ -43,8 +43,8 @@ LONGEST = 2.0
 """Seconds after which it begins all the same."""
 RETRY = 2.0
 """Seconds after which what could not be done is tried again, though nothing was saved."""
-_REMEMBERED = 500_000
-"""Bindings that held, and lines by which they did, that are remembered: some 50 MB at most."""
+_REMEMBERED = 100_000
+"""Bindings that held that are remembered, each with the lines by which it did."""
 
 
 class SupersededError(Exception):

@@ -9,7 +9,7 @@ import json
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from coursebuild.core.model.sensitivity import Sensitivity
+from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
@@ -44,7 +44,7 @@ def _timed(line: ScriptLine | LabLine) -> dict[str, Any]:
 def _sensitivity(one: Sensitivity) -> dict[str, Any]:
     """What is known of a script; an amplification without bounds is `null`."""
     value: dict[str, Any] = plain(one, standing="status")
-    rows = {"doubts": one.doubts, "flips": one.flips}
+    rows: dict[str, tuple[Doubt | Flip, ...]] = {"doubts": one.doubts, "flips": one.flips}
     told = {
         name: [{"file": row.span.path, **plain(row)} for row in found]
         for name, found in rows.items()

@@ -47,35 +47,32 @@ class BindingMemory(Protocol):
 
 
 class BindingHistory:
-    """See the module."""
+    """Follows a course from check to check: by what each binding held when it last did."""
 
     def __init__(self) -> None:
         self._by: dict[str, BindingEvidence] = {}
         self._last: dict[BindingInputs, BindingEvidence] = {}
-        self._lines: dict[tuple[str, ...], tuple[str, ...]] = {}
-        """Each once: many bindings hold by the same."""
 
     def __len__(self) -> int:
-        """How much is remembered: bindings, and lines."""
-        return len(self._by) + sum(map(len, self._lines))
+        """How many bindings are remembered, those of outputs that are no more too."""
+        return len(self._by)
 
     def clear(self) -> None:
         """Forget all of them."""
-        for remembered in (self._by, self._last, self._lines):
-            remembered.clear()
+        self._by.clear()
+        self._last.clear()
 
     def holds(self, key: str, inputs: BindingInputs) -> bool:
         """See `BindingMemory`."""
         evidence = self._by.get(key)
-        if evidence is not None and evidence.lines:
-            self._last[inputs] = evidence
+        if evidence is not None:
+            self.add(key, inputs, evidence)
         return evidence is not None
 
     def add(self, key: str, inputs: BindingInputs, evidence: BindingEvidence) -> None:
         """See `BindingMemory`."""
-        lines = self._lines.setdefault(evidence.lines, evidence.lines)
-        self._by[key] = evidence = BindingEvidence(lines, evidence.ran)
-        if lines:
+        self._by[key] = evidence
+        if evidence.lines:
             self._last[inputs] = evidence
 
     def before(self, inputs: BindingInputs) -> BindingEvidence:

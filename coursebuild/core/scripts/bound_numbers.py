@@ -98,6 +98,16 @@ class Window(Struct, frozen=True):
         """The numbers as printed."""
         return ", ".join(number.text for number in self.numbers)
 
+    @property
+    def before(self) -> str:
+        """What stands before them in their line."""
+        return self.line.text[: self.numbers[0].start]
+
+    @property
+    def after(self) -> str:
+        """What stands after them, without white space at its start."""
+        return self.line.text[self.numbers[-1].end :].lstrip().replace("\u2212", "-")
+
 
 class Shown(Struct, frozen=True):
     """What a binding shows: its numbers and the text around them; `before` is all without any."""
@@ -145,22 +155,23 @@ class Shown(Struct, frozen=True):
             for line in lines
             for first in range(len(line.numbers) - count + 1)
         ]
-        for stands_beside in (self._after_stands, self._before_stands):
+        for stands_beside in self._sides():
             windows = [window for window in windows if stands_beside(window)] or windows
         return windows
 
     def stands_beside(self, window: Window) -> bool:
         """Whether the text around the numbers stands around the printed ones as well."""
-        return self._before_stands(window) and self._after_stands(window)
+        return all(side(window) for side in self._sides())
 
-    def _before_stands(self, window: Window) -> bool:
-        start = window.numbers[0].start
-        before = plain(window.line.text[max(0, start - 4 * len(self.before) - 200) : start])
-        return re.search(_whole_words(self.before) + r"\Z", before) is not None
-
-    def _after_stands(self, window: Window) -> bool:
-        rest = window.line.text[window.numbers[-1].end :].lstrip().replace("\u2212", "-")
-        return re.match(_whole_words(self.after), rest) is not None
+    def _sides(self) -> Iterator[Callable[[Window], bool]]:
+        """Whether the text after and the text before the numbers stands beside printed ones."""
+        if self.after:
+            after = re.compile(_whole_words(self.after))
+            yield lambda window: after.match(window.after) is not None
+        if self.before:
+            before = re.compile(_whole_words(self.before) + r"\Z")
+            reach = 4 * len(self.before) + 200
+            yield lambda window: before.search(plain(window.before[-reach:])) is not None
 
 
 def _whole_words(text: str) -> str:

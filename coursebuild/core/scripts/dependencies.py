@@ -20,7 +20,7 @@ from typing import assert_never
 
 from msgspec import Struct
 
-from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.text.patterns import pattern
 
 VERSION = "3"
@@ -112,15 +112,7 @@ def is_perturbed(inputs: Inputs) -> bool:
 
 def group_key(inputs: Inputs) -> str:
     """The name of the group of results that these inputs can have."""
-    parts = [
-        inputs.path,
-        inputs.text,
-        inputs.args,
-        inputs.timeout,
-        inputs.requires,
-        inputs.around,
-        inputs.version,
-    ]
+    parts = [getattr(inputs, name) for name in Inputs.__struct_fields__]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -141,7 +133,8 @@ def needs(
     assert trace is not None
     found = {Need(Kind.FILE, path) for path in trace.files}
     found |= {Need(Kind.LISTING, path) for path in trace.folders}
-    found |= {Need(Kind.MODULE, name) for name in _modules(trace, requires)}
+    found |= {Need(Kind.MODULE, name) for name in trace.modules}
+    found |= {Need(Kind.MODULE, name.partition(".")[0]) for name in requires}
     known = dict(places)
     ours = f"{known['library'].rstrip('/')}/mjcourse/"
     for path in trace.outside:
@@ -192,11 +185,6 @@ def sought_files(name: str) -> tuple[str, ...]:
     return tuple(f"{before}{module}{end}" for module in modules for end in (".py", "/__init__.py"))
 
 
-def _modules(trace: Trace, requires: Iterable[str]) -> Iterator[str]:
-    yield from trace.modules
-    yield from (name.partition(".")[0] for name in requires)
-
-
 def forgotten(run: ScriptRun) -> str:
     """Why the result of a run is not remembered, as the end of a sentence; empty if it is."""
     match run.outcome:
@@ -227,25 +215,23 @@ def forgotten(run: ScriptRun) -> str:
 
 def input_changes(old: Inputs, new: Inputs) -> list[str]:
     """What is different, each as a clause."""
-    found = []
-    if old.text != new.text:
-        found.append("its text changed")
-    if old.args != new.args:
-        found.append(f"its arguments changed: {_list(old.args)} → {_list(new.args)}")
-    if old.timeout != new.timeout:
-        found.append(f"its option `timeout` changed: {old.timeout:g} → {new.timeout:g}")
-    if old.requires != new.requires:
-        found.append(
-            f"its option `requires` changed: {_list(old.requires)} → {_list(new.requires)}"
-        )
-    before, now = dict(old.around), dict(new.around)
-    for name in sorted({*before, *now}):
-        one, two = before.get(name, "unset"), now.get(name, "unset")
+    found = ["its text changed"] if old.text != new.text else []
+    for what, one, two in (
+        ("its arguments changed", _list(old.args), _list(new.args)),
+        ("its option `timeout` changed", f"{old.timeout:g}", f"{new.timeout:g}"),
+        ("its option `requires` changed", _list(old.requires), _list(new.requires)),
+        *_both(dict(old.around), dict(new.around)),
+    ):
         if one != two:
-            found.append(f"{name}: {one} → {two}")
+            found.append(f"{what}: {one} → {two}")
     if old.version != new.version:
         found.append("this version of coursebuild runs scripts in another way")
     return found
+
+
+def _both(old: dict[str, str], new: dict[str, str]) -> Iterator[tuple[str, str, str]]:
+    for name in sorted({*old, *new}):
+        yield name, old.get(name, "unset"), new.get(name, "unset")
 
 
 def state_changes(

@@ -9,9 +9,10 @@ both times.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Sequence
 
-from coursebuild.core.model import Comparison, Course, Mode, Recording, Table, document_blocks
+from coursebuild.core.model import Comparison, Course, Recording, Table, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.align import Step, StepKind, align
 from coursebuild.core.scripts.compare import compare
@@ -33,12 +34,11 @@ def repeat_findings(
 ) -> tuple[Diagnostic, ...]:
     """A warning for each script; `differing` holds what is remembered and what was done now."""
     by_path = {extraction.path: extraction for extraction in extractions}
-    found = []
-    for before, now in differing:
-        extraction = by_path.get(now.path)
-        if extraction is not None and not _may_differ(course, before, now):
-            found.append(_told(extraction, before, now))
-    return tuple(found)
+    return tuple(
+        _unrepeatable(by_path[now.path], before, now)
+        for before, now in differing
+        if now.path in by_path and not _may_differ(course, before, now)
+    )
 
 
 def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
@@ -50,18 +50,14 @@ def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
         for block in document_blocks(document)
         if isinstance(block, Recording) and block.script == now.path and block.readable
     ]
-    return bool(recordings) and all(_both_hold(course, r, before, now) for r in recordings)
+    return bool(recordings) and all(
+        compare(r, r.comparison or course.comparison, course.filters, run.stdout).status != "drift"
+        for r in recordings
+        for run in (before, now)
+    )
 
 
-def _both_hold(course: Course, recording: Recording, before: ScriptRun, now: ScriptRun) -> bool:
-    comparison: Comparison = recording.comparison or course.comparison
-    if comparison.mode is Mode.VOLATILE:
-        return True
-    verdicts = (compare(recording, comparison, course.filters, run.stdout) for run in (before, now))
-    return all(verdict.status == "verified" for verdict in verdicts)
-
-
-def _told(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
+def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
     notes = []
     if (before.outcome, before.status) != (now.outcome, now.status):
         notes.append(Note(f"it ended otherwise: before {_end(before)}, now {_end(now)}"))
@@ -84,8 +80,6 @@ def _end(run: ScriptRun) -> str:
 
 
 def _diff(before: str, now: str) -> str:
-    import difflib
-
     lines = [
         line
         for line in difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
@@ -104,11 +98,8 @@ def unstable(recording: Recording, first: Side, second: Side, comparison: Compar
     """
     steps = align(first, second, LineMatcher(comparison))
     line_starts = second.line_starts()
-    lines: list[str] = []
-    for step in steps:
-        text = _difference(step, first, second, line_starts)
-        if text:
-            lines.append(text)
+    told = (_difference(step, first, second, line_starts) for step in steps)
+    lines = [text for text in told if text]
     notes = [Note(text) for text in lines[:_NAMED]]
     if len(lines) > _NAMED:
         more = len(lines) - _NAMED

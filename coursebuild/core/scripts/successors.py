@@ -108,16 +108,13 @@ def _groups(
     old: Sequence[_Known], new: Sequence[_Known], key: Callable[[_Known], Hashable]
 ) -> Iterator[_Pairs]:
     """The lines that are known by the same key, in order, where there are as many as before."""
-    by_key: dict[Hashable, list[_Known]] = {}
-    for line in new:
-        by_key.setdefault(key(line), []).append(line)
-    wanted: dict[Hashable, list[_Known]] = {}
-    for line in old:
-        wanted.setdefault(key(line), []).append(line)
-    for name, lines in wanted.items():
-        others = by_key.get(name, [])
-        if len(others) == len(lines):
-            yield list(zip(lines, others, strict=True))
+    both: dict[Hashable, tuple[list[_Known], list[_Known]]] = {}
+    for side, lines in enumerate((old, new)):
+        for line in lines:
+            both.setdefault(key(line), ([], []))[side].append(line)
+    for before, now in both.values():
+        if before and len(before) == len(now):
+            yield list(zip(before, now, strict=True))
 
 
 def _together(group: _Pairs) -> bool:

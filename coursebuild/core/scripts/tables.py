@@ -58,7 +58,7 @@ from coursebuild.core.text.source import Span
 
 _ALIKE = 6
 _PLACES = 64
-_DIFF_ROWS = 20
+_LINES = 40
 _WIDTH = 160
 
 
@@ -120,21 +120,20 @@ def compare_table(
 ) -> Verdict:
     """The verdict on a recorded table."""
     changes: list[Change] = []
-    removed: list[str] = []
+    lines: list[str] = []
     line_starts = ran.line_starts()
     for found in match_rows(table_rows(table, filters), ran, comparison):
         differing = _row_changes(found, ran, comparison, line_starts)
         changes += differing
         if differing:
-            removed.append("-" + shortened(_row_text(found.row), _WIDTH))
+            lines.append("-" + shortened(_row_text(found.row), _WIDTH))
             if found.line >= 0:
-                removed.append("+" + shortened(plain(ran.lines[found.line].text), _WIDTH))
+                lines.append("+" + shortened(plain(ran.lines[found.line].text), _WIDTH))
     if not changes:
         return Verdict(recording, comparison, "verified")
-    if len(removed) > 2 * _DIFF_ROWS:
-        more = len(removed) - 2 * _DIFF_ROWS
-        removed[2 * _DIFF_ROWS :] = [f"… and {more} more lines"]
-    diff = "\n".join(("--- recorded", "+++ this run", *removed))
+    if len(lines) > _LINES:
+        lines[_LINES:] = [f"… and {len(lines) - _LINES} more lines"]
+    diff = "\n".join(("--- recorded", "+++ this run", *lines))
     return Verdict(recording, comparison, "drift", tuple(changes), diff)
 
 
