@@ -36,7 +36,7 @@ from coursebuild.core.scripts.dependencies import (
     state_changes,
 )
 from coursebuild.core.scripts.extract import extract, jobs
-from coursebuild.core.scripts.remembered import BindingRecord
+from coursebuild.core.scripts.remembered import RunRecord
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.records import bench_path
 from coursebuild.pipeline.lab_inputs import SIMULATED, lab_inputs, labs_of
@@ -144,11 +144,11 @@ class _Explainer:
         reasons = [] if holds else self._reasons(last, inputs)
         return _explained("lab", name, owner, last, tuple(reasons))
 
-    def _lab_holds(self, last: BindingRecord, inputs: Inputs) -> bool:
+    def _lab_holds(self, last: RunRecord, inputs: Inputs) -> bool:
         same = not last.forgotten and last.inputs == inputs
         return same and not list(state_changes(last.dependencies, self.memory.states))
 
-    def _reasons(self, last: BindingRecord | None, inputs: Inputs) -> list[str]:
+    def _reasons(self, last: RunRecord | None, inputs: Inputs) -> list[str]:
         if last is None:
             return ["there is no result of it on this machine"]
         found = input_changes(last.inputs, inputs)
@@ -170,7 +170,7 @@ class _Explainer:
                 found.append(self._lab(name))
         return tuple(found)
 
-    def _depends(self, last: BindingRecord | None, path: str) -> bool:
+    def _depends(self, last: RunRecord | None, path: str) -> bool:
         folder = path.rpartition("/")[0]
         return last is not None and any(
             (d.kind is Kind.FILE and d.name == path)
@@ -225,7 +225,7 @@ def _explained(
     kind: Literal["script", "lab"],
     name: str,
     owner: str,
-    record: BindingRecord | None,
+    record: RunRecord | None,
     reasons: tuple[str, ...],
 ) -> Explained:
     state: State = "would run" if reasons else "remembered"

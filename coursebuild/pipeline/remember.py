@@ -44,7 +44,7 @@ from coursebuild.core.scripts.dependencies import (
     sought,
     state_changes,
 )
-from coursebuild.core.scripts.remembered import REMEMBERED, BindingRecord, from_bytes, to_bytes
+from coursebuild.core.scripts.remembered import REMEMBERED, RunRecord, from_bytes, to_bytes
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32
@@ -160,7 +160,7 @@ class Memory:
         self.states.save()
         return found
 
-    def remembered(self, inputs: Inputs) -> BindingRecord | None:
+    def remembered(self, inputs: Inputs) -> RunRecord | None:
         """The result kept on this machine that holds now."""
         group = group_key(inputs)
         for key in self.store.group(_RESULTS, group):
@@ -170,13 +170,13 @@ class Memory:
                 return record
         return None
 
-    def results(self, inputs: Inputs) -> list[BindingRecord]:
+    def results(self, inputs: Inputs) -> list[RunRecord]:
         """All results kept on this machine for these inputs, newest first."""
         keys = self.store.group(_RESULTS, group_key(inputs))
         records = (self._read(self.store.peek(_RESULTS, key), inputs) for key in keys)
         return [record for record in records if record is not None]
 
-    def last(self, path: str) -> BindingRecord | None:
+    def last(self, path: str) -> RunRecord | None:
         """What became of the last run of a script, without what it printed."""
         data = self.store.peek(_LAST, _last_key(path))
         record = None if data is None else from_bytes(data.partition(b"\n")[2])
@@ -185,7 +185,7 @@ class Memory:
     def note_lab(self, inputs: Inputs, files: Iterable[str], trial: LabTrial) -> None:
         """Note what a lab's trial depends on; `files` are those of its model."""
         needed = [Need(Kind.FILE, path) for path in sorted(files)]
-        record = BindingRecord(
+        record = RunRecord(
             inputs,
             tuple(Dependency(n.kind, n.name, self.states(n)) for n in needed),
             Outcome.OK if trial.ok else Outcome.FAILED,
@@ -213,7 +213,7 @@ class Memory:
             needed = folded(needed, self.states.now)
             dependencies = tuple(Dependency(n.kind, n.name, self.states.now(n)) for n in needed)
             why = why or self._disturbed(inputs, needed)
-        record = BindingRecord(
+        record = RunRecord(
             inputs,
             dependencies,
             run.outcome,
@@ -260,10 +260,10 @@ class Memory:
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""
 
-    def _holds(self, record: BindingRecord) -> bool:
+    def _holds(self, record: RunRecord) -> bool:
         return not any(True for _ in state_changes(record.dependencies, self.states))
 
-    def _read(self, data: bytes | None, inputs: Inputs) -> BindingRecord | None:
+    def _read(self, data: bytes | None, inputs: Inputs) -> RunRecord | None:
         """The record of an entry, if it is one of these inputs."""
         if data is None:
             return None
@@ -276,7 +276,7 @@ class Memory:
         )
         return record if fits else None
 
-    def _fetch(self, wanted: Sequence[Inputs]) -> list[BindingRecord]:
+    def _fetch(self, wanted: Sequence[Inputs]) -> list[RunRecord]:
         """Results that hold from the shared cache."""
         if self.store.shared is None or not wanted:
             return []
@@ -287,7 +287,7 @@ class Memory:
             keys = [key for key in self.store.shared_group(_RESULTS, group) if key not in here]
             return [(key, self.store.get(_RESULTS, key)) for key in keys[:_MOST_SHARED]]
 
-        found: list[BindingRecord] = []
+        found: list[RunRecord] = []
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
@@ -300,7 +300,7 @@ class Memory:
                         break
         return found
 
-    def _note(self, record: BindingRecord, result: str = "") -> None:
+    def _note(self, record: RunRecord, result: str = "") -> None:
         """Note under the script's path what is known of its last run.
 
         `result` is the key of the result, where it is remembered.
@@ -312,7 +312,7 @@ class Memory:
         before = self.store.peek(_LAST, key)
         if result and before is not None and before.startswith(head):
             return
-        bare = BindingRecord(
+        bare = RunRecord(
             record.inputs,
             record.dependencies,
             record.outcome,
@@ -325,7 +325,7 @@ class Memory:
         if before != data:
             self.store.put(_LAST, key, data, local=True)
 
-    def _compare(self, record: BindingRecord, run: ScriptRun) -> None:
+    def _compare(self, record: RunRecord, run: ScriptRun) -> None:
         """Hold a run made afresh against what is remembered for the same dependencies."""
         for before in self.results(record.inputs):
             if before.dependencies == record.dependencies:

@@ -55,23 +55,14 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
                 nearest = block
                 first.setdefault(block.path, block)
             elif isinstance(block, Recording) and block.script is not None:
+                comparison, run = block.comparison or course.comparison, by_path.get(block.script)
                 same = nearest is not None and nearest.path == block.script
-                kept = not same or first[block.script] is nearest
-                run = by_path.get(block.script) if kept and block.readable else None
-                verdicts.append(_verdict(block, course.comparison, course.filters, run))
+                kept = block.readable and (not same or first[block.script] is nearest)
+                if kept and run and run.outcome is Outcome.OK and not is_silent(run.stdout):
+                    verdicts.append(compare(block, comparison, course.filters, run.stdout))
+                else:
+                    verdicts.append(Verdict(block, comparison, "unchecked"))
     return tuple(verdicts)
-
-
-def _verdict(
-    recording: Recording,
-    default: Comparison,
-    filters: tuple[Filter, ...],
-    run: ScriptRun | None,
-) -> Verdict:
-    comparison = recording.comparison or default
-    if run is None or run.outcome is not Outcome.OK or is_silent(run.stdout):
-        return Verdict(recording, comparison, "unchecked")
-    return compare(recording, comparison, filters, run.stdout)
 
 
 def is_silent(stdout: str) -> bool:

@@ -1,8 +1,7 @@
 """What to say about a script that did not run to its end, or in which a simulation was lost.
 
 Entry points: `failure` (a run), `silence` (an output is recorded and nothing was printed),
-`divergence` (simulations), `is_lost`; `in_lessons` (a text with the paths of extracted files made
-places of lessons).
+`divergence` (simulations), `is_lost`.
 
 1. A traceback's frames are read out of the standard error: each line of an extracted file is the
    line of a lesson, and the innermost such line is what the diagnostic points at. Of a script that
@@ -58,9 +57,18 @@ class _Lessons:
                 return extraction, _without_indentation(span)
         return None
 
-    def place(self, found: re.Match[str]) -> Span | None:
-        """The lesson's line of a frame."""
-        return self._find(found)[1]
+    def translated(self, text: str) -> str:
+        """The text with the paths and lines of extracted files made those of lessons."""
+
+        def frame(found: re.Match[str]) -> str:
+            _, span = self._find(found)
+            return found.group() if span is None else f'File "{span.path}", line {span.line}'
+
+        def warning(found: re.Match[str]) -> str:
+            _, span = self._find(found)
+            return found.group() if span is None else f"{span.path}:{span.line}"
+
+        return _WARNING.sub(warning, _FRAME.sub(frame, text))
 
     def _find(self, found: re.Match[str]) -> tuple[Extraction | None, Span | None]:
         parts = found["path"].replace("\\", "/").split("/")
@@ -78,41 +86,25 @@ def _without_indentation(span: Span) -> Span:
     return Span(span.source, span.start + lead, span.end)
 
 
-def in_lessons(text: str, extractions: Iterable[Extraction]) -> str:
-    """The text with `File "…/examples/x.py", line 12` made the lesson's path and line."""
-    return _in_lessons(text, _Lessons(extractions))
-
-
-def _in_lessons(text: str, lessons: _Lessons) -> str:
-    def frame(found: re.Match[str]) -> str:
-        span = lessons.place(found)
-        return found.group() if span is None else f'File "{span.path}", line {span.line}'
-
-    def warning(found: re.Match[str]) -> str:
-        span = lessons.place(found)
-        return found.group() if span is None else f"{span.path}:{span.line}"
-
-    return _WARNING.sub(warning, _FRAME.sub(frame, text))
-
-
 def failure(
     extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
 ) -> Diagnostic | None:
     """What is wrong with a run; `None` for one that ended well or was not to be made."""
-    path = f"`{extraction.path}`"
+    path, help = f"`{extraction.path}`", ""
     match run.outcome:
         case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN:
             return None
         case Outcome.FAILED:
-            message = f"{path} exited with status {run.status}"
-            return _crash("script-failed", extraction, run, extractions, message)
+            rule, message = "script-failed", f"{path} exited with status {run.status}"
         case Outcome.KILLED:
-            message = f"{path} was ended by {_signal_name(run.status)}"
-            return _crash("script-killed", extraction, run, extractions, message)
+            name = _signal_name(run.status)
+            rule, message = "script-killed", f"{path} was ended by {name}"
+            if name == "SIGKILL":
+                help = "the system ends a process that takes too much memory"
         case Outcome.TIMEOUT:
             limit = f"{extraction.script.timeout:g}"
-            message = f"{path} was stopped after {limit} s, its time limit"
-            return _crash("script-timeout", extraction, run, extractions, message)
+            rule, message = "script-timeout", f"{path} was stopped after {limit} s, its time limit"
+            help = "make it do less, or set `timeout=SECONDS` on its fence to a higher limit"
         case Outcome.OUTPUT_LIMIT:
             rule, message = "script-output-limit", f"{path} printed more than 1 MiB"
             help = "print less: a recorded output is to be read"
@@ -121,9 +113,20 @@ def failure(
             help = "print text; `sys.stdout.buffer` takes bytes as they are"
         case _:
             assert_never(run.outcome)
+    lessons, stderr = _Lessons(extractions), _COLOURS.sub("", run.stderr)
     fence = extraction.script.span.first_line()
-    notes = _stderr_notes(run, _Lessons(extractions))
-    return diagnose(rule, fence, message, help=help, notes=notes)
+    where, span, label = extraction, fence, ""
+    if run.outcome in (Outcome.FAILED, Outcome.KILLED, Outcome.TIMEOUT):
+        where, span = lessons.innermost(stderr) or (extraction, fence)
+        label = "" if span is fence else "it was here"
+    if run.outcome is Outcome.FAILED:
+        if not (_parses(where) and _parses(extraction)):
+            return None
+        label = _last_words(stderr)
+    notes = _stderr_notes(run.outcome, lessons.translated(stderr))
+    if where.path != extraction.path:
+        notes.insert(0, Note(f"`{extraction.path}` was running", fence))
+    return diagnose(rule, span, message, label=label, help=help, notes=notes)
 
 
 def silence(recording: Recording, path: str) -> Diagnostic:
@@ -141,44 +144,6 @@ def _signal_name(number: int) -> str:
         return signal.Signals(number).name
     except ValueError:
         return f"signal {number}"
-
-
-def _crash(
-    rule: str,
-    extraction: Extraction,
-    run: ScriptRun,
-    extractions: Iterable[Extraction],
-    message: str,
-) -> Diagnostic | None:
-    """A diagnostic at the innermost line of the traceback that lies in a lesson."""
-    lessons = _Lessons(extractions)
-    stderr = _COLOURS.sub("", run.stderr)
-    fence = extraction.script.span.first_line()
-    notes: list[Note] = []
-    where, span = lessons.innermost(stderr) or (extraction, fence)
-    if rule == "script-failed" and not (_parses(where) and _parses(extraction)):
-        return None
-    if where.path != extraction.path:
-        notes.append(Note(f"`{extraction.path}` was running", fence))
-    label = "" if span is fence else "it was here"
-    if rule == "script-failed":
-        label = _last_words(stderr)
-    return diagnose(
-        rule,
-        span,
-        message,
-        label=label,
-        help=_help(rule, run),
-        notes=[*notes, *_stderr_notes(run, lessons)],
-    )
-
-
-def _help(rule: str, run: ScriptRun) -> str:
-    if rule == "script-timeout":
-        return "make it do less, or set `timeout=SECONDS` on its fence to a higher limit"
-    if rule == "script-killed" and _signal_name(run.status) == "SIGKILL":
-        return "the system ends a process that takes too much memory"
-    return ""
 
 
 def _parses(extraction: Extraction) -> bool:
@@ -205,10 +170,10 @@ def _last_words(stderr: str) -> str:
     return shortened(written[-1], _LABEL) if written else ""
 
 
-def _stderr_notes(run: ScriptRun, lessons: _Lessons) -> list[Note]:
-    """The end of the standard error, its paths made places of lessons."""
-    text = _in_lessons(_COLOURS.sub("", run.stderr), lessons).rstrip()
-    text = _THREAD.sub("", text.removeprefix(_ABORTED) if run.outcome is Outcome.TIMEOUT else text)
+def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
+    """The end of the standard error."""
+    text = text.rstrip()
+    text = _THREAD.sub("", text.removeprefix(_ABORTED) if outcome is Outcome.TIMEOUT else text)
     if not text.strip():
         return []
     lines = text.replace("\r\n", "\n").split("\n")

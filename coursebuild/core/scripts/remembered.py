@@ -1,6 +1,6 @@
 """The result of a script as it is kept: what it depends on, and what it did.
 
-Entry points: `BindingRecord`, `to_bytes`, `from_bytes`, `Record.run`.
+Entry points: `RunRecord`, `to_bytes`, `from_bytes`, `Record.run`.
 
 Paths of the machine in what a script wrote to its error output are taken out before it is kept, and
 those of the machine that reads it are put in.
@@ -23,7 +23,7 @@ REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING
 _MARK = "\0"
 
 
-class BindingRecord(Struct, frozen=True):
+class RunRecord(Struct, frozen=True):
     """One run of a script."""
 
     inputs: Inputs
@@ -70,7 +70,7 @@ class BindingRecord(Struct, frozen=True):
         )
 
 
-def to_bytes(record: BindingRecord, places: Iterable[tuple[str, str]]) -> bytes:
+def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
     """As JSON; `places` are folders of this machine, each with a name, the longer ones first."""
     stderr = _take_out(record.stderr, places)
     kept = replace(record, seconds=round(record.seconds, 4), stderr=stderr)
@@ -78,13 +78,13 @@ def to_bytes(record: BindingRecord, places: Iterable[tuple[str, str]]) -> bytes:
     return json.dumps(msgspec.to_builtins(kept), ensure_ascii=True).encode()
 
 
-def from_bytes(data: bytes) -> BindingRecord | None:
+def from_bytes(data: bytes) -> RunRecord | None:
     """The record that JSON holds; `None` where it holds none."""
     try:
         try:
-            return msgspec.json.decode(data, type=BindingRecord)
+            return msgspec.json.decode(data, type=RunRecord)
         except msgspec.DecodeError:  # perhaps for an escape that is half a letter
-            return msgspec.convert(json.loads(data), BindingRecord)
+            return msgspec.convert(json.loads(data), RunRecord)
     except (ValueError, RecursionError):
         return None
 

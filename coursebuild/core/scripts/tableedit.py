@@ -19,7 +19,7 @@ from coursebuild.core.scripts.lines import canonical, same_number
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.numbers import Number, round_like
 from coursebuild.core.scripts.repeat import unstable
-from coursebuild.core.scripts.tables import RowCell, RowMatch, match_rows, rows_match, table_rows
+from coursebuild.core.scripts.tables import RowCell, RowMatch, TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Span
 
@@ -39,7 +39,7 @@ def updated_table(
     ran, again = Side.of(first, filters), Side.of(second, filters)
     if comparison.mode is Mode.VOLATILE:
         comparison = Comparison()
-    matches = match_rows(table_rows(table, filters), ran, comparison)
+    matches = TableMatcher(table_rows(table, filters), ran, comparison).match()
     rows: list[tuple[RowCell, ...]] = []
     edits: list[Edit] = []
     for found in matches:
@@ -49,10 +49,10 @@ def updated_table(
         cells, changed = row
         rows.append(cells)
         edits += changed
-    if not rows_match(rows, ran, comparison):
+    if TableMatcher(rows, ran, comparison).all_match() is None:
         where = table.span if not edits else edits[0].span
         return _refused(where, "the table cannot be made to match what the script prints")
-    if not rows_match(rows, again, comparison):
+    if TableMatcher(rows, again, comparison).all_match() is None:
         return unstable(recording, ran, again, comparison)
     return _joined(edits) if edits else None
 

@@ -1,6 +1,6 @@
 """Recorded tables: does each row stand in a line of the output?
 
-Entry points: `compare_table`, `table_rows`, `match_rows`, `rows_match`.
+Entry points: `compare_table`, `table_rows`, `TableMatcher`.
 
 1. A body row's cells, as plain text, must stand in order in one line that ran, white space folded;
    the rows in order in lines further and further down. The header row and all other lines are free.
@@ -13,6 +13,7 @@ Entry points: `compare_table`, `table_rows`, `match_rows`, `rows_match`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from itertools import islice
 
 from msgspec import Struct
@@ -99,18 +100,6 @@ def table_rows(table: Table, filters: Iterable[Filter] = ()) -> tuple[tuple[RowC
     return tuple(rows)
 
 
-def match_rows(
-    rows: Sequence[tuple[RowCell, ...]], ran: Side, comparison: Comparison
-) -> tuple[RowMatch, ...]:
-    """For each row the line that it stands in: with its numbers if it can be, else but for them."""
-    return _Rows(rows, ran, comparison).match()
-
-
-def rows_match(rows: Sequence[tuple[RowCell, ...]], ran: Side, comparison: Comparison) -> bool:
-    """Whether every row stands in a line, in order, with its numbers."""
-    return _Rows(rows, ran, comparison).all_match() is not None
-
-
 def compare_table(
     recording: Recording,
     table: Table,
@@ -122,7 +111,7 @@ def compare_table(
     changes: list[Change] = []
     lines: list[str] = []
     line_starts = ran.line_starts()
-    for found in match_rows(table_rows(table, filters), ran, comparison):
+    for found in TableMatcher(table_rows(table, filters), ran, comparison).match():
         differing = _row_changes(found, ran, comparison, line_starts)
         changes += differing
         if differing:
@@ -158,7 +147,7 @@ def _row_changes(
     return changes
 
 
-class _Rows:
+class TableMatcher:
     """Matches the rows of one table with the lines of one output."""
 
     def __init__(
@@ -167,32 +156,27 @@ class _Rows:
         self.rows = rows
         self.comparison = comparison
         self.lines = [plain(text) for text in ran.texts]
-        self._canons: list[Canon | None] = [None] * len(self.lines)
+        self.canon = cache(lambda line: canonical(self.lines[line]))
 
     def match(self) -> tuple[RowMatch, ...]:
+        """For each row its line: with its numbers if it can be, else but for them."""
         lines = self.all_match() or self._aligned()
         return tuple(self._row_match(row, line) for row, line in zip(self.rows, lines, strict=True))
 
-    def canon(self, line: int) -> Canon:
-        found = self._canons[line]
-        if found is None:
-            found = self._canons[line] = canonical(self.lines[line])
-        return found
-
-    def same(self, recorded: Number, ran: Number) -> bool:
+    def _same(self, recorded: Number, ran: Number) -> bool:
         return same_number(recorded, ran, self.comparison)
 
-    def stands(self, row: int, line: int, same: SameNumber) -> bool:
+    def _stands(self, row: int, line: int, same: SameNumber) -> bool:
         return _first_places(self.rows[row], self.canon(line), same) is not None
 
     def all_match(self) -> list[int] | None:
-        """A line for each row, if all of them match."""
+        """A line for each row, in order, if all of them match."""
         found: list[int] = []
         line = -1
         for row in range(len(self.rows)):
             if self.rows[row]:
                 below = range(line + 1, len(self.lines))
-                line = next((n for n in below if self.stands(row, n, self.same)), -1)
+                line = next((n for n in below if self._stands(row, n, self._same)), -1)
                 if line < 0:
                     return None
             found.append(line)
@@ -209,15 +193,15 @@ class _Rows:
     def _weight(self, row: int, line: int) -> int:
         if not self.rows[row]:
             return 0
-        if self.stands(row, line, self.same):
+        if self._stands(row, line, self._same):
             return MATCH
-        return _ALIKE if self.stands(row, line, any_number) else 0
+        return _ALIKE if self._stands(row, line, any_number) else 0
 
     def _row_match(self, row: tuple[RowCell, ...], line: int) -> RowMatch:
         if line < 0 or not row:
             return RowMatch(row, 0 if not row else -1, ())
         canon = self.canon(line)
-        places = _first_places(row, canon, self.same) or _nearest_places(row, canon, self.same)
+        places = _first_places(row, canon, self._same) or _nearest_places(row, canon, self._same)
         pairs = tuple(
             (cell, recorded, printed)
             for cell, place in zip(row, places, strict=True)

@@ -10,12 +10,12 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Divergence, Outcome, Sign
 from coursebuild.core.scripts.dependencies import Dependency, Inputs, Kind
-from coursebuild.core.scripts.remembered import BindingRecord, from_bytes, to_bytes
+from coursebuild.core.scripts.remembered import RunRecord, from_bytes, to_bytes
 
 HERE = (("course", "/home/me/course"), ("prefix", "/opt/venv"), ("home", "/home/me"))
 THERE = (("course", "/ci/build"), ("prefix", "/usr"), ("home", "/root"))
 INPUTS = Inputs("examples/a.py", "0" * 64, (), 10.0, (), (("Python", "3.11"),))
-RECORD = BindingRecord(INPUTS, (), Outcome.OK, 0, 0.25, 1_700_000_000, "", "out\n", "")
+RECORD = RunRecord(INPUTS, (), Outcome.OK, 0, 0.25, 1_700_000_000, "", "out\n", "")
 
 text = st.text(st.characters(codec="utf-8"), max_size=20)
 names = st.text(max_size=8)  # lone surrogates too: bytes of names that are no text
@@ -40,7 +40,7 @@ divergences = st.builds(
     st.lists(text, max_size=2).map(tuple),
 )
 records = st.builds(
-    BindingRecord,
+    RunRecord,
     inputs,
     st.lists(dependencies, max_size=3).map(tuple),
     st.sampled_from(Outcome),
@@ -55,7 +55,7 @@ records = st.builds(
 
 
 @given(records)
-def test_there_and_back(record: BindingRecord) -> None:
+def test_there_and_back(record: RunRecord) -> None:
     found = from_bytes(to_bytes(record, ()))
     assert found == record
 
