@@ -68,14 +68,6 @@ def test_axis_angle_and_rotation_vectors(rng: np.random.Generator) -> None:
         close(spatial.quat_to_rotvec(quat) / 0.01, rotvec, 4 / 0.01)
 
 
-def test_differences(rng: np.random.Generator) -> None:
-    res = np.zeros(3)
-    for a, b in zip(unit_quats(rng), unit_quats(rng), strict=True):
-        mujoco.mju_subQuat(res, a, b)
-        close(spatial.quat_sub(a, b), res, 8)
-        close(spatial.angular_distance(a, b), np.linalg.norm(res), 8)
-
-
 def test_integration(rng: np.random.Generator) -> None:
     for q, v in zip(unit_quats(rng), rng.normal(size=(COUNT, 3)), strict=True):
         for dt in (0.002, -1.0, 1e-9):
@@ -108,18 +100,6 @@ def test_poses(rng: np.random.Generator) -> None:
         rot, shift = spatial.pose_inverse(spatial.quat_to_mat(q1), p1)
         close(shift, pos, 8)
         same_rotation(spatial.mat_to_quat(rot), quat)
-
-
-def test_spatial_transforms(rng: np.random.Generator) -> None:
-    res = np.zeros(6)
-    for q, pos, vector in zip(
-        unit_quats(rng), rng.normal(size=(COUNT, 3)), rng.normal(size=(COUNT, 6)), strict=True
-    ):
-        rot = spatial.quat_to_mat(q)
-        # From about oldpos to about newpos, then into the axes of the new frame.
-        for is_force, transform in ((0, spatial.motion_transform), (1, spatial.force_transform)):
-            mujoco.mju_transformSpatial(res, vector, is_force, pos, np.zeros(3), rot.ravel())
-            close(transform(*spatial.pose_inverse(rot, pos)) @ vector, res, 40)
 
 
 def test_velocities_of_two_frames_of_one_body(rng: np.random.Generator) -> None:

@@ -79,19 +79,6 @@ def test_a_hole_is_a_part_of_negative_mass() -> None:
     np.testing.assert_allclose(inertia, parts[2], rtol=1e-13)
 
 
-def test_composition_over_leading_axes(rng: np.random.Generator) -> None:
-    masses = rng.uniform(1, 2, size=(4, 1, 3))
-    centres = rng.normal(size=(5, 3, 3))
-    tensors = np.broadcast_to(np.eye(3), (3, 3, 3))
-    mass, com, inertia = spatial.compose_inertia(masses, centres, tensors)
-    assert (mass.shape, com.shape, inertia.shape) == ((4, 5), (4, 5, 3), (4, 5, 3, 3))
-    for i, j in np.ndindex(4, 5):
-        one = spatial.compose_inertia(masses[i, 0], centres[j], tensors)
-        np.testing.assert_allclose(mass[i, j], one[0], rtol=1e-15)
-        np.testing.assert_allclose(com[i, j], one[1], rtol=0, atol=1e-15)
-        np.testing.assert_allclose(inertia[i, j], one[2], rtol=0, atol=1e-14)
-
-
 def test_composition_errors() -> None:
     eye = np.eye(3)
     with pytest.raises(ValueError, match=r"^mass must have shape \(\.\.\., n\), got \(\)$"):
@@ -140,17 +127,6 @@ def test_spatial_inertia_times_velocity_is_momentum() -> None:
     linear = mass * (move + np.cross(turn, com))
     np.testing.assert_allclose(momentum[3:], linear, rtol=1e-15)
     np.testing.assert_allclose(momentum[:3], tensor @ turn + np.cross(com, linear), rtol=1e-15)
-
-
-def test_spatial_inertias_add_as_bodies_compose(rng: np.random.Generator) -> None:
-    masses, centres = rng.uniform(0.1, 2, size=5), rng.normal(size=(5, 3))
-    tensors = spatial.inertia_from_principal(
-        rng.uniform(0.4, 0.6, size=(5, 3)), rng.normal(size=(5, 4))
-    )
-    whole = spatial.spatial_inertia(masses, centres, tensors).sum(axis=0)
-    got = spatial.split_spatial_inertia(whole)
-    for part, want in zip(got, spatial.compose_inertia(masses, centres, tensors), strict=True):
-        np.testing.assert_allclose(part, want, rtol=0, atol=2e-14)
 
 
 def test_transformed_spatial_inertia_is_that_of_the_moved_body() -> None:

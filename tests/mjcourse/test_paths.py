@@ -104,13 +104,6 @@ def test_a_models_folder_alone_is_no_course(tmp_path: Path) -> None:
     )
 
 
-def test_content_without_a_map_is_no_course(tmp_path: Path) -> None:
-    (tmp_path / "content" / "course.toml").mkdir(parents=True)
-    write(tmp_path / "models" / "box.xml")
-    with pytest.raises(ModelNotFoundError, match="no course for model 'box'"):
-        ask(tmp_path / "x.py")
-
-
 @pytest.mark.parametrize(
     ("name", "tail"),
     [
@@ -131,16 +124,6 @@ def test_a_missing_model_lists_near_names(course: Path, name: str, tail: str) ->
     with pytest.raises(ModelNotFoundError) as caught:
         ask(course / "examples" / "x.py", name)
     assert str(caught.value) == f"no model {name!r} in {course / 'models'}{tail}"
-
-
-def test_a_missing_model_lists_no_more_than_eight_names(course: Path) -> None:
-    for k in range(10):
-        write(course / "models" / f"scene_{k}.xml")
-    with pytest.raises(ModelNotFoundError) as caught:
-        ask(course / "examples" / "x.py", "quadruped")
-    assert str(caught.value).endswith(
-        "'pendulum', 'scene_0', 'scene_1', 'scene_2', 'scene_3' and 8 more"
-    )
 
 
 def test_a_course_without_models(course: Path) -> None:
@@ -299,18 +282,6 @@ def test_modules_code_and_prompts(course: Path, tmp_path: Path) -> None:
     assert run("-", cwd=course, code=ASK) == want
     after = run("-i", str(script), cwd=tmp_path, code="print(model_path('v1.2'))\n")
     assert str(course / "models" / "v1.2.xml") in after
-
-
-@pytest.mark.site
-def test_a_shell_inside_a_course_s_environment_works_on_the_current_folder(
-    course: Path, tmp_path: Path
-) -> None:
-    shell = course / ".venv" / "bin" / "shell"
-    other = tmp_path / "other"
-    write(other / "models" / "box.xml")
-    write(other / "examples" / "y.py")
-    code = f"import sys; sys.ps1 = '> '; sys.argv = [{str(shell)!r}]\n{ASK}"
-    assert run("-c", code, cwd=other / "examples") == str(other / "models" / "box.xml")
 
 
 @pytest.mark.site

@@ -6,27 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.model import Comparison, Mode, Recording, document_blocks
+from coursebuild.core.model import Comparison, Mode
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import diff_rows
-from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.text.source import Source
-
-EXACT = Comparison()
-SCRIPT = "```python file=examples/x.py\n0\n```\n\nOutput:\n\n"
+from support.sample_lessons import EXACT, recording, table
 
 
-def recording(body: str, how: str = "") -> Recording:
-    """The recorded output of a lesson."""
-    text = f"{SCRIPT}````text{how}\n{body}\n````\n"
-    parsed = parse_document(Source("content/lessons/1.1-x.md", text), frozenset(), lesson=True)
-    (found,) = (b for b in document_blocks(parsed.value) if isinstance(b, Recording))
-    return found
-
-
-def rows(recorded: str, ran: str, comparison: Comparison = EXACT, how: str = "") -> list[str]:
+def rows(recorded: str, ran: str, comparison: Comparison = EXACT) -> list[str]:
     """Each row as text; what changed in it stands in brackets."""
-    block = recording(recorded, how)
+    block = recording(recorded)
     verdict = compare(block, comparison, (), ran)
     return [
         row.mark + "".join(f"[{p.text}]" if p.changed else p.text for p in row.pieces)
@@ -60,9 +48,7 @@ def test_what_an_ellipsis_stands_for_is_not_shown() -> None:
 
 
 def test_of_a_table_the_cells_that_changed() -> None:
-    text = f"{SCRIPT}| n | x |\n| --- | --- |\n| 1 | 2.5 |\n"
-    parsed = parse_document(Source("content/lessons/1.1-x.md", text), frozenset(), lesson=True)
-    (block,) = (b for b in document_blocks(parsed.value) if isinstance(b, Recording))
+    block = table("| n | x |\n| --- | --- |\n| 1 | 2.5 |")
     verdict = compare(block, EXACT, (), "1 3.5\n")
     found = [(row.mark, row.pieces[0].text) for row in diff_rows(block, verdict, (), "1 3.5\n")]
     assert found == [("-", "2.5"), ("+", "3.5")]

@@ -5,7 +5,7 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
-from support.sample_lessons import course, document, ran, told
+from support.sample_lessons import DIGITS, course, document, ran, told
 
 LESSON = """\
 ```python file=examples/a.py
@@ -59,3 +59,45 @@ def test_lessons_lean_on_each_other() -> None:
     )
     runs = (ran("E 1.5"), ran("7\n", path="examples/b.py"))
     assert findings(*runs, lessons=(document(LESSON), other)) == ["binding-mismatch at 1:27 `1.6`"]
+
+
+def test_every_recording_gets_a_verdict() -> None:
+    text = """\
+```python file=examples/a.py
+1
+```
+
+Output:
+
+```text
+one
+```
+
+Output:
+
+```text volatile
+two
+```
+
+```python file=examples/b.py
+2
+```
+
+Output:
+
+```text digits
+1.5
+```
+"""
+    here = course(document(text))
+    runs = (ran("one\n"), ran("1.52\n", path="examples/b.py"))
+    assert [v.status for v in verify(here, runs)] == ["verified", "volatile", "verified"]
+    assert [v.status for v in verify(here, runs[:1])] == ["verified", "volatile", "unchecked"]
+    failed = (ran("one\n", outcome=Outcome.FAILED, status=1), ran("", path="examples/b.py"))
+    assert [v.status for v in verify(here, failed)] == ["unchecked"] * 3
+
+
+def test_the_course_s_comparison_is_the_default() -> None:
+    text = "```python file=examples/a.py\n1\n```\n\nOutput:\n\n```text\n1.5\n```\n"
+    (found,) = verify(course(document(text), comparison=DIGITS), (ran("1.52"),))
+    assert (found.status, found.comparison) == ("verified", DIGITS)
