@@ -61,11 +61,11 @@ class Step(Struct, frozen=True):
 
 def same_lines(recorded: Side, ran: Side, comparison: Comparison) -> bool:
     """Whether what ran is what was recorded."""
-    if recorded.texts == ran.texts:
+    if recorded.lines == ran.lines:
         return True
-    matcher, lines = LineMatcher(comparison), ran.texts
+    matcher, lines = LineMatcher(comparison), ran.lines
     blocks: list[list[str]] = [[]]
-    for line in recorded.texts:
+    for line in recorded.lines:
         if matcher.elides_lines(line):
             blocks.append([])
         else:
@@ -91,7 +91,7 @@ def same_lines(recorded: Side, ran: Side, comparison: Comparison) -> bool:
 
 def align(recorded: Side, ran: Side, matcher: LineMatcher) -> tuple[Step, ...]:
     """The steps that lead through both sides, in order."""
-    literal = [i for i, line in enumerate(recorded.lines) if not matcher.elides_lines(line.text)]
+    literal = [i for i, line in enumerate(recorded.lines) if not matcher.elides_lines(line)]
     pairs = _line_pairs(recorded, literal, ran, matcher)
     steps: list[Step] = []
     i = j = 0
@@ -99,7 +99,7 @@ def align(recorded: Side, ran: Side, matcher: LineMatcher) -> tuple[Step, ...]:
         stop = literal[literal_index] if literal_index < len(literal) else len(recorded.lines)
         steps += _gap(i, stop, j, ran_index, recorded, matcher)
         if stop < len(recorded.lines):
-            same = matcher.matches(recorded.lines[stop].text, ran.lines[ran_index].text)
+            same = matcher.matches(recorded.lines[stop], ran.lines[ran_index])
             steps.append(Step(StepKind.SAME if same else StepKind.DIFFERS, stop, ran_index))
         i, j = stop + 1, ran_index + 1
     return tuple(steps)
@@ -109,7 +109,7 @@ def _line_pairs(
     recorded: Side, literal: Sequence[int], ran: Side, matcher: LineMatcher
 ) -> list[tuple[int, int]]:
     """Pairs of recorded lines, as indices of `literal`, and lines that ran."""
-    lines, texts = [recorded.lines[i].text for i in literal], ran.texts
+    lines, texts = [recorded.lines[i] for i in literal], ran.lines
     # A `...` line stands just before line `k` of those that are none.
     following = [*literal, len(recorded.lines)]
     free = [before != after - 1 for before, after in zip([-1, *literal], following, strict=True)]
@@ -136,7 +136,7 @@ def _gap(
     i: int, i_stop: int, j: int, j_stop: int, recorded: Side, matcher: LineMatcher
 ) -> list[Step]:
     """The steps between two pairs: recorded lines `[i, i_stop)`, lines that ran `[j, j_stop)`."""
-    elliptic = [matcher.elides_lines(recorded.lines[k].text) for k in range(i, i_stop)]
+    elliptic = [matcher.elides_lines(recorded.lines[k]) for k in range(i, i_stop)]
     steps: list[Step] = []
     if any(elliptic):
         for k, elides in enumerate(elliptic, start=i):

@@ -43,7 +43,7 @@ class PrintedLine(Struct, frozen=True):
 
 def lines_of_run(stdout: str) -> tuple[PrintedLine, ...]:
     """The lines of an output that is not recorded."""
-    return tuple(map(PrintedLine.of, Side.of(stdout).texts))
+    return tuple(map(PrintedLine.of, Side.of(stdout).lines))
 
 
 def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
@@ -52,7 +52,7 @@ def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
         return tuple(_row_line(row) for row in table_rows(recording.body) if row)
     side = Side.of(recording.body.text)
     return tuple(
-        PrintedLine.of(line.text, _in_fence(recording.body, side, index))
+        PrintedLine.of(line, _in_fence(recording.body, side, index))
         for index, line in enumerate(side.lines)
     )
 

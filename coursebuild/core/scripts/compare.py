@@ -119,7 +119,7 @@ class _Changes(Struct, frozen=True):
 
     def _line(self, step: Step) -> Iterator[Change]:
         """The changes inside one line."""
-        recorded, ran = self.recorded.lines[step.recorded].text, self.ran.lines[step.ran].text
+        recorded, ran = self.recorded.lines[step.recorded], self.ran.lines[step.ran]
         for d in differences(recorded, ran, self.matcher):
             start, end = self.recorded.origin(step.recorded, d.start, d.end)
             ran_start, ran_end = self.ran.origin(step.ran, d.ran_start, d.ran_end)
@@ -133,12 +133,12 @@ class _Changes(Struct, frozen=True):
 
     def _missing(self, steps: Sequence[Step]) -> Change:
         start, _ = self.recorded.origin(steps[0].recorded, 0, 0)
-        text = "\n".join(self.recorded.lines[step.recorded].text for step in steps)
+        text = "\n".join(self.recorded.lines[step.recorded] for step in steps)
         span = self._span(start, self._end_of(steps[-1].recorded))
         return Change(DriftKind.MISSING, span, text, "", 0)
 
     def _extra(self, steps: Sequence[Step]) -> Change:
-        text = "\n".join(self.ran.lines[step.ran].text for step in steps)
+        text = "\n".join(self.ran.lines[step.ran] for step in steps)
         before, lines = steps[0].recorded, len(self.recorded.lines)
         place = self.recorded.origin(before, 0, 0)[0] if before < lines else self._end_of(lines - 1)
         ran_line = self.ran.raw_line(steps[0].ran, self.line_starts)
@@ -148,7 +148,7 @@ class _Changes(Struct, frozen=True):
         """Where a recorded line ends; 0 where none is recorded."""
         if line < 0:
             return 0
-        return self.recorded.origin(line, 0, len(self.recorded.lines[line].text))[1]
+        return self.recorded.origin(line, 0, len(self.recorded.lines[line]))[1]
 
     def _span(self, start: int, end: int) -> Span:
         if not self.body.text:

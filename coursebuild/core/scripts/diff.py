@@ -87,11 +87,11 @@ def _hunks(steps: Sequence[Step]) -> list[list[Step]]:
 def _rows(step: Step, recorded: Side, ran: Side) -> Iterator[DiffRow]:
     """The rows of a step: one for a line on either side, none for what an ellipsis stands for."""
     if step.kind is StepKind.SAME:
-        yield _row(" ", recorded.lines[step.recorded].text)
+        yield _row(" ", recorded.lines[step.recorded])
     if step.kind in (StepKind.DIFFERS, StepKind.MISSING):
-        yield _row("-", recorded.lines[step.recorded].text)
+        yield _row("-", recorded.lines[step.recorded])
     if step.kind in (StepKind.DIFFERS, StepKind.EXTRA):
-        yield _row("+", ran.lines[step.ran].text)
+        yield _row("+", ran.lines[step.ran])
 
 
 def _row(mark: Mark, text: str) -> DiffRow:
@@ -142,7 +142,7 @@ def _page_rows(step: Step, recorded: Side, ran: Side, matcher: LineMatcher) -> I
     if step.kind in (StepKind.SAME, StepKind.ELLIPSIS):
         yield from (_row(" ", text) for text in recorded.raw_lines(step.recorded))
     elif step.kind is StepKind.DIFFERS:
-        one, two = recorded.lines[step.recorded].text, ran.lines[step.ran].text
+        one, two = recorded.lines[step.recorded], ran.lines[step.ran]
         found = differences(one, two, matcher)
         yield DiffRow("-", _pieces(one, [(d.start, d.end) for d in found]))
         yield DiffRow("+", _pieces(two, [(d.ran_start, d.ran_end) for d in found]))

@@ -70,9 +70,9 @@ def updated_body(
         return updated_table(recording, recording.body, comparison, filters, first, second)
     body = recording.body
     if comparison.mode is Mode.VOLATILE:
-        if Side.of(body.text).texts == Side.of(first).texts:
+        if Side.of(body.text).lines == Side.of(first).lines:
             return None
-        return _fence_edit(recording, list(Side.of(first).texts))
+        return _fence_edit(recording, list(Side.of(first).lines))
     recorded, ran, again = (Side.of(text, filters) for text in (body.text, first, second))
     lines: list[str] | Diagnostic
     if same_lines(recorded, ran, comparison):
@@ -104,7 +104,7 @@ def _new_lines(
     filters: tuple[Filter, ...],
 ) -> list[str] | Diagnostic:
     """The lines to record; they match the run."""
-    printed = list(Side.of(ran.raw).texts)
+    printed = list(Side.of(ran.raw).lines)
     tries: list[list[str]] = []
     if filters or comparison.ellipsis:
         kept = _Kept(body, recorded, ran, LineMatcher(comparison)).lines()
@@ -146,7 +146,7 @@ class _Kept:
                     return self.recorded.raw_lines(step.recorded)
                 return self.ran.raw_lines(step.ran)
             case StepKind.DIFFERS:
-                if self.matcher.elides(self.recorded.lines[step.recorded].text):
+                if self.matcher.elides(self.recorded.lines[step.recorded]):
                     return self._with_numbers(step)
                 return self.ran.raw_lines(step.ran)
             case StepKind.MISSING:
@@ -162,17 +162,17 @@ class _Kept:
 
     def _on_purpose(self, step: Step) -> bool:
         """Whether a line that matches does so by an ellipsis or a filter."""
-        text = self.recorded.lines[step.recorded].text
+        text = self.recorded.lines[step.recorded]
         return (
             self.matcher.elides(text)
             or self.recorded.raw_lines(step.recorded) != (text,)
-            or self.ran.raw_lines(step.ran) != (self.ran.lines[step.ran].text,)
+            or self.ran.raw_lines(step.ran) != (self.ran.lines[step.ran],)
         )
 
     def _with_numbers(self, step: Step) -> Iterable[str] | Diagnostic:
         """A line with `...` that fits but for its numbers, with the numbers of the run."""
-        text = self.recorded.lines[step.recorded].text
-        pairs = self.matcher.pairs(text, self.ran.lines[step.ran].text)
+        text = self.recorded.lines[step.recorded]
+        pairs = self.matcher.pairs(text, self.ran.lines[step.ran])
         if pairs is None or self.recorded.raw_lines(step.recorded) != (text,):
             return self._lost(step.recorded, "this line no longer fits what the script prints")
         parts: list[str] = []
@@ -184,7 +184,7 @@ class _Kept:
         return ("".join((*parts, text[at:])),)
 
     def _lost(self, line: int, label: str) -> Diagnostic:
-        start, end = self.recorded.origin(line, 0, len(self.recorded.lines[line].text))
+        start, end = self.recorded.origin(line, 0, len(self.recorded.lines[line]))
         return refused(
             self.body.span(start, end),
             f"an output with `{ELLIPSIS}` cannot be brought up to date here",

@@ -16,6 +16,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from itertools import accumulate
 
 from msgspec import Struct
 
@@ -143,42 +144,31 @@ def plain(text: str) -> str:
     return " ".join(text.replace("\u2212", "-").split())
 
 
-class Line(Struct, frozen=True):
-    """A line: its text without trailing white space, and where it begins in its side's text."""
-
-    at: int
-    text: str
-
-
 class Side(Struct, frozen=True):
     """One side of a comparison."""
 
     raw: str
     """Before the filters, its line ends as they came."""
     mapped: MappedText
-    lines: tuple[Line, ...]
+    lines: tuple[str, ...]
+    """Without trailing white space."""
+    starts: tuple[int, ...]
+    """Where the lines begin in the mapped text."""
 
     @classmethod
     def of(cls, text: str, filters: Iterable[Filter] = ()) -> Side:
         """The lines of a text after the filters."""
         mapped = filtered(MappedText.of_output(text), filters)
-        lines: list[Line] = []
-        at = 0
-        for line in mapped.text.split("\n"):
-            lines.append(Line(at, line.rstrip()))
-            at += len(line) + 1
-        while lines and not lines[-1].text:
+        parts = mapped.text.split("\n")
+        starts = accumulate((len(part) + 1 for part in parts), initial=0)
+        lines = [part.rstrip() for part in parts]
+        while lines and not lines[-1]:
             lines.pop()
-        return cls(text, mapped, tuple(lines))
-
-    @property
-    def texts(self) -> tuple[str, ...]:
-        """The lines' texts."""
-        return tuple(line.text for line in self.lines)
+        return cls(text, mapped, tuple(lines), tuple(starts))
 
     def origin(self, line: int, start: int, end: int) -> tuple[int, int]:
         """Where `lines[line].text[start:end]` stands in the raw text."""
-        at = self.lines[line].at
+        at = self.starts[line]
         return self.mapped.origin(at + start, at + end)
 
     def line_starts(self) -> list[int]:

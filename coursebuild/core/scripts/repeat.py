@@ -125,12 +125,12 @@ def _difference(step: Step, first: Side, second: Side, line_starts: list[int]) -
     match step.kind:
         case StepKind.DIFFERS:
             number = second.raw_line(step.ran, line_starts)
-            a, b = first.lines[step.recorded].text, second.lines[step.ran].text
+            a, b = first.lines[step.recorded], second.lines[step.ran]
             return f"line {number}: {_quoted(a)} in one run, {_quoted(b)} in the next"
         case StepKind.MISSING:
-            return f"{_quoted(first.lines[step.recorded].text)} was printed in the first run only"
+            return f"{_quoted(first.lines[step.recorded])} was printed in the first run only"
         case StepKind.EXTRA:
-            return f"{_quoted(second.lines[step.ran].text)} was printed in the second run only"
+            return f"{_quoted(second.lines[step.ran])} was printed in the second run only"
         case StepKind.SAME | StepKind.ELLIPSIS | StepKind.ELIDED:
             return ""
 

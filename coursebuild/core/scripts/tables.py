@@ -117,7 +117,7 @@ def compare_table(
         if differing:
             lines.append("-" + shortened(_row_text(found.row), _WIDTH))
             if found.line >= 0:
-                lines.append("+" + shortened(plain(ran.lines[found.line].text), _WIDTH))
+                lines.append("+" + shortened(plain(ran.lines[found.line]), _WIDTH))
     if not changes:
         return Verdict(recording, comparison, "verified")
     if len(lines) > _LINES:
@@ -155,7 +155,7 @@ class TableMatcher:
     ) -> None:
         self.rows = rows
         self.comparison = comparison
-        self.lines = [plain(text) for text in ran.texts]
+        self.lines = [plain(text) for text in ran.lines]
         self.canon = cache(lambda line: canonical(self.lines[line]))
 
     def match(self) -> tuple[RowMatch, ...]:
