@@ -14,7 +14,6 @@ Entry points: `failure` (a run), `silence` (an output is recorded and nothing wa
 from __future__ import annotations
 
 import re
-import signal
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import assert_never
@@ -35,6 +34,10 @@ _CRASH = "Current thread "
 _ABORTED = "Fatal Python error: Aborted\n\n"
 """What Python says when it is asked, at the end of its time, where it is."""
 _LIBRARIES = ("site-packages", "dist-packages")
+
+_FIRST_SIGNALS = "HUP INT QUIT ILL TRAP ABRT BUS FPE KILL USR1 SEGV USR2 PIPE ALRM TERM"
+_SIGNALS = {**dict(enumerate(_FIRST_SIGNALS.split(), 1)), 24: "XCPU", 25: "XFSZ", 31: "SYS"}
+"""As Linux numbers them (signal(7))."""
 
 _TAIL_LINES = 30
 _TAIL_CHARACTERS = 4000
@@ -140,10 +143,7 @@ def silence(recording: Recording, path: str) -> Diagnostic:
 
 
 def _signal_name(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
+    return f"SIG{_SIGNALS[number]}" if number in _SIGNALS else f"signal {number}"
 
 
 def _parses(extraction: Extraction) -> bool:
