@@ -49,7 +49,7 @@ def lines_of_run(stdout: str) -> tuple[PrintedLine, ...]:
 def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
     """The lines of a recorded output, as the author sees them: no filter is applied."""
     if isinstance(recording.body, Table):
-        return tuple(_row_line(row) for row in table_rows(recording.body) if row)
+        return tuple(map(_row_line, table_rows(recording.body)))
     side = Side.of(recording.body.text)
     return tuple(
         PrintedLine.of(line, _in_fence(recording.body, side, index))

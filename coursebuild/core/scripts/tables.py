@@ -78,7 +78,8 @@ class RowCell(Struct, frozen=True):
 class RowMatch(Struct, frozen=True):
     """A row of a table and the line that it stands in; `line` is -1 where there is none.
 
-    `pairs` are the numbers of the row, each with its cell and the printed one.
+    Where its numbers are not all those of the line, `pairs` are the numbers of the row, each with
+    its cell and the printed one.
     """
 
     row: tuple[RowCell, ...]
@@ -87,17 +88,14 @@ class RowMatch(Struct, frozen=True):
 
 
 def table_rows(table: Table, filters: Iterable[Filter] = ()) -> tuple[tuple[RowCell, ...], ...]:
-    """The body rows of a table; cells without text are left out."""
+    """The body rows of a table; cells and rows without text are left out."""
     rules = tuple(filters)
-    rows = []
-    for row in table.rows:
-        cells = []
-        for cell in row:
-            mapped = cell_text(cell, rules)
-            if mapped.text:
-                cells.append(RowCell(cell, mapped, canonical(mapped.text)))
-        rows.append(tuple(cells))
-    return tuple(rows)
+    texts = ([(cell, cell_text(cell, rules)) for cell in row] for row in table.rows)
+    rows = (
+        tuple(RowCell(cell, mapped, canonical(mapped.text)) for cell, mapped in row if mapped.text)
+        for row in texts
+    )
+    return tuple(row for row in rows if row)
 
 
 def compare_table(
@@ -163,24 +161,21 @@ class TableMatcher:
         lines = self.all_match() or self._aligned()
         return tuple(self._row_match(row, line) for row, line in zip(self.rows, lines, strict=True))
 
-    def _same(self, recorded: Number, ran: Number) -> bool:
-        return same_number(recorded, ran, self.comparison)
-
-    def _stands(self, row: int, line: int, same: SameNumber) -> bool:
-        return _first_places(self.rows[row], self.canon(line), same) is not None
-
     def all_match(self) -> list[int] | None:
         """A line for each row, in order, if all of them match."""
         found: list[int] = []
-        line = -1
-        for row in range(len(self.rows)):
-            if self.rows[row]:
-                below = range(line + 1, len(self.lines))
-                line = next((n for n in below if self._stands(row, n, self._same)), -1)
-                if line < 0:
-                    return None
+        below = 0
+        for row in self.rows:
+            lines = range(below, len(self.lines))
+            line = next((n for n in lines if _stands(row, self.canon(n), self._same)), None)
+            if line is None:
+                return None
             found.append(line)
+            below = line + 1
         return found
+
+    def _same(self, recorded: Number, ran: Number) -> bool:
+        return same_number(recorded, ran, self.comparison)
 
     def _aligned(self) -> list[int]:
         """A line for each row that stands in one but for its numbers; -1 for the others."""
@@ -191,17 +186,15 @@ class TableMatcher:
         return found
 
     def _weight(self, row: int, line: int) -> int:
-        if not self.rows[row]:
-            return 0
-        if self._stands(row, line, self._same):
+        if _stands(self.rows[row], self.canon(line), self._same):
             return MATCH
-        return _ALIKE if self._stands(row, line, any_number) else 0
+        return _ALIKE if _stands(self.rows[row], self.canon(line), any_number) else 0
 
     def _row_match(self, row: tuple[RowCell, ...], line: int) -> RowMatch:
-        if line < 0 or not row:
-            return RowMatch(row, 0 if not row else -1, ())
+        if line < 0 or _stands(row, self.canon(line), self._same):
+            return RowMatch(row, line, ())
         canon = self.canon(line)
-        places = _first_places(row, canon, self._same) or _nearest_places(row, canon, self._same)
+        places = _nearest_places(row, canon, self._same)
         pairs = tuple(
             (cell, recorded, printed)
             for cell, place in zip(row, places, strict=True)
@@ -230,17 +223,15 @@ def _places(cell: Canon, line: Canon, start: int, same: SameNumber) -> Iterator[
         place = text.find(wanted, place + 1)
 
 
-def _first_places(row: Sequence[RowCell], line: Canon, same: SameNumber) -> list[int] | None:
-    """Places of the cells in order, each the first after the one before."""
-    found: list[int] = []
+def _stands(row: Sequence[RowCell], line: Canon, same: SameNumber) -> bool:
+    """Whether the cells stand in a line in order, each at its first place after the one before."""
     at = 0
     for cell in row:
-        place = next(_places(cell.canon, line, at, same), -1)
-        if place < 0:
-            return None
-        found.append(place)
+        place = next(_places(cell.canon, line, at, same), None)
+        if place is None:
+            return False
         at = place + len(cell.canon.skeleton)
-    return found
+    return True
 
 
 def _nearest_places(row: Sequence[RowCell], line: Canon, same: SameNumber) -> list[int]:
@@ -248,15 +239,15 @@ def _nearest_places(row: Sequence[RowCell], line: Canon, same: SameNumber) -> li
 
     The row is known to stand in the line but for its numbers.
     """
+    # For each place of the last cell: the cost so far, the places, the offset where it ends.
     best: list[tuple[float, list[int], int]] = [(0.0, [], 0)]
-    """For each place of the last cell: the cost so far, the places, the offset where it ends."""
     for cell in row:
         extended: list[tuple[float, list[int], int]] = []
         start = min(end for _, _, end in best)
         for place in islice(_places(cell.canon, line, start, any_number), _PLACES):
-            fits = [way for way in best if way[2] <= place]
-            if fits:
-                cost, places, _ = min(fits, key=lambda way: way[0])
+            before = [way for way in best if way[2] <= place]
+            if before:
+                cost, places, _ = min(before, key=lambda way: way[0])
                 total = cost + _cost(cell.canon, line, place, same)
                 end = place + len(cell.canon.skeleton)
                 extended.append((total, [*places, place], end))
