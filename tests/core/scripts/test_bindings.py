@@ -178,29 +178,6 @@ def test_what_is_most_probably_meant(
     assert found.help == help_text
 
 
-def test_what_is_said() -> None:
-    found = one("`+6.7 %`{out}")
-    assert found is not None
-    assert (
-        told(found)
-        == """\
-binding-mismatch at 18:8 `+6.7 %`
-  `+6.7 %` is not what `examples/a.py` printed, rounded to the digits shown
-  ^ the nearest printed value is +6.641
-  help: write `+6.6 %`, if that is what is meant"""
-    )
-    found = one("`midpoint`{out}")
-    assert found is not None
-    assert (
-        told(found)
-        == """\
-binding-mismatch at 18:8 `midpoint`
-  `midpoint` does not stand in the output of `examples/a.py`
-  help: write it as it is printed, or take `{out}` away"""
-    )
-    assert (one("`1.5`{out}", "no number here\n") or found).label == "no number was printed"
-
-
 def test_text_beside_the_number_chooses() -> None:
     printed = "E 6.0 J\nP 6.04 W\nv=6.1 m/s\n"
     assert one("`6.0`{out}", printed) is None
@@ -256,20 +233,6 @@ binding-orphan at 21:2 `1.5`
   `1.5` is bound to `examples/c.py`, which has no recorded output and is not run
   help: record its output below it"""
     )
-
-
-def test_volatile_outputs_bear_nothing() -> None:
-    text = script() + output("took 1.5 s\n", "volatile") + "\n`1.5 s`{out}\n"
-    (found,) = check(text, ran("took 1.5 s\n"))
-    assert (
-        told(found)
-        == """\
-binding-volatile at 11:2 `1.5 s`
-  `1.5 s` is bound to an output that differs by machine
-  help: take `{out}` away, or compare the output by another key than `volatile`"""
-    )
-    both = script() + output("x 2.5\n") + output("took 1.5 s\n", "volatile")
-    assert check(both + "\n`2.5`{out=examples/a.py}\n", ran("x 2.5\ntook 1.5 s\n")) == ()
 
 
 @pytest.mark.parametrize(

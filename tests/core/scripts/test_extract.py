@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -38,17 +37,6 @@ def test_scripts_become_files() -> None:
         ScriptJob("examples/b/c.py", (), 60.0, (), True),
     )
     assert c.text == "pass\n"
-
-
-@pytest.mark.parametrize("eol", ["\n", "\r\n"])
-def test_line_ends_are_lf_and_lines_are_known(eol: str) -> None:
-    text = f"intro{eol}> ```python file=examples/a.py{eol}> one{eol}>{eol}>   three{eol}> ```{eol}"
-    (found,) = extract(course(*lessons(text, prefix="> "))).value
-    assert found.text == "one\n\n  three\n"
-    spans = [found.line_span(line) for line in range(5)]
-    assert [span and (span.line, span.text) for span in spans] == [
-        None, (3, "one"), (4, ""), (5, "  three"), None,
-    ]  # fmt: skip
 
 
 @given(

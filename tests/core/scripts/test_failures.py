@@ -70,31 +70,6 @@ script-failed at 7:5 `helper.fall()`
     )
 
 
-def test_a_traceback_that_ends_in_a_sibling_example() -> None:
-    stderr = (
-        "Traceback (most recent call last):\n"
-        '  File "C:\\course\\examples\\a.py", line 5, in <module>\n    go()\n'
-        '  File "C:\\course\\examples\\helper.py", line 2, in fall\n    raise ValueError\n'
-        "ValueError\n"
-    )
-    assert (
-        said(stderr)
-        == """\
-content/lessons/1.1-first.md
-script-failed at 5:7 `raise ValueError`
-  `examples/a.py` exited with status 1
-  ^ ValueError
-  note at 3:1 ````python file=examples/a.py timeout=2.5`: `examples/a.py` was running
-  note: its standard error:
-    Traceback (most recent call last):
-      File "content/lessons/4.2-mass.md", line 8, in <module>
-        go()
-      File "content/lessons/1.1-first.md", line 5, in fall
-        raise ValueError
-    ValueError"""
-    )
-
-
 def test_an_exception_group_ends_with_its_last_exception() -> None:
     stderr = (
         "  + Exception Group Traceback (most recent call last):\n"

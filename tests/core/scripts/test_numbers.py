@@ -158,19 +158,6 @@ def test_rounding_in_the_notation_of_another_number(
     assert round_like(scan(written)[0], Decimal(value)) == expected
 
 
-@given(
-    st.decimals(
-        allow_nan=False, allow_infinity=False, places=4, min_value=-(10**6), max_value=10**6
-    ),
-    st.integers(0, 4),
-)
-def test_a_rounded_number_shows_its_value(value: Decimal, places: int) -> None:
-    (pattern,) = scan(f"{1:.{places}f}")
-    rounded = round_like(pattern, value)
-    assert rounded is not None
-    assert within_half_unit(scan(rounded)[0], value)
-
-
 @given(st.text())
 def test_scanning_never_fails_and_spans_slice_back(text: str) -> None:
     end = 0

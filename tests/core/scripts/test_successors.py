@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.binding_memory import BindingHistory
 from coursebuild.core.scripts.bindings import Printed, check_bindings
 from coursebuild.core.scripts.compare import verify
@@ -211,24 +211,6 @@ def test_an_output_that_is_not_recorded_has_places_too() -> None:
     assert look(held, text, ran("x 7.52\ny 1\n")) == ()
     (found,) = look(held, text, ran("x 9.52\ny 7.6\n"))
     assert (found.label, found.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
-
-
-def test_a_script_that_fails_in_between_takes_nothing_away() -> None:
-    held, now = BindingHistory(), "period 2.950 s\nhalf 1.975 s\n"
-    assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
-    failed = ran(outcome=Outcome.FAILED, status=1)
-    assert look(held, lesson("`2.006`{out}", PENDULUM), failed) == ()
-    (found,) = look(held, lesson("`2.006`{out}", now), ran(now))
-    assert found.help == "write `2.950`"
-    # It is the same as long as the number stands there, whatever is recorded next.
-    later = "period 5.000 s\nhalf 2.005 s\n"
-    (found,) = look(held, lesson("`2.006`{out}", later), ran(later))
-    assert (found.label, found.help) == ("5.000 is printed where 2.006 was", "write `5.000`")
-    # As it was before it was, the one that held last counts.
-    assert look(held, lesson("`2.006`{out}", "half 2.006 s\n"), ran(PENDULUM)) == ()
-    assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
-    (found,) = look(held, lesson("`2.006`{out}", later), ran(later))
-    assert found.help == "write `5.000`"
 
 
 def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
