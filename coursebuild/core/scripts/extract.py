@@ -76,7 +76,8 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
             clash = _clash(extraction, files, folders)
             if clash is None:
                 files[key] = extraction
-                folders |= dict.fromkeys(_folders(key), extraction)
+                for folder in _folders(key):
+                    folders.setdefault(folder, extraction)
                 kept.append(extraction)
             else:
                 found.append(clash)
