@@ -68,14 +68,10 @@ def _hunks(steps: Sequence[Step]) -> list[list[Step]]:
         if step.kind in _CHANGED:
             shown.add(index)
             for way in (-1, 1):
-                near = index + way
-                while (
-                    0 <= near < len(steps)
-                    and abs(near - index) <= _CONTEXT
-                    and steps[near].kind is StepKind.SAME
-                ):
+                for near in range(index + way, index + way * (_CONTEXT + 1), way):
+                    if not 0 <= near < len(steps) or steps[near].kind is not StepKind.SAME:
+                        break
                     shown.add(near)
-                    near += way
     hunks: list[list[Step]] = []
     for index in sorted(shown):
         if index - 1 not in shown:
