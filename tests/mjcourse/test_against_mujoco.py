@@ -184,23 +184,3 @@ def test_inertia_of_a_composed_body(rng: np.random.Generator) -> None:
         moments, _ = spatial.principal_axes(inertia)
         np.testing.assert_allclose(moments, np.sort(model.body_inertia[1]), rtol=1e-12)
         assert spatial.is_physical_inertia(inertia)
-
-
-def test_spatial_inertia_is_the_mass_matrix_of_a_free_body(rng: np.random.Generator) -> None:
-    model = compiled(
-        geom("box", 2.0, np.array([0.3, 0.2, 0.1]), rng.normal(size=3), unit_quats(rng, 1)[0]),
-        geom("capsule", 1.0, np.array([0.1, 0.3]), rng.normal(size=3), unit_quats(rng, 1)[0]),
-    )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    columns = np.zeros((6, 6))
-    for k in range(6):
-        mujoco.mj_mulM(model, data, columns[k], np.eye(6)[k])
-    ours = spatial.spatial_inertia(
-        model.body_mass[1],
-        model.body_ipos[1],
-        spatial.inertia_from_principal(model.body_inertia[1], model.body_iquat[1]),
-    )
-    # A free joint has its linear velocity first, in the world's axes: here the body's.
-    order = [3, 4, 5, 0, 1, 2]
-    np.testing.assert_allclose(ours[np.ix_(order, order)], columns, rtol=0, atol=2e-14)

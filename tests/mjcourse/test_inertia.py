@@ -127,12 +127,3 @@ def test_spatial_inertia_times_velocity_is_momentum() -> None:
     linear = mass * (move + np.cross(turn, com))
     np.testing.assert_allclose(momentum[3:], linear, rtol=1e-15)
     np.testing.assert_allclose(momentum[:3], tensor @ turn + np.cross(com, linear), rtol=1e-15)
-
-
-def test_transformed_spatial_inertia_is_that_of_the_moved_body() -> None:
-    mass, com, tensor = 2.0, np.array([0.5, -1.0, 2.0]), np.diag([1.0, 2.0, 2.5])
-    rot, pos = spatial.exp_so3([0.3, 2.0, -1.0]), np.array([3.0, -2.0, 0.7])
-    got = spatial.transform_spatial_inertia(spatial.spatial_inertia(mass, com, tensor), rot, pos)
-    want = spatial.spatial_inertia(mass, rot @ com + pos, spatial.rotate_inertia(tensor, rot))
-    np.testing.assert_allclose(got, want, rtol=0, atol=2e-14)
-    assert (got == got.T).all()

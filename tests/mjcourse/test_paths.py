@@ -1,10 +1,8 @@
-import concurrent.futures
 import multiprocessing
 import os
 import pickle
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -85,12 +83,6 @@ def test_a_downloaded_course_has_no_content(tmp_path: Path) -> None:
     script = write(root / "examples" / "x.py")
     assert ask(script) == root / "models" / "box.xml"
     assert ask(root / "my_own.py") == root / "models" / "box.xml"
-
-
-def test_a_map_further_up_wins_over_a_download(course: Path) -> None:
-    write(course / "public" / "models" / "box.xml")
-    script = write(course / "public" / "examples" / "x.py")
-    assert ask(script) == course / "models" / "box.xml"
 
 
 def test_a_models_folder_alone_is_no_course(tmp_path: Path) -> None:
@@ -214,22 +206,6 @@ def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path:
     }
     exec("found = load()", script)
     assert script["found"] == course / "models" / "box.xml"
-
-
-def test_threads_and_pools_of_the_script(course: Path) -> None:
-    scope: dict[str, object] = {"__name__": "__main__", "__file__": str(course / "x.py")}
-    exec("from mjcourse import model_path\ndef load(name): return model_path(name)", scope)
-    load = scope["load"]
-    assert callable(load)
-    found: list[object] = []
-    threads = [threading.Thread(target=lambda: found.append(load("box"))) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        found += pool.map(load, ["box"] * 8)
-    assert found == [course / "models" / "box.xml"] * 16
 
 
 SCRIPT = """

@@ -107,15 +107,6 @@ def test_signs_of_the_axes_do_not_hang_on_rounding() -> None:
         np.testing.assert_allclose(axes[:, 2], [0, 0, -1], atol=1e-14)
 
 
-def test_a_batch_is_as_good_as_one_by_one() -> None:
-    tensors = np.array([*random_tensors(), *nearly_equal()]).reshape(2, -1, 3, 3)
-    moments, axes = spatial.principal_axes(tensors)
-    for index in np.ndindex(tensors.shape[:2]):
-        one_moments, one_axes = spatial.principal_axes(tensors[index])
-        assert (moments[index] == one_moments).all()
-        assert (axes[index] == one_axes).all()
-
-
 def test_nan_stays_in_its_entry() -> None:
     tensors = np.array([np.eye(3), np.full((3, 3), np.nan), np.diag([1, np.inf, 1])])
     tensors[2, 0, 1] = np.nan
