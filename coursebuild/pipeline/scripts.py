@@ -19,8 +19,8 @@ from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.scripts.dependencies import Inputs
-from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
+from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
