@@ -153,8 +153,9 @@ def sort_terms(plan: IndexPlan, pages: Iterable[bytes]) -> list[bytes]:
     """
     having: defaultdict[str, str] = defaultdict(str)
     for number, data in enumerate(pages):
+        digit = f"{number:x}"
         for line in data.decode().split("\n") if data else ():
-            having[line[1:]] += f"{number:x}{line[0]}"
+            having[line[1:]] += digit + line[0]
     found: list[list[str]] = [[] for _ in range(plan.terms + plan.words)]
     for term in sorted(having):
         first, *others = plan.places(term)

@@ -27,6 +27,11 @@ _LEADS = frozenset({"level", "stub"})
 """Kinds of pages of which the title and the summary count: the rest is of other pages."""
 _TITLE, _HEADING, _TEXT, _CODE = 3, 2, 1, 0
 """Where a term stands, by weight."""
+_WEIGHTS = tuple(
+    tuple(f"{field << 2 | often:x}" for often in (0, 0, 1, 1, 2, 2, 2, 2, 2, 2, 3))
+    for field in range(4)
+)
+"""The digit of a term by its field and how often it occurs; see `terms`."""
 _FIELDS = {"text": _TEXT, "formula": _TEXT, "code": _CODE, "output": _CODE}
 
 
@@ -110,9 +115,5 @@ def terms(titles: list[str], sections: Iterable[Section]) -> bytes:
         for term, count in count_terms("\n".join(texts)).items():
             times[term] = times.get(term, 0) + count
             best[term] = field
-    lines = [f"{best[term] << 2 | _often(times[term]):x}{term}" for term in sorted(times)]
+    lines = [_WEIGHTS[best[term]][min(times[term], 10)] + term for term in sorted(times)]
     return "\n".join(lines).encode("utf-8", "replace")
-
-
-def _often(times: int) -> int:
-    return 0 if times == 1 else 1 if times < 4 else 2 if times < 10 else 3
