@@ -121,19 +121,20 @@ def _serve(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(parser: argparse.ArgumentParser) -> None:
+    from coursebuild.core.features import features
+
     _running(parser)
+    known = [exporter for feature in features() for exporter in feature.exporters]
+    offers = ", ".join(f"{one.name} ({one.summary})" for one in known)
+    files = ", ".join(one.file for one in known)
     parser.add_argument(
-        "kind",
-        choices=("epub", "page", "qti", "scorm"),
-        help="the lessons as an e-book (EPUB 3) or on one page, the quizzes as IMS QTI 2.1,"
-        " or the course as SCORM 1.2",
+        "name", metavar="NAME", help=f"{offers}, or what a feature of the course itself can write"
     )
     parser.add_argument(
         "--out",
         default=None,
         metavar="FILE",
-        help="from the course's folder (default: course.epub, course.html, quizzes-qti.zip,"
-        " course-scorm.zip)",
+        help=f"from the course's folder (default: {files})",
     )
 
 
@@ -209,7 +210,7 @@ _COMMANDS = (
     ("serve", "preview: build, serve, rebuild and reload on change", serve_command, _serve),
     (
         "export",
-        "verify everything and write the course, or its quizzes, as one file",
+        "verify everything and write the course as one file",
         export_command,
         _export,
     ),

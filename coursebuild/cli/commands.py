@@ -150,14 +150,14 @@ def extract_command(arguments: argparse.Namespace) -> int:
 
 
 def export_command(arguments: argparse.Namespace) -> int:
-    """Write the course, or its quizzes, as one file."""
+    """Write the course as one file."""
     from pathlib import Path
 
-    from coursebuild.pipeline.export import NAMES, export
+    from coursebuild.pipeline.export import export
 
     options = options_of(arguments)
-    out = Path(arguments.out or NAMES[arguments.kind])
-    return print_report(export(options, arguments.kind, out), "text", options)
+    out = Path(arguments.out) if arguments.out else None
+    return print_report(export(options, arguments.name, out), "text", options)
 
 
 def serve_command(arguments: argparse.Namespace) -> int:

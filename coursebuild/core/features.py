@@ -1,7 +1,8 @@
-"""The interface of features: how kinds of fences and of pages, and files of a site, enter the tool.
+"""The interface of features: how kinds of fences and pages, files of a site and exports enter.
 
-Entry points: `Feature`, with `FenceKind`, `PageKind` and `PagePart`, which says what a feature has;
-`features()`, those that there are; `fence_kind`, `kind_of_block` and `page_kind`, which find one.
+Entry points: `Feature`, with `FenceKind`, `PageKind`, `PagePart` and `Exporter`, which say what a
+feature has; `features()`, those that there are; `fence_kind`, `kind_of_block`, `page_kind` and
+`find_exporter`, which find one.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
@@ -37,6 +38,7 @@ if TYPE_CHECKING:  # the layers above, of which a feature's functions take value
     from coursebuild.core.model.results import FileList, SiteFile
     from coursebuild.core.pages.added_files import SiteContext
     from coursebuild.core.pages.context import PageContext
+    from coursebuild.core.pages.exports.context import ExportContext
     from coursebuild.core.pages.exports.plain import Plain
     from coursebuild.core.pages.library import Library
     from coursebuild.core.pages.page_inputs import PageInputs
@@ -128,10 +130,29 @@ class PagePart(Struct, frozen=True, kw_only=True):
     """
 
 
+class Exporter(Struct, frozen=True, kw_only=True):
+    """What `coursebuild export NAME` writes: a course in which nothing is wrong, as one file."""
+
+    name: str
+    summary: str
+    """What it writes, in a few words for `coursebuild export --help`."""
+    file: str
+    """What the file is called where the command does not say."""
+    mark: str
+    """How the file of an earlier export is known, which may be replaced: a path in the archive, or
+    a text near the beginning of a single file."""
+    make: Callable[[ExportContext], Iterable[SiteFile | Diagnostic]]
+    """The files of the archive, and warnings of what it cannot hold."""
+    archive: bool = True
+    """Whether it is a ZIP archive; if not, `make` gives one file."""
+
+
 class Feature(Struct, frozen=True, kw_only=True):
     """What a lesson can hold or a site can offer. Everything but the name is optional."""
 
     name: str
+    needs: tuple[str, ...] = ()
+    """Names of the features whose modules it imports."""
     fences: tuple[FenceKind[Any], ...] = ()
     pages: tuple[PageKind, ...] = ()
     rules: tuple[Rule, ...] = ()
@@ -152,6 +173,8 @@ class Feature(Struct, frozen=True, kw_only=True):
     with the page. Nothing where that says nothing."""
     files: Callable[[SiteContext], Iterable[SiteFile | FileList]] | None = None
     """Further files of the site."""
+    exporters: tuple[Exporter, ...] = ()
+    """What `coursebuild export` can write."""
 
 
 CORE_PAGES = ("home", "level", "lesson", "stub", "model", "page", "notfound")
@@ -167,7 +190,7 @@ _INSTALLED_BY = {
     "quiz": "coursebuild with its quizzes",
     "tabs": "`plugins/tabs` of coursebuild",
 }
-"""What has to be installed for fences that a course written for coursebuild may have."""
+"""What has to be installed for features that a course written for coursebuild may use."""
 
 _PAGE_NAME = pattern("[a-z][a-z0-9-]*")
 
@@ -215,7 +238,10 @@ def clash(added: Feature, known: Iterable[Feature]) -> str:
     if twice:
         return f"there is a page `{twice[0]}` already"
     odd = [kind.name for kind in added.pages if not _PAGE_NAME.fullmatch(kind.name)]
-    return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`" if odd else ""
+    if odd:
+        return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
+    exporters = _exporter_names((added,)) & _exporter_names(known)
+    return f"there is an export `{min(exporters)}` already" if exporters else ""
 
 
 def fence_kind(name: str) -> FenceKind[Any] | None:
@@ -231,6 +257,20 @@ def fence_names() -> tuple[str, ...]:
 def kind_of_block(block: FeatureBlock) -> FenceKind[Any]:
     """The kind of fence that a block came from."""
     return _by_block()[type(block)]
+
+
+def find_exporter(name: str) -> Exporter | str:
+    """The exporter of a name, or why there is none."""
+    known = features()
+    for feature in known:
+        for exporter in feature.exporters:
+            if exporter.name == name:
+                missing = sorted(set(feature.needs) - {other.name for other in known})
+                if not missing:
+                    return exporter
+                source = _INSTALLED_BY.get(missing[0], f"the feature `{missing[0]}`")
+                return f"`export {name}` needs {missing[0]}: install {source}"
+    return f"there is no export `{name}`: choose from {', '.join(sorted(_exporter_names(known)))}"
 
 
 def missing_package(name: str) -> str:
@@ -305,6 +345,10 @@ def _package_lines() -> tuple[str, ...]:
                 status = file.stat()
                 lines.append(f"{file}\0{status.st_size}\0{status.st_mtime_ns}")
     return tuple(lines)
+
+
+def _exporter_names(found: Iterable[Feature]) -> set[str]:
+    return {exporter.name for feature in found for exporter in feature.exporters}
 
 
 def _rules_of(found: Iterable[Feature]) -> set[str]:

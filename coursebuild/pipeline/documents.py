@@ -36,6 +36,8 @@ from coursebuild.pipeline.tasks import (
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.workers import Workers
+    from coursebuild.core.pages.context import PageContext
+    from coursebuild.core.pages.page_inputs import PageInputs
     from coursebuild.core.pages.record import PageRecord
     from coursebuild.pipeline.reading import PageReader
 
@@ -195,6 +197,10 @@ class Documents(Parser):
     def page(self, page: Draw) -> tuple[PageRecord, str]:
         """A page and its body alone, drawn here and now."""
         return self._here().page(page)
+
+    def context(self, path: str, inputs: PageInputs, language: str) -> PageContext:
+        """The document at a path with all its text, on the page with these inputs."""
+        return self._here().context(self._tasks[path], inputs, language)
 
     def _work(
         self, name: str, requests: Iterator[tuple[int | None, Request]]

@@ -34,9 +34,11 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import strings_for
 from coursebuild.core.pages.lookup.lexicon import lexicon, misdeclared
+from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.templates import templates_of
 from coursebuild.core.pages.tools import Tools, mark_now
+from coursebuild.core.pages.urls import Place
 from coursebuild.core.pages.zips import imports
 from coursebuild.core.run.versions import package_version
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -45,11 +47,9 @@ from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import document_fingerprint
 from coursebuild.pipeline.tasks import (
     BYPRODUCTS,
-    ITEMS,
     PAGES,
     SUMMARIES,
     Answer,
-    Ask,
     DocumentSummary,
     Draw,
     Drawn,
@@ -60,6 +60,7 @@ from coursebuild.pipeline.tasks import (
 )
 
 if TYPE_CHECKING:
+    from coursebuild.core.pages.context import PageContext
     from coursebuild.core.run.v8 import MathEngine
 
 _MATHML, _CODE = "mathml", "code"
@@ -85,7 +86,6 @@ _HEAVY = (
     "coursebuild.core.pages.pages",
     "coursebuild.core.syntax.document",
     "coursebuild.core.syntax.lab",
-    "coursebuild.features.quiz.parse",
     "coursebuild.features.search.page",
 )
 
@@ -131,14 +131,12 @@ class PageReader:
         with self._lock:
             return self._answer(request)
 
-    def _answer(self, request: Task | Draw | Ask) -> Answer:
+    def _answer(self, request: Task | Draw) -> Answer:
         match request:
             case Task():
                 return self._read(request)
             case Draw():
                 return self._draw(request)
-            case Ask():
-                return self._ask(request.page)
             case _:
                 assert_never(request)
 
@@ -255,18 +253,14 @@ class PageReader:
         self._store.put(PAGES, request.key, msgspec.msgpack.encode(page), local=True)
         return page.packed_record
 
-    def _ask(self, request: Draw) -> bytes:
-        """The items of a page's quizzes, and what they cannot hold."""
-        from coursebuild.core.pages.packages.items import page_quizzes
+    def context(self, task: Task, inputs: PageInputs, language: str) -> PageContext:
+        """A document with all its text, on its page."""
+        from coursebuild.core.pages.context import PageContext
 
-        assert request.task is not None
-        whole = self._whole(request.task)
-        tools = replace(self._tools_for(request.language), formulas=whole.formulas)
-        language, base_url = request.language, request.base_url
-        made = page_quizzes(request.inputs, whole.document, tools, base_url, language)
-        data = encode(made)
-        self._store.put(ITEMS, request.key, data, local=True)
-        return data
+        assert inputs.shown is not None, "a page with a document shows it"
+        whole = self._whole(task)
+        tools = replace(self._tools_for(language), formulas=whole.formulas)
+        return PageContext.made(tools, inputs.shown, Place(inputs.path), whole.document)
 
     def _tools_for(self, language: str) -> Tools:
         if language not in self._tools:

@@ -1,8 +1,8 @@
 """What is asked of a `Reader`, and what it answers and keeps.
 
-Entry points: `Task`, a text to parse, and what is known of it then, its `DocumentSummary`; `Draw`
-and `Ask`, what is made of a page; `Later`, a page that is put together when it is sent; `Drawn`,
-and `KeptPage`, the same in the memo.
+Entry points: `Task`, a text to parse, and what is known of it then, its `DocumentSummary`; `Draw`,
+a page to draw; `Later`, a page that is put together when it is sent; `Drawn`, and `KeptPage`, the
+same in the memo.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coursebuild.core.values import decode, encode
 if TYPE_CHECKING:
     from coursebuild.core.pages.exports.files import PageByproducts
 
-SUMMARIES, PAGES, BYPRODUCTS, ITEMS = "summaries", "pages", "byproducts", "items"
+SUMMARIES, PAGES, BYPRODUCTS = "summaries", "pages", "byproducts"
 """Kinds of entries in the store. They stay on this machine, where they are made soon enough."""
 
 
@@ -96,28 +96,22 @@ class Draw(Struct, frozen=True):
         return found
 
 
-class Ask(Struct, frozen=True):
-    """Make the items of a page's quizzes; they are kept under the page's key."""
-
-    page: Draw
-
-
 class Later:
-    """A page of which only little is held until it is sent; it arrives as what is made of it."""
+    """A page of which only little is held until it is sent; it arrives as a `Draw`."""
 
     __slots__ = ("make", "path")
 
-    def __init__(self, path: str | None, make: Callable[[], Draw | Ask]) -> None:
+    def __init__(self, path: str | None, make: Callable[[], Draw]) -> None:
         """`path` is that of its document, if it has one."""
         self.path = path
         self.make = make
 
-    def __reduce__(self) -> tuple[Callable[[Draw | Ask], Draw | Ask], tuple[Draw | Ask]]:
+    def __reduce__(self) -> tuple[Callable[[Draw], Draw], tuple[Draw]]:
         """The page itself."""
         return _same, (self.make(),)
 
 
-def _same(request: Draw | Ask) -> Draw | Ask:
+def _same(request: Draw) -> Draw:
     return request
 
 
@@ -132,10 +126,9 @@ class Drawn(Struct, frozen=True):
     """What it gives to the files beside it."""
 
 
-Request: TypeAlias = Task | Draw | Ask | Later
+Request: TypeAlias = Task | Draw | Later
 Answer: TypeAlias = bytes
-"""The summary of what was read; the packed record of the page that was drawn; the packed
-items of its quizzes."""
+"""The summary of what was read; the packed record of the page that was drawn."""
 
 
 class KeptPage(Struct, frozen=True, array_like=True):

@@ -18,7 +18,7 @@ from typing import BinaryIO
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
-from coursebuild.core.model.results import OutputFile, SiteFile
+from coursebuild.core.model.results import SiteFile
 
 _DATE = (1980, 1, 1, 0, 0, 0)
 _LEVEL = 6
@@ -28,8 +28,10 @@ _STORED = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _FIRST)
 _AUTHORED = ("features", "models", "examples", ".coursebuild", ".git")
 
 
-def check_target(root: Path, out: Path, is_ours: Callable[[Path], bool]) -> None:
-    """Nothing may be at `out`, or at what it links to, but a file that is ours.
+def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
+    """Nothing may be at `out`, or at what it links to, but such a file of an earlier export.
+
+    That has a file called `mark`, or `mark` near its beginning where it is no archive.
 
     Raises:
         PublishRefusedError: the file must not go there.
@@ -45,14 +47,14 @@ def check_target(root: Path, out: Path, is_ours: Callable[[Path], bool]) -> None
         )
     if place.is_dir():
         raise PublishRefusedError(f"{out} is a folder", help="name a file, such as `course.zip`")
-    if os.path.lexists(place) and not is_ours(place):
+    is_export = _holds_file if archive else _begins_with
+    if os.path.lexists(place) and not is_export(place, mark):
         raise PublishRefusedError(
             f"{out} is there, and is no such export", help="move it away, or name another file"
         )
 
 
-def holds(place: Path, name: str) -> bool:
-    """Whether a file is an archive with a file of this name."""
+def _holds_file(place: Path, name: str) -> bool:
     try:
         with zipfile.ZipFile(place) as archive:
             return name in archive.namelist()
@@ -60,11 +62,10 @@ def holds(place: Path, name: str) -> bool:
         return False
 
 
-def begins_with(place: Path, mark: bytes) -> bool:
-    """Whether a file has this near its beginning."""
+def _begins_with(place: Path, mark: str) -> bool:
     try:
         with place.open("rb") as file:
-            return mark in file.read(1000)
+            return mark.encode() in file.read(1000)
     except OSError:
         return False
 
@@ -91,7 +92,7 @@ def write_single(out: Path, files: Iterable[SiteFile]) -> int:
         EffectError: it cannot be written; what was there stays.
     """
     (file,) = files
-    return _write(out, lambda target: target.write(_data(file)))
+    return _write(out, lambda target: target.write(file.make()))
 
 
 def _write(out: Path, write: Callable[[BinaryIO], object]) -> int:
@@ -120,8 +121,4 @@ def _add(archive: zipfile.ZipFile, file: SiteFile) -> None:
     entry.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
     entry.create_system = 3
     entry.external_attr = 0o100644 << 16
-    archive.writestr(entry, _data(file), compresslevel=_LEVEL)
-
-
-def _data(file: SiteFile) -> bytes:
-    return file.data if isinstance(file, OutputFile) else file.make()
+    archive.writestr(entry, file.make(), compresslevel=_LEVEL)

@@ -279,6 +279,10 @@ class OutputFile(Struct, frozen=True):
     path: str
     data: bytes
 
+    def make(self) -> bytes:
+        """Its bytes, as `CachedFile` gives them."""
+        return self.data
+
 
 class CachedFile(Struct, frozen=True):
     """A file of the site that need not be made where it was published under the same key before."""

@@ -1,6 +1,6 @@
 """Drawn HTML as the part of XHTML that QTI 2.1 allows.
 
-Entry points: `Flow(files)`, and its `blocks` and `line`; `Flow.lost` says what could not be kept.
+Entry points: `Flow(link, picture)`, and its `blocks` and `line`; `lost` says what was not kept.
 
 QTI 2.1 has the text of XHTML (information model, chapter "Content Model"), pictures, links, tables
 and MathML, and nothing that moves, plays or asks. What has no place there is either
@@ -15,11 +15,9 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from urllib.parse import urlsplit
 
-from msgspec import Struct
-
+from coursebuild.core.pages.exports.xml import Element, add, element
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
-from coursebuild.core.pages.packages.formulas import mathml
-from coursebuild.core.pages.packages.xml import Element, add, element
+from coursebuild.features.qti.mathml import mathml
 
 _BLOCKS = frozenset(
     "address article aside blockquote center details dialog div dl fieldset figcaption figure"
@@ -49,20 +47,18 @@ _NUMBER = re.compile(r"[0-9]{1,5}")
 _LANGUAGE = re.compile(r"[A-Za-z]{1,8}(?:-[A-Za-z0-9]{1,8})*")
 
 
-class FlowPlaces(Struct, frozen=True):
-    """Where addresses of a drawn page lead, seen from a file of the package."""
-
-    link: Callable[[str], str | None]
-    """The same address for someone who has the package alone; `None` where there is none."""
-    picture: Callable[[str], str | None]
-    """The picture's place in the package."""
-
-
 class Flow:
     """Brings texts into the package, one after the other."""
 
-    def __init__(self, places: FlowPlaces) -> None:
-        self._places = places
+    def __init__(
+        self, link: Callable[[str], str | None], picture: Callable[[str], str | None]
+    ) -> None:
+        """`link` and `picture` say where an address on the drawn page leads in the package.
+
+        They give `None` where it leads nowhere.
+        """
+        self._link_of = link
+        self._picture_of = picture
         self.lost: list[str] = []
         """What was not kept, a sentence each, without repeats."""
 
@@ -252,7 +248,7 @@ class Flow:
             yield ")"
 
     def _picture(self, node: HtmlElement) -> Iterator[Element | str]:
-        place = self._places.picture(node.attributes.get("src", ""))
+        place = self._picture_of(node.attributes.get("src", ""))
         alt = node.attributes.get("alt", "")
         if place is None:
             source = node.attributes.get("src", "")
@@ -266,7 +262,7 @@ class Flow:
     def _link(self, node: HtmlElement, pre: bool) -> Iterator[Element | str]:
         address = node.attributes.get("href", "")
         inner = list(self._line(node.children, pre=pre))
-        place = self._places.link(address) if address else None
+        place = self._link_of(address) if address else None
         if place is not None:
             yield element("a", {"href": place}, *inner)
             return

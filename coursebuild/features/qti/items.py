@@ -1,14 +1,14 @@
 """A question as an item of QTI 2.1.
 
-Entry point: `made_items(page, quiz)`, from the page of a quiz's document.
+Entry point: `quiz_items(page, quiz, course)`.
 
 A quiz's texts are drawn as its page draws them, and brought into what QTI allows (`flow`). Names
 are those of the IMS QTI 2.1 Assessment Test, Section, and Item Information Model, 2012:
 
 1. A response and outcomes are declared: the points, and what to say.
 2. The body has the question, hints that are opened one by one (`infoControl`), and an interaction.
-3. Response processing compares, and says which feedback is shown: that of each option that was
-   chosen, and the explanation.
+3. Response processing (`processing`) compares, and says which feedback is shown: that of each
+   option that was chosen, and the explanation.
 """
 
 from __future__ import annotations
@@ -19,29 +19,25 @@ from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model import Document, document_blocks
+from coursebuild.core.model import Block, Course, Inline
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.packages.flow import Flow, FlowPlaces
-from coursebuild.core.pages.packages.formulas import NAMESPACE as MATHML
-from coursebuild.core.pages.packages.processing import (
+from coursebuild.core.pages.exports.xml import XSI, Element, add, document, element, identifier
+from coursebuild.core.text.source import Span
+from coursebuild.features.qti.flow import Flow
+from coursebuild.features.qti.mathml import NAMESPACE as MATHML
+from coursebuild.features.qti.processing import (
     EXPLANATION,
-    FEEDBACK,
     RESPONSE,
-    SCORE,
     ResponseParts,
     compared,
-    declared,
     double,
     feedback,
     matches,
+    outcomes,
     processing,
     response,
 )
-from coursebuild.core.pages.packages.xml import XSI, Element, add, document, element, identifier
-from coursebuild.core.pages.page_inputs import PageInputs
-from coursebuild.core.pages.tools import Tools
-from coursebuild.core.text.source import Span
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
@@ -56,11 +52,11 @@ from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_ht
 NAMESPACE = "http://www.imsglobal.org/xsd/imsqti_v2p1"
 SCHEMA = "http://www.imsglobal.org/xsd/qti/qtiv2p1/imsqti_v2p1.xsd"
 STYLE = "style.css"
-NAME = 32
+_NAME = 32
 """Characters that an identifier should have at most, for systems that keep no more."""
 
 
-class MadeItem(Struct, frozen=True):
+class QuestionItem(Struct, frozen=True):
     """A question as an item."""
 
     identifier: str
@@ -69,60 +65,47 @@ class MadeItem(Struct, frozen=True):
     """Site paths of the files that it shows."""
 
 
-class Loss(Struct, frozen=True):
-    """Something of a question that an item cannot hold, or why there is no item."""
-
-    span: Span
-    what: str
-
-
-class MadeQuiz(Struct, frozen=True):
+class QuizItems(Struct, frozen=True):
     """A quiz as items."""
 
     identifier: str
     title: str
-    items: tuple[MadeItem, ...]
-    losses: tuple[Loss, ...]
+    items: tuple[QuestionItem, ...]
+    losses: tuple[tuple[Span, str], ...]
+    """Something of a question that an item cannot hold, or why there is no item."""
 
 
-def made_items(page: PageContext, quiz: Quiz, base_url: str, language: str) -> MadeQuiz:
+def quiz_items(page: PageContext, quiz: Quiz, course: Course) -> QuizItems:
     """A quiz as items, and what could not be kept."""
-    made, losses = [], []
+    items, losses = [], []
     for number, question in enumerate(quiz.questions, 1):
-        writer = _Writer(page, quiz, number, base_url, language)
+        writer = _Writer(page, quiz, number, course)
         item = writer.item(question)
-        losses += [Loss(question.span, what) for what in writer.flow.lost]
-        made += [item] if item is not None else []
-    return MadeQuiz(
-        identifier("quiz.", quiz.id, most=NAME),
-        quiz.title or quiz.id,
-        tuple(made),
-        tuple(losses),
-    )
+        losses += [(question.span, loss) for loss in writer.flow.lost]
+        items += [item] if item is not None else []
+    name = identifier("quiz.", quiz.id, most=_NAME)
+    return QuizItems(name, quiz.title or quiz.id, tuple(items), tuple(losses))
 
 
 class _Writer:
     """Writes one item."""
 
-    def __init__(
-        self, page: PageContext, quiz: Quiz, number: int, base_url: str, language: str
-    ) -> None:
+    def __init__(self, page: PageContext, quiz: Quiz, number: int, course: Course) -> None:
         self.page = page
+        self.words = page.tools.words
         self.quiz = quiz
         self.number = number
-        self.base_url = base_url
-        self.language = language
+        self.course = course
         self.pictures: dict[str, None] = {}
-        self.flow = Flow(FlowPlaces(self._link, self._picture))
+        self.flow = Flow(self._link, self._picture)
 
-    def item(self, question: AnyQuestion) -> MadeItem | None:
+    def item(self, question: AnyQuestion) -> QuestionItem | None:
         """The item, or nothing where the question has no answer."""
         parts = self._parts(question)
         if parts is None:
             return None
-        name = identifier("q.", self.quiz.anchor(question.key), most=NAME)
-        words = self.page.tools.words
-        title = question.label or words("package.question", n=self.number)
+        name = identifier("q.", self.quiz.anchor(question.key), most=_NAME)
+        title = question.label or self.words("package.question", n=self.number)
         root = element(
             "assessmentItem",
             {
@@ -134,71 +117,67 @@ class _Writer:
                 "title": f"{self.quiz.title}: {title}" if self.quiz.title else title,
                 "adaptive": "false",
                 "timeDependent": "false",
-                "xml:lang": self.language,
+                "xml:lang": self.course.language or "en",
             },
         )
-        add(root, parts.response, *self._outcomes())
+        add(root, parts.response, *outcomes())
         add(root, element("stylesheet", {"href": f"../{STYLE}", "type": "text/css"}))
         add(root, self._body(question, parts))
         explanation = self._explanation(question)
-        says = [EXPLANATION] if explanation is not None else []
-        add(root, processing(parts, says))
+        add(root, processing(parts, explained=explanation is not None))
         add(root, *parts.feedback, explanation)
-        return MadeItem(name, document(root), tuple(self.pictures))
-
-    def _outcomes(self) -> tuple[Element, Element]:
-        zero = element("defaultValue", {}, element("value", {}, "0"))
-        score = element("outcomeDeclaration", declared(SCORE, "single", "float"), zero)
-        score.set("normalMaximum", "1")
-        return score, element("outcomeDeclaration", declared(FEEDBACK, "multiple", "identifier"))
+        return QuestionItem(name, document(root), tuple(self.pictures))
 
     def _body(self, question: AnyQuestion, parts: ResponseParts) -> Element:
         body = element("itemBody", {}, *self._blocks(question.text), *parts.before)
         for number, hint in enumerate(question.hints, 1):
-            title = self.page.tools.words("package.hint", n=number)
+            title = self.words("package.hint", n=number)
             add(body, element("infoControl", {"title": title}, *self._blocks(hint)))
         add(body, *parts.interaction)
         return body
 
     def _explanation(self, question: AnyQuestion) -> Element | None:
-        inner: list[Element] = []
-        if isinstance(question, OpenQuestion):
-            inner += [self._said("package.reference"), *self._blocks(question.reference)]
+        inner = self._reference(question) if isinstance(question, OpenQuestion) else []
         inner += self._blocks(question.explain)
         if isinstance(question, ChoiceQuestion) and question.sim is not None:
             address = self._link(f"#{self.quiz.anchor(question.key)}")
             if address is None:
                 self.flow.lost.append("its simulation is on its page alone, and left out")
             else:
-                words = self.page.tools.words("package.simulation")
-                inner.append(element("p", {}, element("a", {"href": address}, words)))
+                link = element("a", {"href": address}, self.words("package.simulation"))
+                inner.append(element("p", {}, link))
                 self.flow.lost.append("its simulation is on its page alone, and the item links it")
         return feedback(EXPLANATION, inner) if inner else None
 
     # --- texts
 
-    def _blocks(self, content: tuple[object, ...]) -> list[Element]:
-        return self.flow.blocks(self.page.blocks(content))  # type: ignore[arg-type]
+    def _blocks(self, blocks: tuple[Block, ...]) -> list[Element]:
+        return self.flow.blocks(self.page.blocks(blocks))
 
-    def _said(self, key: str, **values: str | int) -> Element:
-        return element("p", {}, self.page.tools.words(key, **values))
+    def _line(self, inlines: tuple[Inline, ...]) -> list[Element | str]:
+        return self.flow.line(self.page.inlines(inlines))
+
+    def _words(self, key: str, **values: str | int) -> Element:
+        return element("p", {}, self.words(key, **values))
 
     def _link(self, address: str) -> str | None:
+        """An address on the page for someone who has the package alone, if there is one."""
         parts = urlsplit(address)
         if parts.scheme or parts.netloc:
             return address if parts.scheme in ("http", "https", "mailto") else None
-        if not self.base_url:
+        if not self.course.base_url:
             return None
         path = self._site_path(parts.path) if parts.path else self.page.place.path
         rest = address[len(address.split("#", 1)[0].split("?", 1)[0]) :]
-        return f"{self.base_url.rstrip('/')}/{urls.encode(path)}{rest}"
+        return f"{self.course.base_url.rstrip('/')}/{urls.encode(path)}{rest}"
 
     def _picture(self, address: str) -> str | None:
+        """Where the picture at an address on the page is in the package, if it can be there."""
         parts = urlsplit(address)
         if parts.scheme == "data":
             return address
         path = self._site_path(parts.path)
-        if parts.scheme or parts.netloc or not parts.path or not _is_file(path):
+        if parts.scheme or parts.netloc or not path.startswith(("files/", "models/")):
             return None
         self.pictures[path] = None
         return f"../{urls.encode(path)}"
@@ -225,27 +204,26 @@ class _Writer:
                 assert_never(question)
 
     def _choice(self, question: ChoiceQuestion) -> ResponseParts:
-        names = [letter(index) for index in range(len(question.options))]
-        choices = [
-            element("simpleChoice", {"identifier": name}, *self._text(option.text))
-            for name, option in zip(names, question.options, strict=True)
-        ]
-        said = [
+        options = [(letter(index), option) for index, option in enumerate(question.options)]
+        choices = (
+            element("simpleChoice", {"identifier": name}, *self._line(option.text))
+            for name, option in options
+        )
+        given = {"responseIdentifier": RESPONSE, "shuffle": "false"}
+        given["maxChoices"] = "0" if question.several else "1"
+        interaction = element("choiceInteraction", given, *choices)
+        answers = tuple(
             feedback(name, self._blocks(option.feedback), title=name)
-            for name, option in zip(names, question.options, strict=True)
+            for name, option in options
             if option.feedback
-        ]
-        most = "0" if question.several else "1"
-        given = {"responseIdentifier": RESPONSE, "shuffle": "false", "maxChoices": most}
+        )
         cardinality = "multiple" if question.several else "single"
-        right = [names[index] for index in question.answers]
         return ResponseParts(
-            response(cardinality, "identifier", right),
-            (element("choiceInteraction", given, *choices),),
-            before=(self._said("package.choose_all"),) if question.several else (),
-            test=matches,
-            feedback=tuple(said),
-            chosen=bool(said),
+            response(cardinality, "identifier", [letter(index) for index in question.answers]),
+            (interaction,),
+            before=(self._words("package.choose_all"),) if question.several else (),
+            test=matches(),
+            feedback=answers,
         )
 
     def _numeric(self, question: NumericQuestion) -> ResponseParts:
@@ -255,13 +233,11 @@ class _Writer:
         if question.unit:
             add(line, " ", *self.flow.line(unit_html(question.unit)))
         within = double(question.tolerance)
-
-        def test() -> Element:
-            how = {"toleranceMode": "absolute", "tolerance": f"{within} {within}"}
-            return element("equal", how, *compared())
-
+        how = {"toleranceMode": "absolute", "tolerance": f"{within} {within}"}
         return ResponseParts(
-            response("single", "float", [double(question.answer)]), (line,), test=test
+            response("single", "float", [double(question.answer)]),
+            (line,),
+            test=element("equal", how, *compared()),
         )
 
     def _output(self, question: OutputQuestion) -> ResponseParts | None:
@@ -269,59 +245,39 @@ class _Writer:
         if answer is None:
             self.flow.lost.append("it is left out: its script was not run, so nobody knows the key")
             return None
-        asked = self._said("package.output_of", path=question.script, line=question.line)
-        size = str(min(max(len(answer), 12), 80))
         field = element("textEntryInteraction", {"responseIdentifier": RESPONSE})
-        field.set("expectedLength", size)
+        field.set("expectedLength", str(min(max(len(answer), 12), 80)))
         return ResponseParts(
             response("single", "string", [answer]),
             (element("p", {}, field),),
-            before=(asked,),
-            test=lambda: element("stringMatch", {"caseSensitive": "true"}, *compared()),
+            before=(self._words("package.output_of", path=question.script, line=question.line),),
+            test=element("stringMatch", {"caseSensitive": "true"}, *compared()),
         )
 
     def _open(self, question: OpenQuestion) -> ResponseParts:
-        reference = [self._said("package.reference"), *self._blocks(question.reference)]
         given = {"responseIdentifier": RESPONSE, "expectedLines": "6"}
+        reference = element("rubricBlock", {"view": "scorer"}, *self._reference(question))
         return ResponseParts(
             response("single", "string", ()),
-            (
-                element("rubricBlock", {"view": "scorer"}, *reference),
-                element("extendedTextInteraction", given),
-            ),
+            (reference, element("extendedTextInteraction", given)),
         )
+
+    def _reference(self, question: OpenQuestion) -> list[Element]:
+        return [self._words("package.reference"), *self._blocks(question.reference)]
 
     def _order(self, question: OrderQuestion) -> ResponseParts:
         shown = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
         names = {index: letter(place) for place, index in enumerate(shown)}
-        choices = [
+        choices = (
             element(
-                "simpleChoice", {"identifier": names[index]}, *self._text(question.items[index])
+                "simpleChoice", {"identifier": names[index]}, *self._line(question.items[index])
             )
             for index in shown
-        ]
-        right = [names[index] for index in range(len(question.items))]
+        )
         given = {"responseIdentifier": RESPONSE, "shuffle": "false"}
         return ResponseParts(
-            response("ordered", "identifier", right),
+            response("ordered", "identifier", [names[index] for index in range(len(names))]),
             (element("orderInteraction", given, *choices),),
-            before=(self._said("package.order"),),
-            test=matches,
+            before=(self._words("package.order"),),
+            test=matches(),
         )
-
-    def _text(self, text: tuple[object, ...]) -> list[Element | str]:
-        return self.flow.line(self.page.inlines(text))  # type: ignore[arg-type]
-
-
-def _is_file(path: str) -> bool:
-    return path.startswith("files/") or path.startswith("models/")
-
-
-def page_quizzes(
-    inputs: PageInputs, document: Document, tools: Tools, base_url: str, language: str
-) -> tuple[MadeQuiz, ...]:
-    """The quizzes of a document, in its order."""
-    assert inputs.shown is not None
-    page = PageContext.made(tools, inputs.shown, urls.Place(inputs.path), document)
-    quizzes = (block for block in document_blocks(document) if isinstance(block, Quiz))
-    return tuple(made_items(page, quiz, base_url, language or "en") for quiz in quizzes)

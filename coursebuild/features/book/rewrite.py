@@ -1,6 +1,6 @@
 """The HTML of a lesson made fit for another place: other ids, other links, nothing for scripts.
 
-Entry points: `lesson_html`, what a lesson's page says; `rewritten`, the same for another place.
+Entry point: `rewritten(content, rules)`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement
 from coursebuild.core.text.patterns import pattern
 
-_BEFORE, _AFTER = '<div class="prose">\n', '\n</div>\n<div class="lesson-end"'
-"""What stands around the text of a lesson, see `templates/lesson.html`."""
 _DROPPED = frozenset(
     "button form template script style dialog iframe object embed audio video source track".split()
 )
@@ -54,14 +52,8 @@ class Rules(Struct, frozen=True):
     """What is added to the names of sections, which are to be unlike those of other lessons."""
 
 
-def lesson_html(page: str) -> str:
-    """The text of a lesson, out of its page."""
-    _, _, rest = page.partition(_BEFORE)
-    return rest.rpartition(_AFTER)[0]
-
-
 def rewritten(content: Iterable[HtmlContent], rules: Rules) -> Iterator[HtmlContent]:
-    """The same for another place."""
+    """Content of a lesson's page for another place."""
     for child in content:
         if isinstance(child, str):
             yield child

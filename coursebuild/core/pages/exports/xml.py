@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable
 from typing import TypeAlias
 from xml.etree.ElementTree import Element as Element
 from xml.etree.ElementTree import indent, tostring
@@ -18,18 +17,15 @@ Child: TypeAlias = "Element | str | None"
 
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 has no place for, section 2.2."""
-_SLOT = "\ue000"
-_OUTSIDE = re.compile("[^A-Za-z0-9.-]")
 
 
-def clean(text: str) -> str:
-    """A text without the characters that XML cannot hold."""
+def _clean(text: str) -> str:
     return _FORBIDDEN.sub("\ufffd", text)
 
 
 def element(name: str, attributes: dict[str, str] | None = None, *children: Child) -> Element:
     """An element; a child that is `None` is left out."""
-    made = Element(name, {key: clean(value) for key, value in (attributes or {}).items()})
+    made = Element(name, {key: _clean(value) for key, value in (attributes or {}).items()})
     add(made, *children)
     return made
 
@@ -42,9 +38,9 @@ def add(parent: Element, *children: Child) -> None:
         if isinstance(child, Element):
             parent.append(child)
         elif len(parent):
-            parent[-1].tail = (parent[-1].tail or "") + clean(child)
+            parent[-1].tail = (parent[-1].tail or "") + _clean(child)
         else:
-            parent.text = (parent.text or "") + clean(child)
+            parent.text = (parent.text or "") + _clean(child)
 
 
 def document(root: Element, *, pretty: bool = False) -> bytes:
@@ -55,24 +51,12 @@ def document(root: Element, *, pretty: bool = False) -> bytes:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def long_document(root: Element, slot: Element, children: Iterable[Element]) -> bytes:
-    """The same with elements in the place of `slot`'s text, of which one at a time is held."""
-    slot.text = _SLOT
-    before, _, after = document(root, pretty=True).partition(_SLOT.encode())
-    parts = [before]
-    for child in children:
-        indent(child, " ", level=2)
-        child.tail = None
-        parts.append(f"\n  {tostring(child, encoding='unicode')}".encode())
-    return b"".join((*parts, b"\n ", after))
-
-
 def identifier(prefix: str, text: str, *, most: int = 0) -> str:
     """An NCName of ASCII; other texts, other names.
 
     With `most` characters, a longer one ends with digits of its hash.
     """
-    name = prefix + _OUTSIDE.sub(lambda found: f"_{ord(found[0]):x}_", text)
+    name = prefix + re.sub("[^A-Za-z0-9.-]", lambda found: f"_{ord(found[0]):x}_", text)
     if most and len(name) > most:
         digest = hashlib.sha256(name.encode()).hexdigest()[:12]
         name = f"{name[: most - 13]}_{digest}"

@@ -1,18 +1,18 @@
-"""What differs between items, and how a response becomes points and feedback.
+"""How a response becomes points and feedback, and what differs between the kinds of questions.
 
-Entry points: `ResponseParts`; `processing`, the response processing of an item; `response` and
-`feedback`, which declare and show what it is about.
+Entry points: `ResponseParts`; `processing`, the response processing of an item; `response`,
+`outcomes` and `feedback`, which declare and show what it is about.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from msgspec import Struct
 
-from coursebuild.core.pages.packages.xml import Element, add, element
+from coursebuild.core.pages.exports.xml import Element, add, element
 
-RESPONSE, SCORE, FEEDBACK, EXPLANATION = "RESPONSE", "SCORE", "FEEDBACK", "EXPLANATION"
+RESPONSE, _SCORE, _FEEDBACK, EXPLANATION = "RESPONSE", "SCORE", "FEEDBACK", "EXPLANATION"
 """Names of the variables, and of the feedback that everyone gets."""
 
 
@@ -23,24 +23,30 @@ class ResponseParts(Struct, frozen=True):
     interaction: tuple[Element, ...]
     before: tuple[Element, ...] = ()
     """What to do, between the question and its hints."""
-    test: Callable[[], Element] | None = None
+    test: Element | None = None
     """An expression that is true for a right response; `None`: a person scores."""
     feedback: tuple[Element, ...] = ()
-    chosen: bool = False
-    """Whether feedback is named by what was chosen."""
-
-
-def declared(name: str, cardinality: str, base: str) -> dict[str, str]:
-    """The attributes by which a variable is declared."""
-    return {"identifier": name, "cardinality": cardinality, "baseType": base}
+    """What is said to one who chose something, named by that."""
 
 
 def response(cardinality: str, base: str, right: Iterable[str]) -> Element:
     """A declaration of the response, with the right one where there is one."""
     values = [element("value", {}, value) for value in right]
-    made = element("responseDeclaration", declared(RESPONSE, cardinality, base))
+    made = element("responseDeclaration", _declared(RESPONSE, cardinality, base))
     add(made, element("correctResponse", {}, *values) if values else None)
     return made
+
+
+def outcomes() -> tuple[Element, Element]:
+    """Declarations of the points and of what is said."""
+    zero = element("defaultValue", {}, element("value", {}, "0"))
+    score = element("outcomeDeclaration", _declared(_SCORE, "single", "float"), zero)
+    score.set("normalMaximum", "1")
+    return score, element("outcomeDeclaration", _declared(_FEEDBACK, "multiple", "identifier"))
+
+
+def _declared(name: str, cardinality: str, base: str) -> dict[str, str]:
+    return {"identifier": name, "cardinality": cardinality, "baseType": base}
 
 
 def compared() -> tuple[Element, Element]:
@@ -56,21 +62,21 @@ def matches() -> Element:
 
 def feedback(name: str, content: list[Element], title: str = "") -> Element:
     """What is shown where the feedback of a name is due."""
-    given = {"outcomeIdentifier": FEEDBACK, "identifier": name, "showHide": "show"}
+    given = {"outcomeIdentifier": _FEEDBACK, "identifier": name, "showHide": "show"}
     return element("modalFeedback", given | ({"title": title} if title else {}), *content)
 
 
-def processing(parts: ResponseParts, says: list[str]) -> Element:
+def processing(parts: ResponseParts, *, explained: bool) -> Element:
     """The points, and what is said."""
     made = element("responseProcessing")
     if parts.test is not None:
-        right = element("responseIf", {}, parts.test(), _set(SCORE, _value("float", "1")))
-        wrong = element("responseElse", {}, _set(SCORE, _value("float", "0")))
+        right = element("responseIf", {}, parts.test, _set(_SCORE, _value("float", "1")))
+        wrong = element("responseElse", {}, _set(_SCORE, _value("float", "0")))
         add(made, element("responseCondition", {}, right, wrong))
-    said = [element("variable", {"identifier": RESPONSE})] if parts.chosen else []
-    said += [_value("identifier", name) for name in says]
-    if said:
-        add(made, _set(FEEDBACK, element("multiple", {}, *said)))
+    says = [element("variable", {"identifier": RESPONSE})] if parts.feedback else []
+    says += [_value("identifier", EXPLANATION)] if explained else []
+    if says:
+        add(made, _set(_FEEDBACK, element("multiple", {}, *says)))
     return made
 
 

@@ -1,0 +1,225 @@
+"""The whole course as an e-book: EPUB 3.
+
+Entry point: `epub_files(context)`, the files of the archive.
+
+1. Each lesson is a chapter of XHTML, drawn as on its page: formulas are MathML, folds are open,
+   labs are their recorded pictures. Links between lessons lead to chapters; others lead to the site
+   where the course has an address, and are plain text where it has none.
+2. EPUB wants a date of last change. The same course gives the same bytes, so it is always the same,
+   and says nothing.
+
+Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import uuid
+from collections.abc import Iterator
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.model import Lesson, Level
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.exports.context import ExportContext
+from coursebuild.core.pages.html_tree import to_xml
+from coursebuild.features.book.cover import cover
+from coursebuild.features.book.lessons import (
+    PICTURES,
+    ending,
+    facts,
+    lesson_text,
+    levels,
+    site_address,
+    style_path,
+)
+from coursebuild.features.book.rewrite import Rules
+
+_MODIFIED = "2000-01-01T00:00:00Z"
+"""See the module."""
+_CONTAINER = """\
+<?xml version="1.0" encoding="utf-8"?>
+<container xmlns="urn:oasis:names:tc:opendocument:xmlns:container" version="1.0">
+<rootfiles>
+<rootfile full-path="EPUB/package.opf" media-type="application/oebps-package+xml"/>
+</rootfiles>
+</container>
+"""
+_XHTML = "application/xhtml+xml"
+_FEATURES = ("structuralNavigation", "tableOfContents", "displayTransformability")
+_STYLE_RULE = re.compile(r"\.s[0-9a-f]{7}\{[^{}]*\}")
+"""A rule of the site's style sheet that stands for a style in an element, see `styles`."""
+
+
+class EpubItem(Struct, frozen=True):
+    """A file of the package."""
+
+    id: str
+    href: str
+    type: str
+    properties: str = ""
+    linear: bool = False
+    """Whether it is a page, which is read in its place."""
+
+
+def epub_files(context: ExportContext) -> Iterator[SiteFile]:
+    """The files of the archive."""
+    return _Epub(context).files()
+
+
+class _Epub:
+    def __init__(self, context: ExportContext) -> None:
+        self._context = context
+        self._course = context.course
+        self._library = context.library
+        self._language = context.course.language or "en"
+        self._levels = levels(context)
+        self._chapters = {
+            urls.lesson_path(lesson): _lesson_name(lesson)
+            for _, lessons in self._levels
+            for lesson in lessons
+        }
+        self._pictures: dict[str, str] = {}
+        """Names of pictures in the package, by their site path."""
+
+    def files(self) -> Iterator[SiteFile]:
+        yield OutputFile("mimetype", b"application/epub+zip")
+        yield OutputFile("META-INF/container.xml", _CONTAINER.encode())
+        items = [
+            EpubItem("title", "title.xhtml", _XHTML, linear=True),
+            EpubItem("nav", "nav.xhtml", _XHTML, "nav", linear=True),
+            EpubItem("style", "style.css", "text/css"),
+            EpubItem("cover", "cover.svg", PICTURES["svg"], "cover-image"),
+        ]
+        yield OutputFile("EPUB/style.css", self._style().encode())
+        text = cover(self._course.title, direction(self._language))
+        yield OutputFile("EPUB/cover.svg", visible(text).encode())
+        yield OutputFile("EPUB/title.xhtml", self._title())
+        yield OutputFile("EPUB/nav.xhtml", self._nav())
+        for level, lessons in self._levels:
+            name = _level_name(level)
+            items.append(EpubItem(f"x-{xml_id(name)}", name, _XHTML, linear=True))
+            yield OutputFile(f"EPUB/{name}", self._level(level))
+            for lesson in lessons:
+                chapter = self._chapter(lesson)
+                items.append(_chapter_item(_lesson_name(lesson), chapter))
+                yield OutputFile(f"EPUB/{_lesson_name(lesson)}", chapter)
+        for path, name in self._pictures.items():
+            items.append(EpubItem(f"i-{xml_id(name)}", name, PICTURES[ending(path)]))
+            yield CachedFile(f"EPUB/{name}", "", self._context.site()[path].make)
+        yield OutputFile("EPUB/package.opf", self._package(items))
+
+    def _style(self) -> str:
+        """The e-book's style sheet, with the rules of the site's for single elements."""
+        site = self._context.site()[style_path(self._context)].make().decode()
+        own = self._context.assets.template("book/epub.css")
+        return "\n".join((own, *_STYLE_RULE.findall(site), ""))
+
+    # --- pages
+
+    def _chapter(self, lesson: Lesson) -> bytes:
+        rules = Rules(urls.lesson_path(lesson), self._address, self._picture, xml_id)
+        text = lesson_text(self._context, lesson, rules, to_xml, "_top")
+        return self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
+
+    def _page(self, title: str, body: Markup, kind: str) -> bytes:
+        return self._drawn("epub-page", title=title, body=body, kind=kind)
+
+    def _drawn(self, template: str, **values: object) -> bytes:
+        text = self._library.render(
+            f"book/{template}.html",
+            language=self._language,
+            direction=direction(self._language),
+            **values,
+        )
+        return visible(text).encode()
+
+    def _level(self, level: Level) -> bytes:
+        body = self._library.render("book/epub-level.html", level=level)
+        return self._page(f"{level.id} {level.title}", body, "bodymatter")
+
+    def _title(self) -> bytes:
+        body = self._library.render(
+            "book/epub-title.html",
+            title=self._course.title,
+            summary=self._course.summary,
+            facts=facts(self._context),
+            licence=self._course.licence,
+            address=self._course.base_url,
+        )
+        return self._page(self._course.title, body, "frontmatter")
+
+    def _nav(self) -> bytes:
+        body = self._library.render(
+            "book/epub-nav.html",
+            title=self._course.title,
+            levels=self._levels,
+            level_name=_level_name,
+            lesson_name=_lesson_name,
+        )
+        return self._page(self._library.words("exports.contents"), body, "frontmatter")
+
+    def _package(self, items: list[EpubItem]) -> bytes:
+        course = self._course
+        features = list(_FEATURES)
+        features += ["MathML"] if any("mathml" in item.properties for item in items) else []
+        features += ["alternativeText"] if self._pictures else []
+        return self._drawn(
+            "package.opf",
+            uuid=uuid.uuid5(uuid.NAMESPACE_URL, course.base_url or f"course:{course.key}"),
+            title=course.title,
+            summary=course.summary,
+            licence=course.licence,
+            address=course.base_url,
+            modified=_MODIFIED,
+            visual=bool(self._pictures),
+            features=features,
+            items=items,
+        )
+
+    # --- links
+
+    def _address(self, path: str, anchor: str) -> str:
+        """Where a link of a chapter leads; empty for nowhere."""
+        name = self._chapters.get(path)
+        if name is None:
+            return site_address(self._context, path, anchor)
+        return f"{name}#{urls.quoted(xml_id(anchor))}" if anchor else name
+
+    def _picture(self, path: str) -> str:
+        """Where a picture is, which is now part of the package; empty where it cannot be."""
+        if ending(path) not in PICTURES or path not in self._context.site():
+            return ""
+        digest = hashlib.sha256(path.encode()).hexdigest()[:12]
+        return self._pictures.setdefault(path, f"images/{digest}.{ending(path)}")
+
+
+def _chapter_item(name: str, chapter: bytes) -> EpubItem:
+    properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
+    return EpubItem(f"x-{xml_id(name)}", name, _XHTML, " ".join(properties), linear=True)
+
+
+def xml_id(id: str) -> str:
+    """An id as a name of XML: characters that no name has are written as their numbers."""
+    name = re.sub(r"[^A-Za-z0-9_.-]", lambda match: f"_{ord(match[0]):x}_", id)
+    return f"_{name}" if not name or name[0] in "0123456789.-" else name
+
+
+def _lesson_name(lesson: Lesson) -> str:
+    return _file_name(f"{lesson.id}-{lesson.slug}")
+
+
+def _level_name(level: Level) -> str:
+    return _file_name(f"level-{level.id}")
+
+
+def _file_name(name: str) -> str:
+    """A file name of ASCII, which every reading system takes."""
+    if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
+        return f"{name}.xhtml"
+    return f"x{hashlib.sha256(name.encode()).hexdigest()[:16]}.xhtml"
