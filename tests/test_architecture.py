@@ -12,6 +12,7 @@ from typing import NamedTuple
 import pytest
 
 import coursebuild
+from coursebuild.core.features import installed_features
 
 PACKAGE = Path(coursebuild.__file__).parent
 ROOT = PACKAGE.parent
@@ -31,8 +32,6 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"__main__"}),
 )
 OUTSIDE = {"__init__", "core.__init__"}
-TO_MOVE = {("packages", f"coursebuild.features.quiz.{name}") for name in ("model", "page")}
-"""QTI becomes a feature that needs quizzes."""
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
@@ -120,7 +119,19 @@ def test_imports_go_down_and_never_sideways() -> None:
         for path in FILES
         if part_of(path) not in OUTSIDE
         for name in sorted(read(path).imports)
-        if not is_allowed(part_of(path), name) and (path.parent.name, name) not in TO_MOVE
+        if not is_allowed(part_of(path), name)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_features_import_those_alone_that_they_need() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for feature in installed_features()
+        for path in (PACKAGE / "features" / feature.name).rglob("*.py")
+        for name in sorted(read(path).imports)
+        if name.startswith("coursebuild.features.")
+        and name.split(".")[2] not in (feature.name, *feature.needs)
     ]
     assert not wrong, "\n".join(wrong)
 

@@ -74,7 +74,12 @@ def test_a_quiz_says_what_is_missing(course: Folder, without_quizzes: dict[str, 
     assert "help: install coursebuild with its quizzes" in done.out
 
 
-def test_there_is_no_schema_of_quizzes(course: Folder, without_quizzes: dict[str, str]) -> None:
+def test_there_is_no_schema_and_no_export_of_quizzes(
+    course: Folder, without_quizzes: dict[str, str]
+) -> None:
+    done = course.run("export", "qti", env=without_quizzes)
+    reason = "`export qti` needs quiz: install coursebuild with its quizzes"
+    assert (done.status, done.err) == (2, f"coursebuild: {reason}\n")
     done = course.run("schema", "quiz", env=without_quizzes)
     assert (done.status, done.err) == (
         2,

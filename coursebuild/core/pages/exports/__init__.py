@@ -5,6 +5,5 @@
    (`fromhtml`). `llms` lists these copies.
 3. `notebook` is a lesson as a Jupyter notebook that runs, `notebook_file` its file.
 4. `files` says which of these files a site has.
-5. `whole_course` takes the lessons out of the pages of a finished site, `rewrite` fits them to
-   another place: `book` is one page of all lessons, `epub` the e-book.
+5. `context` is what exporters of features are given, `xml` what several write with.
 """

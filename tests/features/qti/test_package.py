@@ -1,0 +1,275 @@
+"""Quizzes as a package of IMS QTI 2.1: every kind of question, whatever stands in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from urllib.parse import unquote
+
+import pytest
+from lxml import etree
+
+from coursebuild.core.pages.exports.xml import identifier
+from support.archives import (
+    Package,
+    entries,
+    formula_mistakes,
+    mistakes,
+    packaging_schema,
+    referred,
+)
+from support.hostile_html import HOSTILE, REFUSED
+from support.qti_rules import MATHML, QTI
+from support.qti_rules import mistakes as item_mistakes
+from support.question_zoo import ANY, SCRIPT, SVG, quiz
+from support.scratch_course import GOOD, Done, Folder
+
+pytestmark = pytest.mark.site
+
+Make = Callable[..., Folder]
+ZIP = "quizzes-qti.zip"
+SPACES = {"q": QTI, "m": MATHML}
+
+
+def export(folder: Folder, *arguments: str) -> Done:
+    done = folder.main("export", "qti", *arguments)
+    assert done.status == 0, done.out + done.err
+    return done
+
+
+def package(folder: Folder) -> dict[str, bytes]:
+    """The package, in which everything is as it must be."""
+    export(folder)
+    files = entries(folder.root / ZIP)
+    check(files)
+    return files
+
+
+def check(files: dict[str, bytes]) -> None:
+    """A package is whole: valid, every file listed, every address a file of it."""
+    manifest = files["imsmanifest.xml"]
+    assert mistakes(packaging_schema(), manifest) == []
+    assert set(referred(manifest)) == set(files) - {"imsmanifest.xml"}
+    for path, data in files.items():
+        if path.startswith(("items/", "tests/")):
+            assert item_mistakes(data) == [], path
+            root = etree.fromstring(data)
+            for math in root.iter(f"{{{MATHML}}}math"):
+                assert formula_mistakes(math) == [], path
+            for address in root.xpath("//@href | //@src"):
+                if not re.match(r"[a-z]+:", address):
+                    assert unquote(address).removeprefix("../") in files
+
+
+def items(files: dict[str, bytes], test: str = "") -> list[etree._Element]:
+    """The items of a test, or of all, in their order."""
+    paths = [path for path in files if path.startswith(f"tests/{test}")]
+    tests = [etree.fromstring(files[path]) for path in paths]
+    names = [ref.get("href") for test in tests for ref in test.iter(f"{{{QTI}}}assessmentItemRef")]
+    return [etree.fromstring(files[unquote(name).removeprefix("../")]) for name in names]
+
+
+@pytest.fixture(scope="session")
+def zoo_items(qti: Package) -> dict[str, etree._Element]:
+    """The items by the names of their questions."""
+    return dict(zip(ANY, items(qti.files), strict=True))
+
+
+def shape(node: etree._Element, path: str) -> list[str]:
+    """Texts or attributes."""
+    found = node.xpath(path, namespaces=SPACES)
+    return [part if isinstance(part, str) else "".join(part.itertext()) for part in found]
+
+
+def right(one: etree._Element) -> list[str]:
+    return shape(one, "//q:correctResponse/q:value")
+
+
+def test_package_of_every_kind_of_question_is_whole(
+    qti: Package, zoo_items: dict[str, etree._Element]
+) -> None:
+    assert qti.done.out.count("warning[package-reduced]") == 1, "the simulation"
+    assert "wrote 14 files to quizzes-qti.zip, 0.0 MB" in qti.done.out
+    check(qti.files)
+    bases = "//q:responseDeclaration/@baseType"
+    assert {name: shape(one, bases) for name, one in zoo_items.items()} == {
+        "mcq": ["identifier"], "several": ["identifier"], "predict": ["identifier"],
+        "numeric": ["float"], "zero": ["float"], "large": ["float"], "output": ["string"],
+        "marks": ["string"], "open": ["string"], "order": ["identifier"],
+    }  # fmt: skip
+    assert qti.files["files/lessons/sketch.svg"] == SVG.encode()
+    titles = [one.get("title") for one in zoo_items.values()]
+    assert titles == [f"Check: Question {n}" for n in range(1, 11)]
+
+
+def test_item_of_a_choice_holds_all_that_its_question_says(
+    zoo_items: dict[str, etree._Element],
+) -> None:
+    one = zoo_items["mcq"]
+    assert right(one) == ["B"]
+    assert shape(one, "//q:choiceInteraction/@maxChoices") == ["1"]
+    assert shape(one, "//q:simpleChoice") == ["1 < 2", "two", "three"]
+    assert shape(one, "//q:infoControl/@title") == ["Hint 1", "Hint 2"]
+    assert shape(one, "//q:modalFeedback/@identifier") == ["A", "C", "EXPLANATION"]
+    assert shape(one, "//q:itemBody/q:pre") == ["if x < 1:\n    y = '&'"]
+    assert shape(one, "//q:itemBody//q:img/@src") == ["../files/lessons/sketch.svg"]
+    assert shape(one, "//q:itemBody//q:td/@class") == ["align-center", "align-right"]
+    assert shape(one, "//q:itemBody/q:ul/q:li") == ["☑ done", "☐ not"]
+    several = zoo_items["several"]
+    assert right(several) == ["A", "C"]
+    assert shape(several, "//q:responseDeclaration/@cardinality") == ["multiple"]
+    assert shape(several, "//q:choiceInteraction/@maxChoices") == ["0"]
+    assert "Choose all that are right." in shape(several, "//q:itemBody/q:p")
+
+
+def test_item_of_a_number_has_its_tolerance_and_unit(
+    zoo_items: dict[str, etree._Element],
+) -> None:
+    for name, value, within in (
+        ("numeric", 0.08, 1e-4), ("zero", 0.0, 0.5), ("large", 6.02e23, 0.02 * 6.02e23)
+    ):  # fmt: skip
+        assert [float(text) for text in right(zoo_items[name])] == [value]
+        [tolerance] = shape(zoo_items[name], "//q:equal/@tolerance")
+        assert [float(text) for text in tolerance.split()] == pytest.approx([within, within])
+    assert shape(zoo_items["numeric"], "//q:p[q:textEntryInteraction]") == [" kg m2"]
+    assert shape(zoo_items["numeric"], "//q:sup") == ["2"]
+
+
+def test_items_of_outputs_texts_and_orders(zoo_items: dict[str, etree._Element]) -> None:
+    one = zoo_items["output"]
+    assert (right(one), right(zoo_items["marks"])) == (["drift  +6.6 %"], ["<b>&amp;"])
+    assert shape(one, "//q:stringMatch/@caseSensitive") == ["true"]
+    assert "What does examples/fall.py print in line 1 of its output?" in shape(one, "//q:p")
+    one = zoo_items["open"]
+    assert right(one) == [] and shape(one, "//q:responseCondition") == []
+    assert shape(one, "//q:rubricBlock/@view") == ["scorer"]
+    assert shape(one, "//q:rubricBlock/q:p[1]") == ["A good answer"]
+    [said] = shape(one, "//q:modalFeedback")
+    assert said.startswith("A good answer") and said.endswith("Because.")
+    one = zoo_items["order"]
+    names = shape(one, "//q:simpleChoice/@identifier")
+    texts = dict(zip(names, shape(one, "//q:simpleChoice"), strict=True))
+    assert [texts[name] for name in right(one)] == ["first", "second", "3", "fourth"]
+    assert right(one) != sorted(right(one)) and names == sorted(names), "it is not given away"
+    assert shape(one, "//q:responseDeclaration/@cardinality") == ["ordered"]
+
+
+# --- hard cases
+
+WARNED = {
+    "<video src='a.mp4'>words</video>": "`<video>` has no place in QTI and is left out",
+    "<ol start='5'><li>five</li></ol>": "a numbered list counts from 1",
+    "<del>no</del>": "crossed-out text is marked by a class",
+    "[there](#hello)": "the link to `#hello` is text, as the course has no `base_url`",
+    "<details><summary>More</summary>x</details>": "`<details>` is open",
+}
+IDS = ["4.2-check", "x-" * 40, "con", "A..b", "7", "a-b", "a_b", "a.b", "ab"]
+IDS += ["x" * 60 + "1", "x" * 60 + "2"]
+FORMULAS = (
+    r"\frac{a}{b} \boxed{E=mc^2} \color{red}x \cancel{y} \vec{v} \sqrt[3]{x} \overbrace{a}^{n}"
+    r" \begin{aligned}a&=b\\c&=d\end{aligned} \text{if } \left(\frac12\right] \mathbb{R}"
+    r" \raisebox{2pt}{x} \phantom{x} \binom{n}{k} \xrightarrow{abc} x'' \not= \lim_{x\to0}"
+)
+
+
+def test_package_of_hard_cases_is_whole_and_its_losses_are_told(make_course: Make) -> None:
+    """What a page cannot hold either is a mistake of the author's, and not tried here."""
+    hostile = [
+        {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
+         "options": [text, "b"], "answer": 0, "feedback": [text, text]}
+        for text in HOSTILE if text not in REFUSED
+    ]  # fmt: skip
+    formulas = {**ANY["zero"], "q": f"Inline ${FORMULAS}$ and\n\n$${FORMULAS}$$"}
+    twice = [ANY["zero"], {**ANY["zero"], "q": "Again?"}]
+    folder = make_course(
+        GOOD
+        + SCRIPT.replace("fall.py", "fall.py requires=no_such_module")
+        + quiz("unknown", ANY["output"], ANY["zero"])
+        + quiz("hostile", *hostile, title='<i>"T" & co</i>')
+        + quiz("warned", *({**ANY["zero"], "q": text} for text in WARNED))
+        + quiz("formulas", formulas)
+        + "".join(quiz(id, *twice) for id in IDS)
+        + quiz("sim", ANY["predict"])
+    )
+    folder.write("content/pages/about.md", "## About\n\n" + quiz("page", ANY["mcq"]))
+    folder.write("content/pages/sketch.svg", SVG)
+    folder.replace(
+        "content/course.toml",
+        "[[level]]",
+        '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n\n[[level]]',
+    )
+    done = export(folder)
+    files = entries(folder.root / ZIP)
+    check(files)
+    said = [
+        *("it is left out: its script was not run, so nobody knows the key", *WARNED.values()),
+        "its simulation is on its page alone, and left out",
+    ]
+    reduced = "this question is not whole in the QTI package: "
+    assert [one for one in said if f"{reduced}{one}" not in done.out] == []
+    assert len(items(files, "quiz.unknown")) == 1
+    assert len(items(files, "quiz.hostile")) == len(hostile) > 15
+    assert etree.fromstring(files["tests/quiz.hostile.xml"]).get("title") == '<i>"T" & co</i>'
+    assert "tests/quiz.page.xml" in files and "files/pages/sketch.svg" in files
+    names = [one.get("identifier") for one in items(files)]
+    assert len(set(names)) == len(names)
+    wanted = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,31}")
+    every = [*names, *(path.rpartition("/")[2][:-4] for path in files if "s/quiz." in path)]
+    assert [name for name in every if not wanted.fullmatch(name)] == []
+    [one] = items(files, "quiz.formulas")
+    found = one.findall(f".//{{{MATHML}}}math")
+    assert len(found) == 2, "a formula that a page cuts in pieces is whole"
+    assert not [key for math in found for node in math.iter() for key in node.attrib
+                if key in ("class", "style") or key.startswith("data-")]  # fmt: skip
+    assert "mathcolor" in {key for node in found[0].iter() for key in node.attrib}
+    assert [n.get("notation") for n in found[0].iter(f"{{{MATHML}}}menclose")] == [
+        "box", "updiagonalstrike"
+    ]  # fmt: skip
+    folder.replace(
+        "content/course.toml", "[[level]]",
+        '[[silence]]\nrule = "package-reduced"\nreason = "the platform has none"\n\n[[level]]',
+    )  # fmt: skip
+    assert "package-reduced" not in export(folder).out
+
+
+def test_identifiers_of_any_texts_are_valid_and_differ() -> None:
+    texts = ["", "ä", "ä ", "_e4_", "Проверка", "問題", "a/b", "..", "a\0b", "é" * 60, "é" * 61,
+             "a b"]  # fmt: skip
+    for most in (0, 32):
+        names = [identifier("q.", text, most=most) for text in texts]
+        assert len(set(names)) == len(texts)
+        for name in names:
+            assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", name) and len(name) <= (most or 1000)
+
+
+# --- edits
+
+
+def test_package_follows_edits_and_names_of_other_items_stay(make_course: Make) -> None:
+    folder = make_course(GOOD + quiz("a", ANY["zero"], ANY["several"]))
+    before = set(package(folder))
+    folder.write(folder.lesson(), GOOD + quiz("a", ANY["large"], ANY["several"], ANY["zero"]))
+    after = set(package(folder))
+    assert before < after and len(after - before) == 1
+    folder.write(folder.lesson(), GOOD + quiz("a", {**ANY["mcq"], "id": "why"}, ANY["predict"]))
+    folder.write("content/lessons/sketch.svg", SVG.replace("4", "5"))
+    folder.replace(
+        "content/course.toml",
+        'title = "Scratch"\n',
+        'title = "Scratch"\nbase_url = "https://example.org/c/"\n',
+    )
+    assert "its simulation is on its page alone, and the item links it" in export(folder).out
+    files = package(folder)
+    assert "items/q.a.why.xml" in files
+    assert files["files/lessons/sketch.svg"] == SVG.replace("4", "5").encode()
+    [address] = shape(items(files)[1], "//q:modalFeedback//q:a/@href")
+    assert re.fullmatch(r"https://example\.org/c/lessons/1\.1-one\.html#a\.[0-9a-f]{8}", address)
+
+
+@pytest.mark.slow
+def test_same_course_gives_the_same_bytes(qti: Package) -> None:
+    once = qti.folder.read(ZIP)
+    export(qti.folder)
+    assert qti.folder.read(ZIP) == once, "from what is kept"
+    export(qti.folder, "--no-cache", "--jobs", "1", "--out", "sub/other.zip")
+    assert qti.folder.read("sub/other.zip") == once

@@ -1,0 +1,129 @@
+"""`coursebuild export`: what a feature of the course can write, and where it may be written."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from support.scratch_course import GOOD, ROOT, Folder
+
+pytestmark = pytest.mark.site
+
+MAP = "content/course.toml"
+
+
+@pytest.fixture
+def course(tmp_path: Path, stores: Path) -> Folder:
+    """A course with the exporter that the docs show."""
+    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    [code] = re.findall(r"^```python\n([^`]*?Exporter\(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    folder = Folder(tmp_path / "a course")
+    folder.fill([GOOD, "## Two\n"], stores)
+    folder.write("features/lessons.py", code)
+    folder.replace(MAP, "[course]\n", '[course]\nfeatures = ["features/lessons.py"]\n')
+    folder.replace(MAP, 'title = "Lesson two"', "title = 'Two, \"quoted\"'")
+    return folder
+
+
+def test_example_of_the_docs_writes_the_lessons_as_a_table(course: Folder) -> None:
+    done = course.main("export", "lessons")
+    assert done.status == 0, done.out + done.err
+    assert "wrote lessons.csv, 0.0 MB" in done.out
+    table = 'id,title,scripts\r\n1.1,Lesson one,1\r\n1.2,"Two, ""quoted""",0\r\n'
+    assert course.read("lessons.csv") == table.encode()
+    course.replace(MAP, "Lesson one", "One")
+    assert course.main("export", "lessons").status == 0, "an earlier export is replaced"
+    assert b"1.1,One,1" in course.read("lessons.csv")
+
+
+def test_exporter_may_pack_files_draw_documents_and_warn(course: Folder) -> None:
+    course.write(
+        "features/lessons.py",
+        """
+from coursebuild.core.features import Exporter, Feature
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.rules import Rule
+
+
+def make(context):
+    for lesson in context.course.lessons:
+        page = context.page(lesson.document)
+        yield OutputFile(f"{lesson.id}.html", page.blocks(page.document.blocks).encode())
+        yield diagnose("bare", lesson.document.blocks[0].span, f"{lesson.id} has no frame")
+    yield from (file for path, file in context.site().items() if path.endswith(".css"))
+    yield OutputFile("map.toml", context.read("content/course.toml"))
+
+
+FEATURE = Feature(
+    name="bare",
+    rules=(Rule("bare", "warning", "A page has no frame."),),
+    exporters=(Exporter(name="bare", summary="s", file="b.zip", mark="map.toml", make=make),),
+)
+""",
+    )
+    done = course.main("export", "bare", "--out", "sub/b.zip")
+    assert done.status == 0 and "wrote 4 files to sub/b.zip" in done.out, done.out + done.err
+    assert done.out.count("warning[bare]") == 2
+    assert course.main("export", "bare", "--out", "sub/b.zip").status == 0
+
+
+def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
+    course.write("notes.txt", "mine")
+    course.write("mine.zip", b"PK\x05\x06" + bytes(18))
+    course.write("public/.coursebuild-site", "{}")
+    for name, out, reason in (
+        ("lessons", "models/q.csv", "lies in models/ of the project, where no export goes"),
+        ("lessons", "notes.txt", "notes.txt is there, and is no such export"),
+        ("epub", "notes.txt", "notes.txt is there, and is no such export"),
+        ("page", "notes.txt", "notes.txt is there, and is no such export"),
+        ("scorm", "mine.zip", "mine.zip is there, and is no such export"),
+        ("lessons", ".", "is a folder"),
+        ("lessons", "public/q.csv", "lies in a published site, which the next build replaces"),
+    ):
+        done = course.main("export", name, "--out", out)
+        assert (done.status, reason in done.err) == (2, True), (name, out, done.err)
+    assert course.text("notes.txt") == "mine"
+
+
+def test_unknown_and_broken_exporters_are_told(course: Folder) -> None:
+    done = course.main("export", "docx")
+    offers = "epub, lessons, page, qti, scorm"
+    assert done.status == 2
+    assert done.err == f"coursebuild: there is no export `docx`: choose from {offers}\n"
+    course.replace("features/lessons.py", 'name="lessons"', 'name="scorm"')
+    done = course.main("export", "docx")
+    assert "features/lessons.py: two features are called `scorm`" in done.err
+    course.replace("features/lessons.py", 'Feature(name="scorm"', 'Feature(name="own"')
+    assert "there is an export `scorm` already" in course.main("check").out
+    usage = course.main("export", "--help").out
+    assert "scorm (the course as SCORM 1.2)" in " ".join(usage.split())
+
+
+def test_nothing_is_written_where_something_is_wrong_or_there_is_nothing(course: Folder) -> None:
+    done = course.main("export", "qti")
+    assert (done.status, done.err.splitlines()[-1]) == (
+        1, "coursebuild: the course has nothing that `export qti` could write"
+    )  # fmt: skip
+    assert course.main("export", "lessons").status == 0
+    once = course.read("lessons.csv")
+    course.replace(course.lesson(), "hello 3.14159\n", "hello 3.14158\n")
+    done = course.main("export", "lessons")
+    assert done.status == 1 and "nothing was written" in done.out
+    assert course.read("lessons.csv") == once
+
+
+def test_full_disk_leaves_what_was_there(course: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert course.main("export", "scorm").status == 0
+    once = course.read("course-scorm.zip")
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("zipfile.ZipFile.writestr", full)
+    done = course.main("export", "scorm")
+    assert done.status == 1 and "cannot be written: no space left on device" in done.err
+    assert course.read("course-scorm.zip") == once
+    assert not [name for name in course.beside() if name.startswith(".course-scorm.zip")]
