@@ -135,7 +135,7 @@ class SiteMaker:
         if self.course.base_url:
             sitemap = meta.sitemap(self.course, pages.indexed)
             files.append(OutputFile(urls.SITEMAP, sitemap))
-        files += self._exports(pages, frozenset(file.path for file in files))
+        files += self._page_copies(pages, frozenset(file.path for file in files))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
         if entries is None and not pages.are_sound({file.path for file in files}):
@@ -261,14 +261,12 @@ class SiteMaker:
         )
         return zips.Surroundings(packages, library, meshes, imports, imports.of)
 
-    # --- what the site gives away
+    # --- Markdown and notebooks
 
-    def _exports(self, pages: Pages, taken: frozenset[str]) -> Iterator[SiteFile]:
-        from coursebuild.core.pages.exports.files import ExportContext, Exports
+    def _page_copies(self, pages: Pages, taken: frozenset[str]) -> Iterator[SiteFile]:
+        from coursebuild.core.pages.exports.files import page_copies
 
-        return Exports(
-            self.library, pages, ExportContext(self._packed, self._imports, taken)
-        ).files()
+        return page_copies(self.library, pages, self._packed, self._imports, taken)
 
 
 def _cut_font(store: Memo, job: FontJob) -> bytes:

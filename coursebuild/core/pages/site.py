@@ -12,7 +12,7 @@ Entry point: `render_site(course, results, assets, options)`.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from hashlib import sha256
 
 from msgspec import Struct, field
@@ -23,7 +23,9 @@ from coursebuild.core.pages import fonts, meta, urls, zips
 from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files, page_notes
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.exports.files import ExportContext, Exports, OnDemand
+from coursebuild.core.pages.draw import draw_whole
+from coursebuild.core.pages.exports.files import PageByproducts, page_byproducts, page_copies
+from coursebuild.core.pages.exports.markdown_copy import html_copy
 from coursebuild.core.pages.frame import Draft, Names, frame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
@@ -143,13 +145,36 @@ def _exports(
 ) -> Iterator[OutputFile]:
     """What the site gives away besides its pages."""
     bodies = {draft.path: visible(str(draft.body)) for draft in drafts}
-    context = ExportContext(
-        zips.lesson_archives(library, options.around),
-        options.around.imports,
-        frozenset(urls.file_path(file.path) for file in options.files),
-    )
-    for file in Exports(library, OnDemand(library, bodies.__getitem__), context).files():
-        yield file if isinstance(file, OutputFile) else OutputFile(file.path, file.make())
+    archives = zips.lesson_archives(library, options.around)
+    taken = frozenset(urls.file_path(file.path) for file in options.files)
+    source = _Pages(library, bodies)
+    for file in page_copies(library, source, archives, options.around.imports, taken):
+        yield OutputFile(file.path, file.make())
+
+
+class _Pages:
+    """The pages of a site, of which each is drawn again when its copies are made."""
+
+    def __init__(self, library: Library, bodies: Mapping[str, str]) -> None:
+        """`bodies` are the pages as published, by path."""
+        self._library = library
+        self._bodies = bodies
+        self._entries = {entry.path: entry for entry in page_list(library)}
+        self.paths = tuple(self._entries)
+
+    def key(self, path: str) -> str:
+        """Its path: nothing is kept."""
+        return path
+
+    def byproducts(self, path: str) -> PageByproducts:
+        """What a page gives to the files beside it."""
+        entry, body = self._entries[path], self._bodies[path]
+        document = entry.document(self._library)
+        if document is None:
+            return PageByproducts(html_copy(path, body), None)
+        inputs = entry.inputs(self._library)
+        _, page = draw_whole(inputs, document, self._library.tools)
+        return page_byproducts(inputs, page, self._library.course.base_url, body)
 
 
 def _machine_files(course: Course, drafts: Iterable[Draft]) -> Iterator[OutputFile]:

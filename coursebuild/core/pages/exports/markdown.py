@@ -13,8 +13,8 @@ where links lead and what our own blocks become.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
-from typing import Protocol, TypeAlias, assert_never
+from collections.abc import Iterable
+from typing import Protocol, assert_never
 
 from coursebuild.core.model import (
     Bench,
@@ -107,36 +107,20 @@ class MarkdownContext(Protocol):
         ...
 
 
-Same: TypeAlias = dict[int, tuple[object, str]]
-"""Texts that are the same in every context, by the identity of what they were written from, which
-is held so that it stays its own."""
+def write_blocks(blocks: Iterable[Block], context: MarkdownContext) -> str:
+    """Blocks one after the other, an empty line between two, without the last line end."""
+    return _Writer(context).blocks(blocks)
 
 
-def write_blocks(
-    blocks: Iterable[Block], context: MarkdownContext, same: Same | None = None
-) -> str:
-    """Blocks one after the other, an empty line between two, without the last line end.
-
-    Where the same document is written for several contexts that show the same numbers, `same` is
-    what they share.
-    """
-    return _Writer(context, same).blocks(blocks)
-
-
-def write_inlines(
-    inlines: tuple[Inline, ...], context: MarkdownContext, same: Same | None = None
-) -> str:
+def write_inlines(inlines: tuple[Inline, ...], context: MarkdownContext) -> str:
     """Inlines in one line, such as a title."""
-    return _Writer(context, same).title(inlines)
+    return _Writer(context).line(inlines)
 
 
-def write_footnotes(
-    footnotes: Iterable[Footnote], context: MarkdownContext, same: Same | None = None
-) -> str:
+def write_footnotes(footnotes: Iterable[Footnote], context: MarkdownContext) -> str:
     """The definitions of footnotes, which are referred to as `[^1]`."""
     return "\n\n".join(
-        hang(f"[^{note.number}]: ", write_blocks(note.blocks, context, same), 4)
-        for note in footnotes
+        hang(f"[^{note.number}]: ", write_blocks(note.blocks, context), 4) for note in footnotes
     )
 
 
@@ -150,31 +134,11 @@ _LAST_MARKS = pattern(r"(^|\s)(#+)$")
 
 
 class _Writer:
-    def __init__(self, context: MarkdownContext, same: Same | None) -> None:
+    def __init__(self, context: MarkdownContext) -> None:
         self.context = context
-        self._same = same
-        self._asked = False
-        """Whether the context said where something lies: elsewhere it may say otherwise."""
 
-    def title(self, inlines: tuple[Inline, ...]) -> str:
-        """Inlines in one line."""
-        return self._once(inlines, lambda: self._one_line(inlines))
-
-    def _one_line(self, inlines: Iterable[Inline]) -> str:
+    def line(self, inlines: Iterable[Inline]) -> str:
         return " ".join(self.inlines(inlines, line=True).split("\n")).strip()
-
-    def _once(self, of: object, write: Callable[[], str]) -> str:
-        """A text, taken from another context where it is the same there."""
-        if self._same is None:
-            return write()
-        known = self._same.get(id(of))
-        if known is not None:
-            return known[1]
-        self._asked = False
-        text = write()
-        if not self._asked:
-            self._same[id(of)] = of, text
-        return text
 
     # --- blocks
 
@@ -198,9 +162,9 @@ class _Writer:
     def block(self, block: Block, after: Block | None = None) -> str:
         match block:
             case Heading():
-                return self._once(block, lambda: self._heading(block))
+                return self._heading(block)
             case Paragraph():
-                return self._once(block, lambda: self.inlines(block.children))
+                return self.inlines(block.children)
             case HtmlFlow():
                 return "".join(map(self._in_html, block.children))
             case ListBlock():
@@ -217,7 +181,7 @@ class _Writer:
                 tex, tag = no_empty_lines(block.tex.text), self._tag(block.span.start)
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case Table():
-                return self._once(block, lambda: self._table(block))
+                return self._table(block)
             case Callout() | PlainCode() | Script() | Recording() | Mjcf():
                 return self.context.own(block)
             case Bench() | Lab() | FeatureBlock():
@@ -232,7 +196,7 @@ class _Writer:
         return self._inline(inline, line=False, cell=False)
 
     def _heading(self, heading: Heading) -> str:
-        text = _LAST_MARKS.sub(r"\1\\\2", self._one_line(heading.children))
+        text = _LAST_MARKS.sub(r"\1\\\2", self.line(heading.children))
         return f"{'#' * heading.level} {text}".rstrip()
 
     def _list(self, block: ListBlock, *, other: bool) -> str:
@@ -308,13 +272,11 @@ class _Writer:
                 text = self._joined(inline.children, line=line, cell=cell)
                 return self._link(inline, text, cell=cell)
             case Image():
-                self._asked = True
                 url = self.context.url(inline.url)
                 return piped(picture(inline.alt, url, inline.title), cell=cell)
             case RawInline():
                 return piped(inline.html, cell=cell)
             case FootnoteRef():
-                self._asked = True
                 return self.context.reference(inline.number)
             case _:
                 assert_never(inline)
@@ -327,7 +289,6 @@ class _Writer:
         source = node.span.text
         if source == f"<{plain_text(node.children)}>" and not cell:
             return source
-        self._asked = True
         href = self.context.href(node.target)
         text = text or escaped(self.context.named(node.target))
         return link(text, href.replace("|", "%7C") if cell else href, node.title)

@@ -16,7 +16,7 @@ from urllib.parse import unquote, urlsplit
 
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.markdown import Same, write_blocks, write_footnotes
+from coursebuild.core.pages.exports.markdown import write_blocks, write_footnotes
 from coursebuild.core.pages.exports.marks import code_span, escaped, guarded, link
 from coursebuild.core.pages.exports.plain import Plain
 from coursebuild.core.pages.lesson import LessonHead, LessonLink, LevelName
@@ -41,17 +41,17 @@ def markdown_href(place: urls.Place, href: str) -> str:
     return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
 
 
-def markdown_copy(inputs: PageInputs, page: PageContext | None, body: str, same: Same) -> str:
-    """The text of a page; `body` is its HTML, as published, `same` what its notebook shares."""
+def markdown_copy(inputs: PageInputs, page: PageContext | None, body: str) -> str:
+    """The text of a page; `body` is its HTML, as published."""
     if page is None:
         return html_copy(inputs.path, body)
     place, words, document = page.place, page.tools.words, page.document
     here = place.href(place.path)
-    context = Plain(page, lambda href: markdown_href(place, href), here, same=same)
+    context = Plain(page, lambda href: markdown_href(place, href), here)
     parts = (
         *head(inputs, words, context.locate),
-        write_blocks(document.blocks, context, same),
-        write_footnotes(document.footnotes, context, same),
+        write_blocks(document.blocks, context),
+        write_footnotes(document.footnotes, context),
         *_foot(inputs, words, context.locate),
     )
     return "\n\n".join(filter(None, parts)) + "\n"
@@ -61,9 +61,7 @@ def html_copy(path: str, body: str) -> str:
     """The text of a page without a document, from its HTML."""
     if urls.markdown_path(path) is None:
         return ""
-    from coursebuild.core.pages.exports.fromhtml import (
-        markdown_of,  # pages with one need none of it
-    )
+    from coursebuild.core.pages.exports.fromhtml import markdown_of
 
     return f"{markdown_of(body, lambda href: markdown_href(urls.Place(path), href))}\n"
 

@@ -28,7 +28,7 @@ def quoted(text: str) -> str:
 
 def fence(language: str, text: str) -> str:
     """Code between fences that are longer than any in it."""
-    runs = _FENCES.findall(text) if "```" in text else ()
+    runs = _FENCES.findall(text)
     ticks = "`" * max([3, *(len(run) + 1 for run in runs)])
     body = text if text.endswith("\n") or not text else f"{text}\n"
     return f"{ticks}{language}\n{body}{ticks}"
@@ -40,7 +40,7 @@ _FENCES = pattern(r"^[ ]*(`{3,})", re.MULTILINE)
 def code_span(text: str, ticks: str = "") -> str:
     """Text as inline code, between these ticks or as few as do."""
     text = text.replace("\n", " ")
-    runs = set(map(len, _TICKS.findall(text))) if "`" in text else ()
+    runs = set(map(len, _TICKS.findall(text)))
     ticks = ticks or "`" * next(n for n in range(1, len(text) + 2) if n not in runs)
     blank = text.strip(" ") == ""
     edges = text[:1] == "`" or text[-1:] == "`" or (text[:1] == text[-1:] == " ")
@@ -49,16 +49,14 @@ def code_span(text: str, ticks: str = "") -> str:
 
 
 _TICKS = pattern("`+")
-_ANY_MARK = pattern(r"[\\`*\[\]<$|!~&_]")
-"""What every mark has; most texts have none."""
 _MARKS = pattern(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
-ALWAYS = pattern(r"[$`]")
+_ALWAYS = pattern(r"[$`]")
 """What is escaped wherever it is text: another reader may see more in it than ours did."""
 
 
 def escaped(text: str) -> str:
     """Text with all its marks escaped, in one line or several."""
-    return _MARKS.sub(lambda match: f"\\{match[0]}", text) if _ANY_MARK.search(text) else text
+    return _MARKS.sub(lambda match: f"\\{match[0]}", text)
 
 
 def link(text: str, href: str, title: str = "") -> str:
@@ -111,10 +109,7 @@ _BEGINS = pattern(
 
 def guarded(text: str) -> str:
     """The lines of a paragraph, so that none of them begins another block."""
-    # A letter begins no block.
-    return "\n".join(
-        [line if line[:1].isalpha() else _guarded_line(line) for line in text.split("\n")]
-    )
+    return "\n".join(map(_guarded_line, text.split("\n")))
 
 
 def _guarded_line(line: str) -> str:
@@ -148,14 +143,13 @@ def text_source(node: Text, *, cell: bool) -> str:
         if text[-1:].isspace() and not source[-1:].isspace():
             text = f"{text[:-1]}&#{ord(text[-1])};"
         return text.replace("\n", "&#10;")
-    if "$" in source or "`" in source:
-        source = ALWAYS.sub(lambda match: f"\\{match[0]}", source)
+    source = _ALWAYS.sub(lambda match: f"\\{match[0]}", source)
     return piped(source, cell=cell)
 
 
 def piped(text: str, *, cell: bool) -> str:
     """Marks, whose pipes are escaped in a cell of a table."""
-    return _PIPE.sub(r"\\|", text) if cell and "|" in text else text
+    return _PIPE.sub(r"\\|", text) if cell else text
 
 
 def delimiter(source: str, usual: str) -> str:
@@ -168,7 +162,7 @@ def formula(node: Math, tag: str, *, cell: bool) -> str:
     tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it may end with a comment
     if cell:  # a pipe would end the cell, and an escaped one is another sign
         tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
-    if "%" in tex and _COMMENT.search(tex):  # a line's end ends a comment
+    if _COMMENT.search(tex):  # a line's end ends a comment
         tex = no_empty_lines(tex)
     elif "\n" in tex:
         tex = " ".join(part.strip() for part in tex.split("\n"))

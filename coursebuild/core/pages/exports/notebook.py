@@ -1,7 +1,7 @@
 """A lesson as a Jupyter notebook that runs.
 
-Entry points: `notebook(inputs, page, …)`, all that the lesson itself gives, and
-`finished(notebook, …)`, the file, with what its scripts need around them.
+Entry point: `notebook(inputs, page, base_url)`, all that the lesson itself gives; `notebook_file`
+makes a file of it, with what its scripts need around them.
 
 1. Markdown cells are cut at headings and at scripts. Links are made whole with the course's
    address, or left as they are on the page where it has none.
@@ -34,7 +34,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.markdown import Same, write_blocks
+from coursebuild.core.pages.exports.markdown import write_blocks
 from coursebuild.core.pages.exports.markdown_copy import head
 from coursebuild.core.pages.exports.marks import escaped, hang, link
 from coursebuild.core.pages.exports.plain import Plain
@@ -64,18 +64,16 @@ class Notebook(Struct, frozen=True):
     head: str
     """Markdown of the first cell."""
     cells: tuple[NotebookCell, ...]
-    python: str
-    """Version of the interpreter that ran the scripts."""
     words: tuple[tuple[str, str], ...]
     """Texts of the first cells, by key, as Markdown."""
 
 
-def notebook(inputs: PageInputs, page: PageContext, base_url: str, same: Same) -> Notebook:
-    """The cells of a lesson; `same` is what its Markdown copy has written."""
+def notebook(inputs: PageInputs, page: PageContext, base_url: str) -> Notebook:
+    """The cells of a lesson."""
     document, words = page.document, page.tools.words
     here = _whole(base_url, inputs.path, page.place.href(inputs.path))
     locate = functools.partial(_whole, base_url, inputs.path)
-    context = Plain(page, locate, here, notebook=True, same=same)
+    context = Plain(page, locate, here, notebook=True)
     parts = head(inputs, words, locate)
     if base_url:
         parts.append(link(context.words("exports.on_site"), here))
@@ -88,7 +86,7 @@ def notebook(inputs: PageInputs, page: PageContext, base_url: str, same: Same) -
             cells += _nested(context, "footnotes", note.blocks)
     keys = ("before", "install", "setup", "setup_none", "left_out")
     texts = tuple((key, escaped(words(f"exports.{key}", zip=SLOT))) for key in keys)
-    return Notebook("\n\n".join(parts), tuple(cells), page.shown.python, texts)
+    return Notebook("\n\n".join(parts), tuple(cells), texts)
 
 
 def _whole(base_url: str, path: str, href: str) -> str:
@@ -105,7 +103,7 @@ def _cells(context: Plain, blocks: Iterable[Block]) -> Iterator[NotebookCell]:
     done = {id(one) for some in joined.values() for one in some}
 
     def told() -> Iterator[NotebookCell]:
-        text = write_blocks(waiting, context, context.same)
+        text = write_blocks(waiting, context)
         if text:
             yield NotebookCell(section, text)
         waiting.clear()

@@ -1,7 +1,7 @@
 """A notebook as a file: its cells with their ids, and what the scripts need around them.
 
-Entry point: `finished(notebook, archive, imports)`. The id of a cell hangs on the heading above it
-or on its script.
+Entry point: `notebook_file(notebook, archive, imports)`. The id of a cell hangs on the heading
+above it or on its script.
 """
 
 from __future__ import annotations
@@ -11,24 +11,21 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import TypeAlias
-
-import msgspec
+from typing import Any, TypeAlias
 
 from coursebuild.core.pages import zips
 from coursebuild.core.pages.exports.marks import code_span
 from coursebuild.core.pages.exports.notebook import SLOT, Notebook
 from coursebuild.core.text.patterns import pattern
 
-Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | bool | None"
-
-MOST = 4 << 20
+Json: TypeAlias = dict[str, Any]
+Imports: TypeAlias = Callable[[str], frozenset[str]]
+"""Says what a Python text imports."""
+_MOST = 4 << 20
 """Bytes of files that a notebook carries at most."""
 
 
-def finished(
-    made: Notebook, archive: zips.Archive | None, imports: Callable[[str], frozenset[str]]
-) -> bytes:
+def notebook_file(made: Notebook, archive: zips.Archive | None, imports: Imports) -> bytes:
     """The notebook as a file; `archive` is that of the lesson's scripts."""
     words = dict(made.words)
     cells = [_markdown("head", made.head)]
@@ -44,25 +41,18 @@ def finished(
             cells.append(_code(name, cell.text, cell.output))
         else:
             cells.append(_markdown(name, cell.text))
-    kernel: Json = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
-    language: Json = {"name": "python", "file_extension": ".py", "mimetype": "text/x-python"}
-    document: Json = {
-        "cells": list(cells),
+    kernel = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
+    language = {"name": "python", "file_extension": ".py", "mimetype": "text/x-python"}
+    document = {
+        "cells": cells,
         "metadata": {"kernelspec": kernel, "language_info": language},
         "nbformat": 4,
         "nbformat_minor": 5,
     }
-    return written(document)
-
-
-def written(value: Json) -> bytes:
-    """JSON as Jupyter writes it: keys in order, each value in a line of its own."""
-    try:
-        data = msgspec.json.encode(value, order="deterministic")
-    except UnicodeEncodeError:  # half of a pair of surrogates
-        text = json.dumps(value, ensure_ascii=False, indent=1, sort_keys=True)
-        return f"{text}\n".encode("utf-8", "replace")
-    return msgspec.json.format(data, indent=1) + b"\n"
+    text = json.dumps(
+        document, ensure_ascii=False, indent=1, sort_keys=True
+    )  # as Jupyter writes it
+    return f"{text}\n".encode("utf-8", "replace")
 
 
 _OTHERS = pattern(r"[^a-zA-Z0-9]+")
@@ -81,9 +71,8 @@ def _markdown(name: str, text: str) -> Json:
 
 
 def _code(name: str, text: str, output: str | None = None, *, hidden: bool = False) -> Json:
-    outputs: list[Json] = []
-    if output is not None:
-        outputs.append({"output_type": "stream", "name": "stdout", "text": _lines(output, "\n")})
+    stream = {"output_type": "stream", "name": "stdout"}
+    outputs = [] if output is None else [stream | {"text": _lines(output, "\n")}]
     return {
         "cell_type": "code",
         "id": name,
@@ -94,16 +83,13 @@ def _code(name: str, text: str, output: str | None = None, *, hidden: bool = Fal
     }
 
 
-def _lines(text: str, end: str = "") -> list[Json]:
+def _lines(text: str, end: str = "") -> list[str]:
     lines = text.rstrip("\n").split("\n")
     return [*[f"{line}\n" for line in lines[:-1]], f"{lines[-1]}{end}"]
 
 
 def _setup(
-    made: Notebook,
-    archive: zips.Archive,
-    imports: Callable[[str], frozenset[str]],
-    words: Mapping[str, str],
+    made: Notebook, archive: zips.Archive, imports: Imports, words: Mapping[str, str]
 ) -> Iterator[Json]:
     files = {path.partition("/")[2]: data for path, data in archive.files.items()}
     needed = sorted(files.pop("requirements.txt", b"").decode().split())
@@ -126,7 +112,7 @@ def _setup(
 
 def _small(files: Mapping[str, bytes]) -> dict[str, bytes]:
     """The files that a notebook can carry, the smallest first."""
-    room, found = MOST, {}
+    room, found = _MOST, {}
     for path, data in sorted(files.items(), key=lambda item: (len(item[1]), item[0])):
         room -= len(data)
         if room >= 0:
@@ -134,9 +120,7 @@ def _small(files: Mapping[str, bytes]) -> dict[str, bytes]:
     return found
 
 
-def _needed_early(
-    own: list[str], files: Mapping[str, bytes], imports: Callable[[str], frozenset[str]]
-) -> set[str]:
+def _needed_early(own: list[str], files: Mapping[str, bytes], imports: Imports) -> set[str]:
     """The scripts of the lesson that one above them imports, maybe through others."""
     modules = {
         path.removeprefix("examples/").removesuffix(".py"): path

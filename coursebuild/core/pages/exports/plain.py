@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Callable
 from typing import assert_never
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 from coursebuild.core.features import kind_of_block
 from coursebuild.core.model import (
@@ -32,7 +32,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.markdown import Same, write_blocks, write_inlines
+from coursebuild.core.pages.exports.markdown import write_blocks, write_inlines
 from coursebuild.core.pages.exports.marks import (
     code_span,
     escaped,
@@ -64,8 +64,6 @@ class Plain(Struct, frozen=True):
     """The address of the page with its labs."""
     notebook: bool = False
     """Whether scripts stand in cells of their own, answers are folded, and footnotes are a list."""
-    same: Same = field(default_factory=dict)
-    """What the page's other context writes in the same way."""
 
     # what the writer asks
 
@@ -115,11 +113,11 @@ class Plain(Struct, frozen=True):
 
     def blocks(self, blocks: tuple[Block, ...]) -> str:
         """Blocks as Markdown."""
-        return write_blocks(blocks, self, self.same)
+        return write_blocks(blocks, self)
 
     def inlines(self, inlines: tuple[Inline, ...]) -> str:
         """Inlines as Markdown in one line."""
-        return write_inlines(inlines, self, self.same)
+        return write_inlines(inlines, self)
 
     def words(self, key: str, **values: str | int | float) -> str:
         """A text of the interface, as Markdown."""
