@@ -48,8 +48,9 @@ def page_byproducts(
     `body` is the page's HTML as published.
     """
     text = markdown_copy(inputs, page, body) if urls.markdown_path(inputs.path) else ""
-    is_lesson = inputs.kind == "lesson" and page is not None
-    return PageByproducts(text, notebook(inputs, page, base_url) if is_lesson else None)
+    if page is None or inputs.kind != "lesson":
+        return PageByproducts(text, None)
+    return PageByproducts(text, notebook(inputs, page, base_url))
 
 
 class PageSource(Protocol):
