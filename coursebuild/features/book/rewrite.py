@@ -6,6 +6,7 @@ Entry point: `rewritten(content, rules)`.
 from __future__ import annotations
 
 import posixpath
+import re
 from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import unquote, urlsplit
 
@@ -13,7 +14,6 @@ from msgspec import Struct
 
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement
-from coursebuild.core.text.patterns import pattern
 
 _DROPPED = frozenset(
     "button form template script style dialog iframe object embed audio video source track".split()
@@ -30,7 +30,7 @@ _REFERRING = frozenset(
 )
 """Attributes that hold ids."""
 _ADDRESSES = frozenset(("href", "xlink:href", "src"))
-_IN_SVG = pattern(r"url\(#([^)]+)\)")
+_IN_SVG = re.compile(r"url\(#([^)]+)\)")
 
 
 class Rules(Struct, frozen=True):

@@ -76,7 +76,6 @@ from coursebuild.core.pages.exports.marks import (
 )
 from coursebuild.core.pages.look import OwnBlock
 from coursebuild.core.pages.markup import escape, is_tight
-from coursebuild.core.text.patterns import pattern
 
 
 class MarkdownContext(Protocol):
@@ -130,7 +129,7 @@ _APART = (
 )
 """Blocks that an empty line parts from others, even in a tight list."""
 
-_LAST_MARKS = pattern(r"(^|\s)(#+)$")
+_LAST_MARKS = re.compile(r"(^|\s)(#+)$")
 
 
 class _Writer:

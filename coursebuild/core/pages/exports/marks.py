@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterable
 
 from coursebuild.core.model import Math, NumberBinding, Text
-from coursebuild.core.text.patterns import pattern
 
 
 def hang(mark: str, text: str, indent: int | None = None) -> str:
@@ -34,7 +33,7 @@ def fence(language: str, text: str) -> str:
     return f"{ticks}{language}\n{body}{ticks}"
 
 
-_FENCES = pattern(r"^[ ]*(`{3,})", re.MULTILINE)
+_FENCES = re.compile(r"^[ ]*(`{3,})", re.MULTILINE)
 
 
 def code_span(text: str, ticks: str = "") -> str:
@@ -48,9 +47,9 @@ def code_span(text: str, ticks: str = "") -> str:
     return f"{ticks}{pad}{text}{pad}{ticks}"
 
 
-_TICKS = pattern("`+")
-_MARKS = pattern(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
-_ALWAYS = pattern(r"[$`]")
+_TICKS = re.compile("`+")
+_MARKS = re.compile(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
+_ALWAYS = re.compile(r"[$`]")
 """What is escaped wherever it is text: another reader may see more in it than ours did."""
 
 
@@ -79,7 +78,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[st
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
-_APART = pattern(r"[\s<>()\\]")
+_APART = re.compile(r"[\s<>()\\]")
 """What an address may have in angle brackets only."""
 
 
@@ -98,7 +97,7 @@ def _title(title: str) -> str:
     return f' "{text}"'
 
 
-_BEGINS = pattern(
+_BEGINS = re.compile(
     r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|`{3,}[^`]*$|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
     r"|[|:\s-]*-[|:\s-]*$)"
     r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
@@ -123,9 +122,9 @@ def _guarded_line(line: str) -> str:
     return f"\\{line}"
 
 
-_PIPE = pattern(r"(?<!\\)\|")
-_COMMENT = pattern(r"(?<!\\)%")
-_MINUS = pattern(r"(?<!\w)-(?=\d)")
+_PIPE = re.compile(r"(?<!\\)\|")
+_COMMENT = re.compile(r"(?<!\\)%")
+_MINUS = re.compile(r"(?<!\w)-(?=\d)")
 
 
 def number_text(node: NumberBinding) -> str:

@@ -16,7 +16,6 @@ from typing import Any, TypeAlias
 from coursebuild.core.pages import zips
 from coursebuild.core.pages.exports.marks import code_span
 from coursebuild.core.pages.exports.notebook import SLOT, Notebook
-from coursebuild.core.text.patterns import pattern
 
 Json: TypeAlias = dict[str, Any]
 Imports: TypeAlias = Callable[[str], frozenset[str]]
@@ -55,7 +54,7 @@ def notebook_file(made: Notebook, archive: zips.Archive | None, imports: Imports
     return f"{text}\n".encode("utf-8", "replace")
 
 
-_OTHERS = pattern(r"[^a-zA-Z0-9]+")
+_OTHERS = re.compile(r"[^a-zA-Z0-9]+")
 
 
 def _slug(name: str) -> str:
