@@ -19,7 +19,7 @@ from coursebuild.core.engine.publish import check_out, publish
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model.results import FileList, Results, SiteFile
 from coursebuild.core.text.diagnostics import Severity
-from coursebuild.pipeline.check import no_lessons, scripts_ahead
+from coursebuild.pipeline.check import no_lessons
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
@@ -31,7 +31,6 @@ from coursebuild.report import Report
 
 if TYPE_CHECKING:
     from coursebuild.core.model import Course
-    from coursebuild.core.run.prewarm import RunAll
     from coursebuild.numerics.reports import Reports
     from coursebuild.pipeline.site import Site
 
@@ -81,25 +80,18 @@ def prepare(options: Options, progress: Progress, make: Make | None = None) -> I
 
     `make` puts other files together than those of the site.
     """
-    with (
-        scripts_ahead(options) as run_all,
-        Documents(options.store, options.jobs, progress.stage) as documents,
-    ):
-        yield _prepared(options, progress, documents, make, run_all)
+    with Documents(options.store, options.jobs, progress.stage) as documents:
+        yield _prepared(options, progress, documents, make)
 
 
 def _prepared(
-    options: Options,
-    progress: Progress,
-    documents: Documents,
-    make: Make | None,
-    run_all: RunAll | None,
+    options: Options, progress: Progress, documents: Documents, make: Make | None
 ) -> Prepared:
     began = time.monotonic()
     loaded = load(options.root, documents)
     if loaded.course is None:
         return Prepared(judge(None, loaded.diagnostics, began), ())
-    verified = verify(loaded.course, options, progress, static=True, run_all=run_all)
+    verified = verify(loaded.course, options, progress, static=True)
     reports = shown_reports(options.root, loaded.course)
     found = [*loaded.diagnostics, *verified.diagnostics, *no_lessons(loaded.course)]
     found += reports.diagnostics

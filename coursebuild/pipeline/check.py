@@ -1,20 +1,18 @@
 """`coursebuild check`: verify the course, or some lessons of it; publish nothing.
 
-Entry points: `check(options, names)`; `scripts_ahead`, what runs scripts, begun before reading.
+Entry point: `check(options, names)`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course, Status
-from coursebuild.core.run.prewarm import RunAll, prewarmed_runner
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.pipeline.documents import Documents
@@ -47,25 +45,14 @@ def check(
     are moved a little.
     """
     progress = Progress(quiet=options.quiet)
-    with project_lock(options.root, progress.say), scripts_ahead(options, names) as run_all:
-        return _check(options, names, progress, run_all, shard, timings, sensitivity)
-
-
-@contextlib.contextmanager
-def scripts_ahead(options: Options, names: tuple[str, ...] = ()) -> Iterator[RunAll | None]:
-    """What runs the scripts, where it is worth beginning before the texts are read."""
-    if names or options.jobs == 1 or options.executor is not None or options.run_all is not None:
-        yield None
-        return
-    with prewarmed_runner(options.root, options.store) as run_all:
-        yield run_all
+    with project_lock(options.root, progress.say):
+        return _check(options, names, progress, shard, timings, sensitivity)
 
 
 def _check(
     options: Options,
     names: tuple[str, ...],
     progress: Progress,
-    run_all: RunAll | None,
     shard: Shard | None,
     timings: str | None,
     sensitivity: bool,
@@ -77,7 +64,7 @@ def _check(
     if course is None:
         return judge(None, loaded.diagnostics, began)
     chosen = select(course, names, options.root)
-    verified = verify(course, options, progress, chosen.documents, shard=shard, run_all=run_all)
+    verified = verify(course, options, progress, chosen.documents, shard=shard)
     if timings is not None:
         from coursebuild.pipeline.shards import write_timings
 

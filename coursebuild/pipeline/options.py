@@ -21,7 +21,7 @@ from coursebuild.core.model import Course, Lesson, Page, Status
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
 
 if TYPE_CHECKING:
-    from coursebuild.core.run.prewarm import RunAll
+    from coursebuild.core.run.runner import RunAll
 
 
 class Options(Struct, frozen=True):

@@ -39,7 +39,7 @@ from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
 from coursebuild.report import LabLine, ScriptLine
 
 if TYPE_CHECKING:
-    from coursebuild.core.run.prewarm import RunAll
+    from coursebuild.core.run.runner import RunAll
     from coursebuild.pipeline.shards import Shard
 
 

@@ -72,18 +72,16 @@ def mortals(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mortals]:
 def points(calls: list[str]) -> list[int]:
     """Which calls to die at, counted from 1: the structural ones, and the first write by half.
 
-    Of those that follow the same kind of call the first and the last: there are rows of them.
+    Of those that follow the same kind of call the last: there are rows of them.
     """
     structural = [number for number, name in enumerate(calls, 1) if name in STRUCTURAL]
-    first: dict[tuple[str, str], int] = {}
     last: dict[tuple[str, str], int] = {}
     before = ""
     for number in structural:
         name = calls[number - 1]
-        first.setdefault((before, name), number)
         last[before, name] = number
         before = name
-    return sorted({*first.values(), *last.values(), calls.index("write") + 1})
+    return sorted({*last.values(), calls.index("write") + 1})
 
 
 def again(template: Folder, folder: Folder) -> None:
@@ -143,23 +141,6 @@ def test_build_killed_at_any_call_leaves_old_or_new_site(
 
 def part(tree: dict[str, bytes], top: str) -> dict[str, bytes]:
     return {name: data for name, data in tree.items() if name.startswith(top)}
-
-
-def test_first_build_killed_at_any_call_leaves_no_site_or_all(
-    make: Make, mortals: Mortals, tmp_path: Path
-) -> None:
-    template, folder = make(OLD), Folder(tmp_path / "mortal")
-    assert mortals.run(template, "check", "-q")[0] == 0
-    again(template, folder)
-    status, calls = mortals.run(folder, "build", "-q")
-    assert status == 0
-    new = folder.tree()
-    for fatal in points(calls)[::2]:
-        again(template, folder)
-        mortals.die(folder, "build", "-q", fatal=fatal)
-        assert part(folder.tree(), "public/") in ({}, part(new, "public/")), calls[fatal - 1]
-        assert mortals.run(folder, "build", "-q")[0] == 0
-        assert (folder.tree(), leftovers(folder)) == (new, [])
 
 
 def test_update_killed_at_any_call_leaves_old_or_new_lessons(

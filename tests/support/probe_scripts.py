@@ -6,49 +6,15 @@
 from __future__ import annotations
 
 PROBES = {
-    "modules": "import sys\nprint(sorted(sys.modules))\n",
-    "modules of numpy": "import sys, numpy\nprint(sorted(sys.modules))\n",
-    "modules of mujoco": "import sys, mujoco\nprint(sorted(sys.modules))\n",
-    "modules of numpy.random": "import sys, numpy.random\nprint(sorted(sys.modules))\n",
-    "modules of numpy.random, late": """
-        import sys, numpy as np
-        before = set(sys.modules)
-        print(np.random.default_rng(1).random(2))
-        print(sorted(set(sys.modules) - before), "secrets" in sys.modules)
-    """,
-    "modules one after another": """
-        import sys
-        for name in ("re", "json", "numpy.linalg", "logging", "numpy.testing", "mujoco",
-                     "xml.etree", "xml.etree.ElementTree", "numpy.random", "multiprocessing",
-                     "concurrent.futures", "asyncio"):
-            before = set(sys.modules)
-            __import__(name)
-            print(name, sorted(set(sys.modules) - before))
-    """,
-    "attributes of modules": """
-        import importlib, os, sys
-        def show():
-            for name in sorted(sys.modules):
-                names = vars(sys.modules[name]).items()
-                print(name, sorted(k for k, v in names if type(v) is type(sys)))
-        show()
-        import xml
-        show()
-        import numpy as np
-        show()
-    """,
     "not imported": """
-        import xml
-        for code in ("xml.etree", "json", "numpy", "os.path", "importlib.util", "random.random()"):
+        for code in ("json", "numpy", "os.path", "random.random()", "numpy.random"):
             try:
                 print(code, type(eval(code)).__name__)
             except Exception as error:
                 print(code, repr(error))
-        import importlib
-        print(hasattr(importlib, "util"), hasattr(importlib, "machinery"))
     """,
     "identity": """
-        import json, numpy, numpy.linalg, sys, importlib
+        import json, numpy, numpy.linalg, sys, importlib.util
         from numpy import linalg
         print(json is sys.modules["json"], linalg is numpy.linalg, numpy.__spec__.name)
         print(numpy.__spec__.loader is numpy.__loader__, json.__spec__.origin == json.__file__)
@@ -79,7 +45,7 @@ PROBES = {
         print(sorted(int(n) for n in os.listdir("/proc/self/fd")))
         print(len(os.listdir("/proc/self/task")), threading.active_count(), threading.enumerate())
         main = threading.main_thread()
-        print(main is threading.current_thread(), main.native_id == os.getpid(), main.daemon)
+        print(main is threading.current_thread(), main.daemon)
     """,
     "signals": """
         import signal
@@ -107,24 +73,12 @@ PROBES = {
     """,
     "warnings": """
         import warnings
-        print(warnings.filters)
         warnings.warn("first")
         warnings.warn("old", DeprecationWarning)
         import numpy as np
-        print(warnings.filters, np.array([1.0]) / 0)
+        print(np.array([1.0]) / 0)
         def inner(): warnings.warn("outside", stacklevel=9)
         inner()
-    """,
-    "frames": """
-        import inspect, sys, traceback
-        print([(f.function, f.lineno) for f in inspect.stack()], sys._getframe().f_back)
-        traceback.print_stack()
-        def deep(n):
-            try:
-                return deep(n + 1)
-            except RecursionError:
-                return n
-        print(deep(0))
     """,
     "source": """
         import inspect, dataclasses, pickle, sys
@@ -278,9 +232,6 @@ FAILURES = {
         "import no_such_module\n",
         "import numpy as np\nnp.linalg.inv(np.zeros((2, 2)))\n",
         "import json\njson.loads('{')\n",
-        "raise KeyboardInterrupt\n",
-        "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True: pass\n",
-        "def f(): f()\nf()\n",
         "raise ExceptionGroup('many', [ValueError(1), TypeError(2)])\n",
         "import sys\nsys.excepthook = lambda *a: print('mine', a[0].__name__)\n1 / 0\n",
         "assert False, 'no'\n",
@@ -297,7 +248,6 @@ FAILURES = {
         "import os\nprint('lost')\nos._exit(3)\n",
         "import os\nprint('lost')\nos.abort()\n",
         "import ctypes\ndef crash(): ctypes.string_at(0)\ncrash()\n",
-        "import numpy, ctypes\ndef crash(): ctypes.string_at(0)\ncrash()\n",
         "import faulthandler\nprint(faulthandler.is_enabled())\nfaulthandler.dump_traceback()\n",
         "import os\nos.kill(os.getpid(), 9)\n",
         "import os, sys\nos.execv(sys.executable, [sys.executable, '-c', 'print(1)'])\n",
@@ -306,7 +256,6 @@ FAILURES = {
         "# -*- coding: latin-1 -*-\nprint('\xe9')\n",
         "\ufeffprint('bom')\n",
         "print('a')\r\nprint('b')\r\n",
-        "x = 1\0\n",
         "",
         "# only a comment",
         '"""Doc."""\nprint(__doc__)\n',

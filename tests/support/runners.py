@@ -12,7 +12,7 @@ import pytest
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import runner
 
-SOURCE_TREE = Path(runner.__file__).parents[2]
+SOURCE_TREE = Path(runner.__file__).parents[3]
 Run = Callable[..., ScriptRun]
 both_ways = pytest.mark.parametrize("server", ["forking", "spawning"], indirect=True)
 """Scripts are run forked from a server, and each with an interpreter of its own: a smoke test."""

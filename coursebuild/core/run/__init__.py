@@ -2,8 +2,8 @@
 
 - `runner`: the lessons' scripts. Its processes, seen from it, are in `workers`; what scripts find
   around them is in `surroundings`
-- what these processes do: `forkserver` (with `warm`, `interpreter`, `preload`),
-  `supervisor` (with `watching`, `required`), `spawned`
+- what these processes do: `supervisor` (with `watching`), `script_process`; both are one program,
+  `worker_main`
 - what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`), made dependencies of by
   `notes`
 - `dask_runner` (with `dask_task`): the same on a cluster

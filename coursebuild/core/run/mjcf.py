@@ -133,7 +133,7 @@ def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
         Paths relative to the root, or absolute where they lie outside, sorted.
     """
     found: set[str] = set()
-    ModelFiles(re, found.add).of_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
+    ModelFiles(found.add).of_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
     inside = {_from_root(root, file) for file in found}
     # MuJoCo puts absolute paths one behind the other; nothing is there, on any machine.
     nowhere = f"{root}/".lstrip("/")

@@ -10,32 +10,28 @@ Entry point: `ModelFiles`. Checked against the system calls of MuJoCo 3.14.0.
 4. A model named by `<model file="..."/>` is a model of its own.
 
 The text is scanned, not parsed: what is no XML to MuJoCo gives its own file and perhaps too many.
-Only what every Python has loaded is imported, and `re` is passed in.
 """
 
 from __future__ import annotations
 
 import posix
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
-    from types import ModuleType
-    from typing import Any
+import re
+from collections.abc import Callable, Collection, Iterator
+from typing import Any
 
 _MESH = frozenset(("mesh", "hfield", "skin"))
 _CUBE = tuple(f"file{side}" for side in ("right", "left", "up", "down", "front", "back"))
 _DEEPEST = 32
+_COMMENTS = re.compile(rb"<!--.*?-->", re.DOTALL)
+_TAGS = re.compile(rb"<([A-Za-z_][\w:.-]*)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*)>")
+_ATTRIBUTES = re.compile(rb"([\w:.-]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 
 
 class ModelFiles:
     """Finds the files of models; `note` is told of each, whether it is there or not."""
 
-    def __init__(self, re: ModuleType, note: Callable[[str], None]) -> None:
+    def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
-        self._comments = re.compile(rb"<!--.*?-->", re.DOTALL)
-        self._tags = re.compile(rb"<([A-Za-z_][\w:.-]*)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*)>")
-        self._attributes = re.compile(rb"([\w:.-]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 
     def of_path(self, path: str, given: Collection[str] = (), *, assets: bool = True) -> None:
         """The files of the model in a file, with that file; without assets only its includes."""
@@ -110,11 +106,11 @@ class ModelFiles:
         self, data: bytes, folder: str, here: str, given: frozenset[str], depth: int
     ) -> Iterator[tuple[str, dict[str, str]]]:
         """Every tag of a text and of what it includes, with its attributes."""
-        for tag in self._tags.finditer(self._comments.sub(b"", data)):
+        for tag in _TAGS.finditer(_COMMENTS.sub(b"", data)):
             name = _decode(tag[1])
             attributes = {
                 _decode(key): _entities(_decode(one or two))
-                for key, one, two in self._attributes.findall(tag[2])
+                for key, one, two in _ATTRIBUTES.findall(tag[2])
             }
             if name != "include":
                 yield name, attributes

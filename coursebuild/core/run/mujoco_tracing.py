@@ -41,9 +41,9 @@ _WRITERS = (
 """Functions that write a file, and the position of its name."""
 
 
-def wrap(mujoco: ModuleType, re: ModuleType) -> None:
+def wrap(mujoco: ModuleType) -> None:
     """Wrap the functions of an imported MuJoCo."""
-    files = ModelFiles(re, _read)
+    files = ModelFiles(_read)
     model, spec = getattr(mujoco, "MjModel", None), getattr(mujoco, "MjSpec", None)
 
     def path(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:

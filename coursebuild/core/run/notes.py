@@ -8,8 +8,7 @@ from __future__ import annotations
 import _imp
 import contextlib
 import os
-import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TypedDict
 
@@ -31,13 +30,7 @@ class Notes(TypedDict):
     states: list[str]
 
 
-def read_notes(
-    data: bytes,
-    overflow: str,
-    root: str,
-    script: str,
-    looked_for: Callable[[str], Iterable[str]] | None = None,
-) -> Notes:
+def read_notes(data: bytes, overflow: str, root: str, script: str) -> Notes:
     """What the records say.
 
     Args:
@@ -45,9 +38,8 @@ def read_notes(
         overflow: a folder that may hold more, in files.
         root: the project's folder, resolved.
         script: the script's path relative to it.
-        looked_for: the top-level names of all that importing a module imports or tries to.
     """
-    collected = _Collected(root, looked_for or (lambda name: (name,)))
+    collected = _Collected(root)
     for part in (data, *_spilled(overflow)):
         for record in part.split(b"\0"):
             if record:
@@ -66,7 +58,7 @@ def read_notes(
 
 
 class _Collected:
-    def __init__(self, root: str, looked_for: Callable[[str], Iterable[str]]) -> None:
+    def __init__(self, root: str) -> None:
         self.files: set[str] = set()
         self.folders: set[str] = set()
         self.outside: set[str] = set()
@@ -76,7 +68,6 @@ class _Collected:
         self.moved = False
         self.states: list[str] = []
         self._root = root.rstrip("/") + "/"
-        self._looked_for = looked_for
 
     def take(self, record: str) -> None:
         kind, about = record[0], record[1:]
@@ -87,8 +78,8 @@ class _Collected:
         elif kind == "m":
             self.modules.add(about)
         elif kind == "n":
-            folder, _, name = about.partition("\t")
-            self._imported(folder.removeprefix(self._root[:-1]).lstrip("/"), name, bool(folder))
+            folder, _, names = about.partition("\t")
+            self._not_looked_for(f"{folder}/".removeprefix(self._root), names.split(","))
         elif kind == "d":
             fields = about.split("\t")
             if len(fields) == _FIELDS and fields not in self.divergences:
@@ -113,16 +104,10 @@ class _Collected:
         else:
             self.outside.add(path)
 
-    def _imported(self, folder: str, name: str, in_project: bool) -> None:
-        prefix = f"{folder}/" if folder else ""
-        for module in self._looked_for(name):
-            if module in sys.builtin_module_names or _imp.is_frozen(module):
-                continue
-            if in_project:
-                self.files.add(f"{prefix}{module}/__init__.py")
-                self.files.add(f"{prefix}{module}.py")
-            elif module not in sys.stdlib_module_names:
-                self.modules.add(module)
+    def _not_looked_for(self, folder: str, names: Iterable[str]) -> None:
+        for name in names:
+            if not _imp.is_frozen(name):
+                self.files |= {f"{folder}{name}/__init__.py", f"{folder}{name}.py"}
 
 
 def _spilled(overflow: str) -> Iterable[bytes]:

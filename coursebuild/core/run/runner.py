@@ -2,11 +2,9 @@
 
 Entry points: `run_scripts`; `ScriptServer`, which stays warm between runs.
 
-1. A server imports, once, the packages that the scripts import (see `forkserver`), and forks
-   `parallel` supervisors, which fork the scripts. Where that cannot be, supervisors are started and
-   start an interpreter for each script (see `supervisor`); the results are the same.
-2. The supervisors are given one script after another; what they report becomes a `ScriptRun` each:
-   UTF-8 is decoded, CRLF becomes LF.
+1. `parallel` supervisors are started. They are given one script after another, and run each as a
+   copy of themselves, or in an interpreter of its own (see `supervisor`); the results are the same.
+2. What they report becomes a `ScriptRun` each: UTF-8 is decoded, CRLF becomes LF.
 3. However this ends, a KeyboardInterrupt included, the supervisors see their input close, kill what
    they run and exit.
 
@@ -33,10 +31,12 @@ from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Sign, Trace
 from coursebuild.core.run import supervisor
 from coursebuild.core.run.notes import Notes
+from coursebuild.core.run.packages import site_folders
+from coursebuild.core.run.script_process import Job
 from coursebuild.core.run.surroundings import OtherEnvironment, library_folder, wanted_packages
 from coursebuild.core.run.surroundings import clean_environment as clean_environment
 from coursebuild.core.run.watching import STDERR_KEPT
-from coursebuild.core.run.workers import ForkServer, ServerLostError, Worker, spawn_worker
+from coursebuild.core.run.workers import Worker
 
 
 class RunStarted(Struct, frozen=True):
@@ -57,6 +57,8 @@ class RunFinished(Struct, frozen=True):
 
 
 RunEvent: TypeAlias = RunStarted | RunFinished
+RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
+"""Runs scripts, as `run_scripts` does."""
 
 
 class RunStoppedError(Exception):
@@ -87,7 +89,7 @@ def run_scripts(
         parallel: how many at a time, at least 1.
         on_event: is told of every start and end, in this thread. What it raises ends the run.
         order: indices of jobs in the order of their start; without it they start as they stand.
-        fork: let a server fork the scripts, where it can.
+        fork: let scripts be copies of their supervisor, where they can.
 
     Returns:
         What each did, in the order of the jobs.
@@ -100,22 +102,23 @@ def run_scripts(
 
 
 class ScriptServer:
-    """Runs scripts, again and again: what they import stays imported in a process apart.
+    """Runs scripts, again and again: what they import stays imported in supervisors.
 
-    The process is started when scripts are first run; a new one takes its place when it has died,
-    when packages of other versions were installed, and when the environment is another one.
+    New ones take their place when they have died, when packages were installed, and when the
+    environment is another one.
 
     Args:
-        fork: let a server fork the scripts, where it can.
+        fork: let scripts be copies of their supervisor, where they can.
         place: another interpreter that is to run them.
     """
 
     def __init__(self, *, fork: bool = True, place: OtherEnvironment | None = None) -> None:
         self._place = place
         self._fork = fork and sys.platform == "linux"
-        self._server: ForkServer | None = None
         self._idle: list[Worker] = []
         """Supervisors that wait for the next run."""
+        self._installed: tuple[object, ...] = ()
+        """How the folders with packages were when these were started."""
 
     def __enter__(self) -> Self:
         return self
@@ -124,19 +127,11 @@ class ScriptServer:
         self.close()
 
     def close(self) -> None:
-        """End the process."""
-        self._dismiss_idle()
-        server, self._server = self._server, None
-        if server is not None:
-            server.close()
-
-    def expect(self, packages: Sequence[str]) -> None:
-        """Begin to import packages that scripts will import, without waiting for it."""
-        if not self._fork:
-            return
-        environment = _environment(self._place)
-        with contextlib.suppress(ServerLostError, OSError):  # which the run will find too
-            self._usable(environment).expect(packages)
+        """End the supervisors."""
+        for worker in self._idle:
+            worker.dismiss()  # all of them, before waiting for any
+        while self._idle:
+            self._idle.pop().close()
 
     def run(
         self,
@@ -183,7 +178,7 @@ class ScriptServer:
         return work.results()
 
     def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
-        worker = self._worker(work)
+        worker = self._worker(work.environment)
         busy.add(worker)
         selector.register(worker, selectors.EVENT_READ, worker)
         work.next(worker)
@@ -203,39 +198,20 @@ class ScriptServer:
         if work.waiting:
             self._start(busy, selector, work)
 
-    def _worker(self, work: _Work) -> Worker:
-        for _ in range(2):  # a server that dies while it is asked is replaced once
-            if not self._fork:
-                break
-            server = self._usable(work.environment)
-            try:
-                if server.load(work.packages()):
-                    self._dismiss_idle()  # they were forked before that
-                return self._idle_worker(work) or server.worker(work.scratch)
-            except ServerLostError:
-                self.close()
-        return self._idle_worker(work) or spawn_worker(work.environment, work.python)
-
-    def _usable(self, environment: Mapping[str, str]) -> ForkServer:
-        if self._server is not None and not self._server.usable(environment):
+    def _worker(self, environment: Mapping[str, str]) -> Worker:
+        """A supervisor that waits for a job: one that is left, or a new one."""
+        installed = _installed(self._place)
+        if installed != self._installed:
             self.close()
-        if self._server is None:
-            python = None if self._place is None else self._place.python
-            self._server = ForkServer(environment, python)
-        return self._server
-
-    def _idle_worker(self, work: _Work) -> Worker | None:
+            self._installed = installed
         while self._idle:
             worker = self._idle.pop()
             worker.rested = True
-            if worker.environment == work.environment and worker.is_there():
+            if worker.environment == environment and worker.is_there():
                 return worker
             worker.close()
-        return None
-
-    def _dismiss_idle(self) -> None:
-        while self._idle:
-            self._idle.pop().close()
+        python = sys.executable if self._place is None else self._place.python
+        return Worker(environment, python, fork=self._fork)
 
 
 class _Work:
@@ -253,7 +229,6 @@ class _Work:
         self.jobs = jobs
         self.tell = tell
         self.environment = _environment(place)
-        self.python = None if place is None else place.python
         self.library = library_folder() if place is None else place.packages
         self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
@@ -266,13 +241,8 @@ class _Work:
         self.done = 0
         self.told: set[int] = set()
         """The jobs whose start was told."""
-        self._packages: tuple[str, ...] | None = None
-
-    def packages(self) -> tuple[str, ...]:
-        """What is worth importing before."""
-        if self._packages is None:
-            self._packages = wanted_packages(self.root / self.jobs[i].path for i in self.waiting)
-        return self._packages
+        paths = (self.root / jobs[index].path for index in self.waiting)
+        self.packages = wanted_packages(paths) if self.waiting else ()
 
     def next(self, worker: Worker) -> None:
         """Hand over the next job, if there is one."""
@@ -309,12 +279,13 @@ class _Work:
         return tuple(self.runs[i] for i in range(len(self.jobs)))
 
     def _message(self, job: ScriptJob) -> bytes:
-        request: supervisor.Job = {
+        request: Job = {
             "root": str(self.root),
             "path": job.path,
             "args": list(job.args),
             "timeout": job.timeout,
             "requires": list(job.requires),
+            "packages": list(self.packages),
             "environment": self.environment,
             "scratch": self.scratch,
             "library": self.library,
@@ -331,6 +302,15 @@ class _Work:
 def _environment(place: OtherEnvironment | None) -> dict[str, str]:
     clean = clean_environment(os.environ)
     return clean if place is None else place.environment(clean)
+
+
+def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
+    """The folders with packages, and when something was installed there."""
+    found: list[object] = []
+    for folder in site_folders() if place is None else (place.packages,):
+        with contextlib.suppress(OSError):
+            found.append((folder, Path(folder).stat().st_mtime_ns))
+    return tuple(found)
 
 
 def _script_run(

@@ -1,7 +1,6 @@
 """The process that runs scripts for `runner` and sees to it that nothing stays behind.
 
-Entry points: `Slot`, in a process that `forkserver` has forked; `main`, in one that `workers` has
-started, where there is no fork server. It imports nothing but the standard library.
+Entry point: `main`, called by the program `worker_main`.
 
 It runs one script after another, each in a session of its own, so that
 
@@ -10,7 +9,9 @@ It runs one script after another, each in a session of its own, so that
 2. when the tool dies, by whatever signal, this process sees its input close and kills what runs;
 3. when this process dies, the system kills the script (Linux).
 
-It has one thread, so that it may act between fork and exec, and fork without an exec.
+Importing NumPy and MuJoCo takes longer than most scripts. So this process imports them once, and
+scripts are copies of it. Where that cannot be, it starts this program anew for each script. It has
+one thread, so that it may fork.
 
 The protocol: from the tool JSON objects (`Job`), each after its length in 4 bytes; to it for each
 one JSON object (`ChildReport`) after its length, and then the bytes of the script's output, of the
@@ -22,52 +23,83 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
+import gc
+import importlib
 import itertools
 import json
+import mmap
 import os
+import re
+import resource
 import shutil
 import signal
 import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
+import traceback
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import Literal, Protocol, TypedDict
+from typing import Literal, TypedDict
 
 from coursebuild.core.run.notes import Notes, read_notes
-from coursebuild.core.run.required import missing_modules
+from coursebuild.core.run.script_process import Job, Preloaded, Script
 from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched, has_ended
 
 LENGTH = struct.Struct(">I")
+PROGRAM = str(Path(__file__).with_name("worker_main.py"))
 
-_WARM = str(Path(__file__).with_name("warm"))
 _NOTES = ".notes"
 """What the folder of a script's notes is called, after its temporary folder."""
+_NOTES_BYTES = 1 << 20
+"""What a script may note of what it looks at, before the rest goes to files."""
+_OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
+"""What Python's fault handler says of `worker_main`, below the script's own frames."""
 _COUNTER = itertools.count()
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _PR_SET_CHILD_SUBREAPER = 36
+_SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGCHLD)
 
 
-class Job(TypedDict):
-    """What to run."""
+class _Start(TypedDict):
+    """A script that this program is started for."""
 
-    root: str
-    """Working directory."""
-    path: str
-    """The script, relative to it."""
-    args: list[str]
-    timeout: float
-    """Seconds."""
-    requires: list[str]
-    """Modules without which it is not run."""
+    job: Job
     environment: dict[str, str]
-    scratch: str
-    """Where the script's temporary folder is made; it goes when the last supervisor does."""
-    library: str
-    """A folder to import `mjcourse` from, where it is not installed."""
-    perturbation: int
-    """The direction in which initial states are moved (`initial_state_perturbation`); 0: none."""
+    notes: str
+
+
+def main(arguments: Sequence[str], bare: Collection[str]) -> Script:
+    """Run what the tool asks for until it closes the pipe; only a script's process returns.
+
+    The arguments are descriptors: where jobs are read and where reports are written, and whether
+    scripts may be copies of this process; or a `_Start` as JSON. `bare` are the modules that every
+    Python has from its start.
+    """
+    if len(arguments) == 1:
+        return _alone(json.loads(arguments[0]), bare)
+    jobs, reports, fork = map(int, arguments)
+    os.set_inheritable(jobs, False)
+    os.set_inheritable(reports, False)
+    tool = os.getppid()
+    supervisor = _Supervisor(jobs, reports, may_fork=bool(fork))
+    try:
+        script = supervisor.work()
+    except SystemExit as end:
+        script, status = None, end.code
+    except Exception:  # a bug: the tool shows it as what the script has said
+        answer = _unstartable(traceback.format_exc())
+        _send(reports, json.dumps(answer[0]).encode(), *answer[1:])
+        script, status = None, 70
+    else:
+        status = 0
+    if script is not None:
+        return script
+    # While the tool lives the folder is its own: another supervisor may be about to use it.
+    if supervisor.scratch and has_ended(tool):
+        with contextlib.suppress(OSError):  # others still use it
+            Path(supervisor.scratch).rmdir()
+    os._exit(int(status or 0))
 
 
 class ChildReport(TypedDict):
@@ -85,56 +117,54 @@ class ChildReport(TypedDict):
     """Length in bytes of the `Notes` as JSON; 0 where nobody watched."""
 
 
-class Forker(Protocol):
-    """Makes a copy of this process that becomes a script."""
-
-    def can_run(self, job: Job) -> bool:
-        """Whether the copy would be what a fresh interpreter is to this script."""
-        ...
-
-    def fork(self, job: Job, environment: Mapping[str, str], notes: str) -> Launched | None:
-        """The copy, which has its pipes and its session; `None` in the copy itself.
-
-        `notes` is a folder that is made where there is much to note of what the script looks at.
-        """
-        ...
+def _alone(start: _Start, bare: Collection[str]) -> Script:
+    """The script that this process was started for."""
+    job, preloaded = start["job"], Preloaded()
+    shadowed = _beside(job) & preloaded.names()
+    if not shadowed:
+        preloaded.load(job["packages"])
+    for name in [name for name in sys.modules if name.partition(".")[0] in shadowed]:
+        if name not in bare:
+            del sys.modules[name]
+    return Script(job, start["environment"], start["notes"], None, preloaded)
 
 
-class Slot:
-    """One supervisor: where its jobs come from and its reports go to."""
+class _Supervisor:
+    """Where jobs come from, and reports go to."""
 
-    def __init__(
-        self, jobs: int, reports: int, forker: Forker | None = None, *, has_library: bool
-    ) -> None:
+    def __init__(self, jobs: int, reports: int, *, may_fork: bool) -> None:
         self.jobs = jobs
         self.reports = reports
-        self.forker = forker
-        self.has_library = has_library
+        self.may_fork = may_fork
+        self.preloaded = Preloaded()
+        self.has_library = not missing_modules(["mjcourse"], None, "")
+        """Whether scripts find `mjcourse` without being told where."""
         self.awake, wake = os.pipe()
         os.set_blocking(self.awake, False)
         os.set_blocking(wake, False)
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda *_: None)
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-        prctl(_PR_SET_CHILD_SUBREAPER, 1)
+        self.libc = ctypes.CDLL(None) if sys.platform == "linux" else None
+        if self.libc is not None:
+            self.libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
         os.chdir("/")
         self.scratch = ""
 
-    def work(self) -> bool:
-        """Serve until the input closes: `False`; `True` in a process that is to become a script."""
+    def work(self) -> Script | None:
+        """Serve until the input closes; a script in a process that is to become it."""
         while (message := _receive(self.jobs)) is not None:
             job: Job = json.loads(message)
             self.scratch = job["scratch"]
             answer = self._serve(job)
-            if answer is None:
-                return True
+            if isinstance(answer, Script):
+                return answer
             _send(self.reports, json.dumps(answer[0]).encode(), *answer[1:])
-        return False
+        return None
 
-    def _serve(self, job: Job) -> tuple[ChildReport, bytes, bytes, bytes] | None:
-        missing = missing_modules(
-            job["requires"], Path(job["root"], job["path"]).parent, job["library"]
-        )
+    def _serve(self, job: Job) -> tuple[ChildReport, bytes, bytes, bytes] | Script:
+        folder_of_script = Path(job["root"], job["path"]).parent
+        missing = missing_modules(job["requires"], folder_of_script, job["library"])
         if missing:
             return _report("missing", missing=missing), b"", b"", b""
         if not os.path.isfile(f"{job['root']}/{job['path']}"):  # noqa: PTH113 (here time counts)
@@ -142,18 +172,20 @@ class Slot:
         environment = dict(job["environment"])
         if not self.has_library:
             environment["PYTHONPATH"] = job["library"]
-        folder, forked = "", False
+        if self.may_fork:
+            self.preloaded.load(job["packages"])
+        folder = ""
+        launched: Launched | Script | None = None
+        start = time.monotonic()
         try:
-            start = time.monotonic()
             try:
                 folder = _temporary(job["scratch"])
                 parent = os.getppid()  # now, since a script may end it as soon as it runs
                 launched = self._launch(job, environment | {"TMPDIR": folder})
             except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
                 return _unstartable(f"the script cannot be started: {error}\n")
-            if launched is None:
-                forked = True
-                return None
+            if isinstance(launched, Script):
+                return launched
             run = Watched(launched, start, job["timeout"], self.awake)
             try:
                 run.watch(self.jobs, parent)
@@ -161,46 +193,124 @@ class Slot:
                 run.end()
             return _finished(run, launched.notes)
         finally:
-            if folder and not forked:
+            if folder and not isinstance(launched, Script):
                 remove_folder(folder)
                 remove_folder(folder + _NOTES)
 
-    def _launch(self, job: Job, environment: Mapping[str, str]) -> Launched | None:
-        for argument in job["args"]:
-            if b"\0" in os.fsencode(argument):
-                raise ValueError("embedded null byte")
-        if self.forker is not None and self.forker.can_run(job):
-            return self.forker.fork(job, environment, environment["TMPDIR"] + _NOTES)
-        return _spawn(job, environment)
+    def _launch(self, job: Job, environment: dict[str, str]) -> Launched | Script:
+        """Start a script; the script itself in the process that is to become it."""
+        if any(b"\0" in os.fsencode(argument) for argument in job["args"]):
+            raise ValueError("embedded null byte")
+        notes = environment["TMPDIR"] + _NOTES
+        start: _Start = {"job": job, "environment": environment, "notes": notes}
+        (out, stdout), (err, stderr) = os.pipe(), os.pipe()
+        try:
+            prepare = functools.partial(self._prepare_script, job, stdout, stderr, os.getpid())
+            if not self._can_fork(job):
+                pid = _spawn(start, prepare)
+                return Launched(pid, out, err, functools.partial(_notes, None, start))
+            shared = mmap.mmap(-1, _NOTES_BYTES)
+            gc.freeze()  # a script's collector shall not look at, and so copy, what is here
+            pid = os.fork()
+            if pid == 0:
+                prepare()
+                signal.set_wakeup_fd(-1)
+                os.closerange(3, max(self.awake, stderr, self.reports) + 16)
+                return Script(job, environment, notes, shared, self.preloaded)
+            return Launched(pid, out, err, functools.partial(_notes, shared, start))
+        except BaseException:
+            os.close(out)
+            os.close(err)
+            raise
+        finally:
+            with contextlib.suppress(OSError):  # closed in a script
+                os.close(stdout)
+                os.close(stderr)
+
+    def _can_fork(self, job: Job) -> bool:
+        """Whether a copy of this process would be what a fresh interpreter is to this script."""
+        if not self.may_fork or self.preloaded.broken or _has_threads():
+            return False
+        return _beside(job).isdisjoint(self.preloaded.names())
+
+    def _prepare_script(self, job: Job, stdout: int, stderr: int, parent: int) -> None:
+        """What a script's process does first: a session, pipes, signals and limits of its own."""
+        os.setsid()
+        if self.libc is not None:  # the system ends it when this process ends
+            self.libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+            if os.getppid() != parent:
+                os._exit(1)
+        os.dup2(stdout, 1)
+        os.dup2(stderr, 2)
+        for number in _SIGNALS:  # `nohup coursebuild` must not make scripts deaf
+            interrupt = number == signal.SIGINT
+            signal.signal(number, signal.default_int_handler if interrupt else signal.SIG_DFL)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file in the project
+        os.chdir(job["root"])
 
 
-def main(reports: int) -> None:
-    """Serve the process that started this one, by standard input and this descriptor."""
-    os.set_inheritable(reports, False)
-    tool = os.getppid()
-    slot = Slot(0, reports, has_library=library_is_installed())
-    try:
-        slot.work()
-    finally:
-        # While the tool lives the folder is its own: another supervisor may be about to use it.
-        if slot.scratch and has_ended(tool):
-            with contextlib.suppress(OSError):  # others still use it
-                Path(slot.scratch).rmdir()
+def _beside(job: Job) -> frozenset[str]:
+    """What stands in the script's folder, as names of modules."""
+    folder = os.path.dirname(f"{job['root']}/{job['path']}")  # noqa: PTH120 (here time counts)
+    return frozenset(name.partition(".")[0] for name in os.listdir(folder))  # noqa: PTH208
 
 
-def library_is_installed() -> bool:
-    """Whether scripts find `mjcourse` without being told where."""
-    return not missing_modules(["mjcourse"], None, "")
+def _spawn(start: _Start, prepare: Callable[[], None]) -> int:
+    """Start this program for one script."""
+    process = subprocess.Popen(
+        [sys.executable, PROGRAM, json.dumps(start)],
+        env=start["environment"],
+        stdin=subprocess.DEVNULL,
+        preexec_fn=prepare,  # safe: there is no other thread
+    )
+    process.returncode = 0  # who watches the script reaps it
+    return process.pid
 
 
-def prctl(option: int, value: int) -> None:
-    """Set a property of this process, where the system is Linux."""
-    if sys.platform == "linux":
-        _libc().prctl(option, value, 0, 0, 0)
+def _notes(shared: mmap.mmap | None, start: _Start) -> Notes | None:
+    """What a script has noted; `None` where it was ended before it took notes."""
+    data, job = b"", start["job"]
+    if shared is not None:
+        end = shared.find(b"\0\0")
+        data = shared[: end if end >= 0 else len(shared)]
+        shared.close()
+    elif not Path(start["notes"]).is_dir():
+        return None
+    return read_notes(data, start["notes"], job["root"], os.path.normpath(job["path"]))
 
 
-def _libc() -> ctypes.CDLL:
-    return ctypes.CDLL(None)
+def _has_threads() -> bool:
+    with contextlib.suppress(OSError):
+        return len(os.listdir("/proc/self/task")) > 1  # noqa: PTH208 (here time counts)
+    return True
+
+
+def missing_modules(names: Sequence[str], folder: Path | None, library: str) -> list[str]:
+    """Which of these modules a script in `folder` could not import; none is imported."""
+    if not names:
+        return []
+    importlib.invalidate_caches()
+    path = [*([str(folder)] if folder else []), *sys.path, *([library] if library else [])]
+    return [name for name in names if not _exists(name, path)]
+
+
+def _exists(name: str, path: Sequence[str]) -> bool:
+    top, saved = True, sys.path
+    for end in (at for at, c in enumerate(f"{name}.") if c == "."):
+        if not name[:end].rpartition(".")[2].isidentifier():
+            return False
+        spec = None
+        try:
+            sys.path = list(path) if top else saved
+            for finder in sys.meta_path:
+                with contextlib.suppress(Exception):  # that of some package may do anything
+                    spec = spec or finder.find_spec(name[:end], None if top else path)
+        finally:
+            sys.path = saved
+        if spec is None:
+            return False
+        path, top = spec.submodule_search_locations or (), False
+    return True
 
 
 def _temporary(scratch: str) -> str:
@@ -217,72 +327,11 @@ def _temporary(scratch: str) -> str:
                 Path(scratch).mkdir(mode=0o700)
 
 
-def _spawn(job: Job, environment: Mapping[str, str]) -> Launched:
-    """Start the script with an interpreter of its own."""
-    notes = environment["TMPDIR"] + _NOTES
-    path = os.pathsep.join(filter(None, (_WARM, environment.get("PYTHONPATH"))))
-    (out, stdout), (err, stderr) = os.pipe(), os.pipe()
-    try:
-        process = subprocess.Popen(
-            [sys.executable, job["path"], *job["args"]],
-            cwd=job["root"],
-            env={
-                **environment,
-                "PYTHONPATH": path,
-                "COURSEBUILD_TRACE": notes,
-                "COURSEBUILD_PERTURBATION": str(job["perturbation"]),
-            },
-            stdin=subprocess.DEVNULL,
-            stdout=stdout,
-            stderr=stderr,
-            start_new_session=True,
-            preexec_fn=_before_exec(os.getpid()),  # safe: there is no other thread
-        )
-    except BaseException:
-        os.close(out)
-        os.close(err)
-        raise
-    finally:
-        os.close(stdout)
-        os.close(stderr)
-    process.returncode = 0  # who watches the script reaps it
-    read = functools.partial(_notes_of_spawned, notes, job["root"], job["path"])
-    return Launched(process.pid, out, err, read)
-
-
-def _notes_of_spawned(folder: str, root: str, path: str) -> Notes | None:
-    if not os.path.isdir(folder):  # noqa: PTH112
-        return None
-    return read_notes(b"", folder, root, path)
-
-
-def _before_exec(parent: int) -> Callable[[], None]:
-    """What the script's process does before it becomes the script."""
-    import resource
-
-    libc = _libc() if sys.platform == "linux" else None
-
-    def prepare() -> None:
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file in the project
-        for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_DFL)  # `nohup coursebuild` must not make scripts deaf
-        die_with(parent, libc)
-
-    return prepare
-
-
-def die_with(parent: int, libc: ctypes.CDLL | None) -> None:
-    """Let the system end this process when `parent`, which has just forked it, ends."""
-    if libc is not None:
-        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-        if os.getppid() != parent:
-            os._exit(1)
-
-
 def _finished(
     run: Watched, notes: Callable[[], Notes | None]
 ) -> tuple[ChildReport, bytes, bytes, bytes]:
     stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
+    stderr = _OUR_FRAME.sub(b"", stderr)
     noted = notes()
     trace = b"" if noted is None else json.dumps(noted).encode()
     report: ChildReport = {

@@ -6,7 +6,7 @@ interpreter than that of the tool.
 
 from __future__ import annotations
 
-import ast
+import contextlib
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -54,10 +54,6 @@ _FIXED = {
     "TERM": "dumb",
     "MPLBACKEND": "Agg",
 }
-_PRELOADED = ("numpy", "numpy.random", "mujoco")
-"""Packages that are worth importing once for all scripts, in this order: one may import those
-before it. None does anything that a script could see."""
-_IMPORTS = re.compile(rb"^[ \t]*(?:import|from)[ \t]+([^\n#;]+)", re.MULTILINE)
 
 
 class OtherEnvironment(Struct, frozen=True):
@@ -90,59 +86,16 @@ def library_folder() -> str:
 
 
 def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
-    """Which of the packages that can be imported for all scripts these ask for.
+    """Which packages are worth importing once for these scripts: they, or files beside, name them.
 
-    A module beside a script, and `mjcourse`, count as part of it.
+    A script that imports MuJoCo in yet another way is run as well, but not remembered.
     """
-    found: set[str] = set()
-    todo, seen = list(scripts), set[Path]()
-    while todo and not found.issuperset(_PRELOADED):
-        path = todo.pop()
-        if path in seen:
-            continue
-        seen.add(path)
-        try:
-            data = path.read_bytes()
-        except OSError:
-            continue
-        said = _said(data)
-        if "numpy" in said and b".random" in data:
-            said.add("numpy.random")
-        if not said.isdisjoint(_PRELOADED) and not found.issuperset(said.intersection(_PRELOADED)):
-            found |= _imported(data)
-        if "mjcourse" in said:
-            found.add("numpy")  # which it is built on
-        todo += [beside for name in said if (beside := path.parent / f"{name}.py").is_file()]
-    if "mujoco" in found:
-        found.add("numpy")
-    return tuple(name for name in _PRELOADED if name in found)
-
-
-def _said(data: bytes) -> set[str]:
-    """Top-level names that a text imports, or has in lines that look so."""
-    return {
-        word.partition(".")[0]
-        for line in _IMPORTS.findall(data)
-        for part in line.decode("utf-8", "replace").split(",")
-        for word in part.split()[:1]
-    }
-
-
-def _imported(data: bytes) -> set[str]:
-    """Names of the packages that a text really imports; none where it is no Python."""
-    try:
-        tree = ast.parse(data)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return set()
-    names: set[str] = set()
-    random = False
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names |= {alias.name.partition(".")[0] for alias in node.names}
-            random = random or any(alias.name == "numpy.random" for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names.add(node.module.partition(".")[0])
-            random = random or node.module == "numpy.random"
-        elif isinstance(node, ast.Attribute):
-            random = random or node.attr == "random"
-    return names | ({"numpy.random"} if random and "numpy" in names else set())
+    words: set[bytes] = set()
+    for folder in {path.parent for path in scripts}:
+        for path in folder.glob("*.py"):
+            if b"mujoco" not in words and path.is_file():  # a pipe has no end
+                with contextlib.suppress(OSError):
+                    words.update(re.findall(rb"\b(?:mujoco|mjcourse|numpy)\b", path.read_bytes()))
+    if b"mujoco" in words:
+        return "numpy", "mujoco"
+    return ("numpy",) if words else ()

@@ -15,34 +15,36 @@ A record is a letter and what it is about, in bytes:
 - `r` and a path: a file was read, or was to be and was not there
 - `l` and a path: a folder was listed
 - `m` and a name: a module was imported that is not Python's own, nor of the project
-- `n`, a folder, a tab and a name: a module that had been imported before scripts were, and all that
-  it imports, would have been found in this folder first
+- `n`, a folder, a tab and names: modules that were imported before the script began, and that it
+  would have found in this folder first
 - `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
 - `p`: an initial state was moved; `s` and numbers: a state at its end (see
   `initial_state_perturbation`)
 - `o` and words: why there may be more
 
-This file is imported in a script's own process too, where nothing may stay behind, so it imports
-nothing but what every Python has loaded.
+The handlers of events use `posix` where `os` would raise an event of its own, and as little else as
+they can: a script may have changed anything.
 """
 
 from __future__ import annotations
 
+import _imp
+import contextlib
+import os
 import posix
+import site
 import sys
+from collections.abc import Callable, Iterable, Sequence
+from types import FrameType
+from typing import Protocol
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-    from types import FrameType
-    from typing import Protocol
 
-    class Sink(Protocol):
-        """Takes whole records, in one call each."""
+class Sink(Protocol):
+    """Takes whole records, in one call each."""
 
-        def write(self, data: bytes, /) -> object:
-            """Add a record; a ValueError says that there is no more room."""
-            ...
+    def write(self, data: bytes, /) -> object:
+        """Add a record; a ValueError says that there is no more room."""
+        ...
 
 
 _WRITING = posix.O_WRONLY | posix.O_RDWR | posix.O_CREAT | posix.O_TRUNC | posix.O_APPEND
@@ -80,6 +82,7 @@ NETWORK = "it uses the network"
 NATIVE = "it loads native code of the project"
 DATABASE = "it opens a database"
 LISTS_OUTSIDE = "it lists folders outside the project"
+UNSEEN_MUJOCO = "it imports MuJoCo where nobody looked for that"
 TOO_MUCH = "it opens too many files to keep track of"
 
 
@@ -112,6 +115,8 @@ class Tracer:
             f"{cache}/.cache/",
             *(f for f in self._installed if f not in self._around),
         )
+        self.has_mujoco = True
+        """Whether MuJoCo tells of the files that it opens, if it is imported."""
         self._sink = sink
         self._overflow = overflow
         self._pid = posix.getpid()
@@ -121,7 +126,7 @@ class Tracer:
         self._noted: set[str] = set()
         self._builtin = frozenset(sys.builtin_module_names)
         self._standard = sys.stdlib_module_names
-        self._is_frozen = sys.modules["_imp"].is_frozen
+        self._is_frozen = _imp.is_frozen
 
     def install(self) -> None:
         """Begin."""
@@ -150,15 +155,16 @@ class Tracer:
         def hook(event: str, args: tuple[object, ...]) -> None:
             handler = find(event)
             if handler is not None:
-                try:  # noqa: SIM105 (contextlib may not be loaded)
+                with contextlib.suppress(Exception):  # a script's own call must not fail for this
                     handler(args)
-                except Exception:  # a script's own call must not fail for this
-                    pass
 
         sys.addaudithook(hook)
 
-    def begin(self) -> None:
-        """Say that notes are taken."""
+    def begin(self, modules: Iterable[str]) -> None:
+        """Take notes; these modules are there already, and are looked for nowhere."""
+        folder = self._project_folder(sys.path[0])
+        if folder is not None:
+            self._note(f"n{folder}\t{','.join(sorted(modules))}")
         self._note("b")
 
     def read(self, path: object) -> None:
@@ -188,16 +194,10 @@ class Tracer:
                     return
         if not dot and name not in self._standard:
             self._note(f"m{name}")
+            if name == "mujoco" and not self.has_mujoco:
+                self.opaque(UNSEEN_MUJOCO)
             if name in _READS_UNSEEN:
                 self.opaque(f"{name}, which it imports, opens files in native code")
-
-    def restored(self, name: str) -> None:
-        """A module that had been imported before was given to the script, with all its imports."""
-        for folder in list(sys.path):
-            at = self._project_folder(folder)
-            if at is not None:
-                self._note(f"n{at}\t{name}")
-        self._note(f"n\t{name}")
 
     def write(self, path: object) -> None:
         """A file was written, made, changed or removed."""
@@ -359,10 +359,8 @@ class Tracer:
             return
         self._busy = True
         try:
-            try:  # noqa: SIM105
+            with contextlib.suppress(FileExistsError):
                 posix.mkdir(self._overflow)
-            except FileExistsError:
-                pass
             flags = posix.O_WRONLY | posix.O_CREAT | posix.O_APPEND | posix.O_CLOEXEC
             fd = posix.open(f"{self._overflow}/{posix.getpid()}", flags, 0o600)
             try:
@@ -421,9 +419,7 @@ def library_folders(root: str, library: str) -> list[str]:
 
 def installed_folders() -> list[str]:
     """The folders of Python's own modules and of installed packages, also as they really are."""
-    site = sys.modules["site"]
-    os = sys.modules["os"]
-    found = {os.path.dirname(os.__file__), *site.getsitepackages()}
+    found = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
     if site.ENABLE_USER_SITE:
         found.add(site.getusersitepackages())
     return sorted({f for folder in found for f in (folder, os.path.realpath(folder))})

@@ -23,7 +23,7 @@ from msgspec import Struct
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.text.patterns import pattern
 
-VERSION = "3"
+VERSION = "4"
 """To be changed with how scripts are run and watched: older results then count no more."""
 
 ABSENT = "absent"

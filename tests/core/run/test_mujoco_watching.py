@@ -301,24 +301,26 @@ PLAIN = [
 ]
 
 
-def without_addresses(text: str) -> str:
-    return re.sub("0x[0-9a-f]+", "0x", text)
+def plain(text: str) -> str:
+    """Without addresses, and without the list of native modules that a crash ends with."""
+    return re.sub("0x[0-9a-f]+", "0x", re.sub("Extension modules: .*", "", text))
 
 
-@pytest.mark.parametrize("number", range(len(PLAIN)))
-def test_the_script_does_what_it_does_alone(run: Run, tmp_path: Path, number: int) -> None:
-    watched = run(PLAIN[number])
-    alone = subprocess.run(
-        [sys.executable, "examples/a.py"],
-        cwd=tmp_path,
-        env=clean_environment({}),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert without_addresses(watched.stdout) == without_addresses(alone.stdout)
-    assert without_addresses(watched.stderr) == without_addresses(alone.stderr)
-    assert abs(watched.status) == abs(alone.returncode)
+def test_watched_script_does_what_it_does_alone(run: Run, tmp_path: Path) -> None:
+    for code in PLAIN:
+        watched = run(code)
+        alone = subprocess.run(
+            [sys.executable, "examples/a.py"],
+            cwd=tmp_path,
+            env=clean_environment({}),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert plain(watched.stdout) == plain(alone.stdout), code
+        assert plain(watched.stderr) == plain(alone.stderr), code
+        assert abs(watched.status) == abs(alone.returncode), code
+        (tmp_path / "MUJOCO_LOG.TXT").unlink(missing_ok=True)
 
 
 def test_the_log_of_a_process_that_nobody_watches_does_not_stay(run: Run) -> None:

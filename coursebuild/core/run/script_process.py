@@ -1,0 +1,230 @@
+"""A process becomes a script: it finds what a bare `python examples/x.py` finds, and is watched.
+
+Entry points: `Preloaded`, the packages that are imported once for all scripts; `Script`, which sets
+up this process, and is then executed by `worker_main`.
+
+What a script finds differs from a bare Python only in that there is one more frame below its own,
+and that modules of the standard library are in `sys.modules` which it has not imported.
+"""
+
+from __future__ import annotations
+
+import atexit
+import builtins
+import contextlib
+import ctypes
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Mapping, Sequence
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from types import CodeType, ModuleType
+from typing import Any, TypedDict
+
+from coursebuild.core.run import initial_state_perturbation, mujoco_tracing, mujoco_watching
+from coursebuild.core.run.tracing import Sink, Tracer, installed_folders, library_folders
+
+_IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
+"""What is imported for a package. None does anything that a script could see."""
+
+
+class Job(TypedDict):
+    """What to run."""
+
+    root: str
+    """Working directory."""
+    path: str
+    """The script, relative to it."""
+    args: list[str]
+    timeout: float
+    """Seconds."""
+    requires: list[str]
+    """Modules without which it is not run."""
+    packages: list[str]
+    """Packages that are worth importing before."""
+    environment: dict[str, str]
+    scratch: str
+    """Where the script's temporary folder is made; it goes when the last supervisor does."""
+    library: str
+    """A folder to import `mjcourse` from, where it is not installed."""
+    perturbation: int
+    """The direction in which initial states are moved (`initial_state_perturbation`); 0: none."""
+
+
+class Preloaded:
+    """Packages that were imported before a script; a finder that gives them to it.
+
+    They are hidden from a script until it imports them, so that what it depends on is seen.
+    """
+
+    def __init__(self) -> None:
+        self.broken = False
+        """Whether importing a package fails: then scripts have to fail on their own."""
+        self._groups: dict[str, dict[str, ModuleType]] = {}
+        """The modules that importing a package brings, without those of the standard library."""
+        self._package: dict[str, str] = {}
+        """Of a top-level module, the package whose import brings it."""
+        self._tracer: Tracer | None = None
+
+    def load(self, packages: Sequence[str]) -> None:
+        """Import packages."""
+        for package in packages:
+            if package not in self._groups:
+                self._load(package)
+
+    def _load(self, package: str) -> None:
+        before = set(sys.modules)
+        try:
+            for name in _IMPORTS[package]:
+                importlib.import_module(name)
+        except ModuleNotFoundError as error:  # a script that asks for it says so
+            self.broken = self.broken or error.name != package
+        except BaseException:
+            self.broken = True
+        new = {n: m for n, m in sys.modules.items() if n not in before and _is_installed(n)}
+        needed = self._groups.get("numpy", {}) if package == "mujoco" else {}
+        self._groups[package] = needed | new
+        for name in new:
+            self._package.setdefault(name.partition(".")[0], package)
+        if package == "mujoco" and "mujoco" in sys.modules:
+            mujoco_tracing.wrap(sys.modules["mujoco"])
+            mujoco_watching.watch(sys.modules["mujoco"])
+
+    def names(self) -> frozenset[str]:
+        """The top-level modules that are there: they are not looked for in a script's folder."""
+        found = {name.partition(".")[0] for name in sys.modules} - {"__main__", "coursebuild"}
+        return frozenset(found.difference(sys.builtin_module_names))
+
+    def module(self, name: str) -> Any:
+        """A module that was imported; `None` where there is no such."""
+        return next((g[name] for g in self._groups.values() if name in g), None)
+
+    def offer(self, tracer: Tracer) -> None:
+        """Hide the packages, and let this process have again what it imports from now on."""
+        self._tracer = tracer
+        everything = {n: m for group in self._groups.values() for n, m in group.items()}
+        for name in everything:
+            sys.modules.pop(name, None)
+        sys.meta_path.insert(0, self)
+        if (random := everything.get("numpy.random")) is not None:
+            random.seed()
+        # They are not given back when the script ends, which would take longer than most scripts.
+        atexit.register(self._forget, everything)
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(everything))
+
+    def _forget(self, modules: Mapping[str, ModuleType]) -> None:
+        for name in modules:
+            sys.modules.pop(name, None)
+
+    def find_spec(
+        self, name: str, path: object = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """A spec that gives what was imported before, if Python would find the same."""
+        module = self.module(name) if target is None else None
+        if module is None or "." in name:
+            return None
+        found = PathFinder.find_spec(name)
+        if found is None or found.origin != getattr(module.__spec__, "origin", None):
+            return None
+        return ModuleSpec(name, self, origin=found.origin)  # type: ignore[arg-type]
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """The module itself."""
+        module: ModuleType = self.module(spec.name)
+        self._spec = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Give the script all that importing the module brings."""
+        module.__spec__ = self._spec
+        group = self._groups[self._package[module.__name__]]
+        sys.modules.update(group)
+        for name in group:
+            if "." not in name and group[name].__spec__ is not None and self._tracer is not None:
+                self._tracer.imported(name, None)
+
+
+def _is_installed(name: str) -> bool:
+    top = name.partition(".")[0]
+    return top not in sys.stdlib_module_names and top != "coursebuild"
+
+
+class Script:
+    """A script that this process is to become."""
+
+    def __init__(
+        self,
+        job: Job,
+        environment: Mapping[str, str],
+        notes: str,
+        sink: Sink | None,
+        preloaded: Preloaded,
+    ) -> None:
+        self.job = job
+        self.path = f"{job['root']}/{job['path']}"
+        self.main = ModuleType("__main__")
+        self.names: dict[str, Any] = vars(self.main)
+        self._environment = environment
+        self._notes = notes
+        self._sink = sink
+        self._preloaded = preloaded
+
+    def compiled(self) -> CodeType:
+        """Set up this process, which stands in the script's folder; the code to execute."""
+        job, preloaded = self.job, self._preloaded
+        arguments = [job["path"], *job["args"]]
+        sys.argv, sys.orig_argv[1:] = arguments, arguments
+        self._set_paths()
+        self.names |= {
+            "__builtins__": builtins,
+            "__file__": self.path,
+            "__cached__": None,
+            "__loader__": SourceFileLoader("__main__", self.path),
+            "__annotations__": {},
+        }
+        tracer = self._tracer()
+        mujoco_tracing.tracer = tracer
+        if job["perturbation"] and (mujoco := preloaded.module("mujoco")) is not None:
+            numpy = preloaded.module("numpy")
+            initial_state_perturbation.install(mujoco, numpy, job["perturbation"])
+        tracer.has_mujoco = preloaded.module("mujoco") is not None
+        for name in [name for name in sys.modules if name.partition(".")[0] == "coursebuild"]:
+            del sys.modules[name]
+        sys.modules["__main__"] = self.main
+        standard = preloaded.names() & sys.stdlib_module_names
+        preloaded.offer(tracer)
+        atexit.register(mujoco_watching.finish)
+        with open(self.path, "rb") as file:  # noqa: PTH123 (time counts)
+            text = file.read()
+        tracer.install()
+        tracer.begin(standard)
+        return compile(text, self.path, "exec", dont_inherit=True)
+
+    def _set_paths(self) -> None:
+        os.environ["TMPDIR"] = self._environment["TMPDIR"]  # the rest is as it was at the start
+        library = self._environment.get("PYTHONPATH")
+        if library is not None and "PYTHONPATH" not in os.environ:
+            os.environ["PYTHONPATH"] = library
+            sys.path[:0] = library.split(os.pathsep)
+        sys.path.insert(0, os.path.dirname(self.path))  # noqa: PTH120
+
+    def _tracer(self) -> Tracer:
+        installed = installed_folders()
+        if "PYTHONPATH" in self._environment:
+            installed += library_folders(self.job["root"], self.job["library"])
+        root, temporary = self.job["root"], self._environment["TMPDIR"]
+        return Tracer(root, temporary, installed, self._notes, self._sink)
+
+
+def report_error(error: BaseException) -> None:
+    """Say what ended a script as Python says it, without the frame that has executed it."""
+    frames = error.__traceback__.tb_next if error.__traceback__ is not None else None
+    if frames is not None and frames.tb_frame.f_code.co_filename == __file__:
+        frames = None  # it was not even compiled
+    try:
+        sys.excepthook(type(error), error.with_traceback(frames), frames)
+    except BaseException:
+        traceback.print_exc()
+    with contextlib.suppress(Exception):
+        sys.stdout.flush()
