@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_course
-from coursebuild.core.run.code import code_digest
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.numerics.reports.diet import DietReport

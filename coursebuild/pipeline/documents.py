@@ -16,7 +16,7 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course, Declarations, Document
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Source

@@ -13,7 +13,7 @@ import hashlib
 import sys
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.pages.links import has
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.pages.shared import PageFacts

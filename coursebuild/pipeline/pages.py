@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage

@@ -26,8 +26,7 @@ from msgspec.structs import replace
 from coursebuild.core.checks.formulas import document_formulas, formula_findings
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.prepared import prepared_folder
-from coursebuild.core.engine.steps import step_key
-from coursebuild.core.engine.tool import typesetter_digest
+from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Document, Script, document_blocks
 from coursebuild.core.model.results import Formula, MathError

@@ -25,9 +25,8 @@ from msgspec import Struct
 from coursebuild.core.engine.digests import Clock, Digests, changed_since
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
-from coursebuild.core.run.conditions import conditions, places
 from coursebuild.core.run.packages import Installed
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.surroundings import OtherEnvironment, conditions, places
 from coursebuild.core.scripts.dependencies import (
     Dependency,
     Inputs,

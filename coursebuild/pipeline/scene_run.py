@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.run.code import code_digest
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import Machine, ScenarioReport, SceneReport

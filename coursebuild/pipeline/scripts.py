@@ -28,8 +28,7 @@ from coursebuild.pipeline.remember import Memory, longest_first
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
-    from coursebuild.core.run.prewarm import RunAll
-    from coursebuild.core.run.runner import RunEvent
+    from coursebuild.core.run.runner import RunAll, RunEvent
 
 
 class ExtractedScripts(Struct, frozen=True):

@@ -27,7 +27,7 @@ from coursebuild.core.engine.prepared import (
     prepared_folder,
     prepared_source,
 )
-from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course

@@ -17,8 +17,8 @@ import time
 
 from msgspec import Struct
 
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.model.scenarios import Bands
-from coursebuild.core.run.code import code_digest
 from coursebuild.core.run.versions import engine_version, package_version, python_version
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.cases import CaseReport

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import msgspec
 from msgspec import Struct
 
-from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Document
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord

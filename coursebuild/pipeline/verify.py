@@ -21,7 +21,7 @@ from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import check_runs
 from coursebuild.core.model import Course, FeatureBlock, Lab, document_blocks, document_has
 from coursebuild.core.model.results import CompileResult, LabResult, Results, ScriptRun

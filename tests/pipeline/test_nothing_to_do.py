@@ -9,8 +9,7 @@ from collections.abc import Callable
 
 import pytest
 
-from coursebuild.core.run.conditions import _SAYS_NOTHING
-from coursebuild.core.run.surroundings import _PASSED_ON
+from coursebuild.core.run.surroundings import _PASSED_ON, _SAYS_NOTHING
 from support.scratch_course import FIRST, ROOT, Folder, block
 
 pytestmark = pytest.mark.site

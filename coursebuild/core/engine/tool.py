@@ -1,6 +1,7 @@
 """Which tool this is: a name for its code, its templates and what it bundles.
 
-Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas.
+Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas; `code_digest`, of
+some code, by its content; `step_key`, the keys of what the tool makes.
 
 What it imports belongs to it, by the versions that are installed. The files' sizes and times tell
 one tool from another, so that none of them need be read. A tool that was installed anew makes
@@ -14,9 +15,12 @@ import hashlib
 import os
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 from coursebuild.core.features import features_digest
+from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.resources import assets_dir, templates_dir
+from coursebuild.core.values import fingerprint
 
 _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120
 
@@ -94,3 +98,36 @@ def _lines(folder: str, inner: str) -> Iterator[str]:
         elif not entry.name.endswith((".pyc", "~")):
             status = entry.stat()
             yield f"{name}\0{status.st_size}\0{status.st_mtime_ns}\0"
+
+
+def step_key(name: str, *values: object) -> str:
+    """The key of what a step of this name makes of these values.
+
+    The tool is part of it: so there is no rule about what makes a thing stale.
+    """
+    return fingerprint((tool_digest(), name, values))
+
+
+def code_digest(*parts: str, root: Path = Path(_CORE).parents[1]) -> str:
+    """A hash over packages and modules, such as `mjcourse/spatial` or `coursebuild/numerics`.
+
+    What takes minutes to measure is kept as long as this is the same, whenever it was installed.
+
+    Raises:
+        FileNotFoundError: the tool has no such part.
+        EffectError: it cannot be read.
+    """
+    digest = hashlib.sha256()
+    for part in parts:
+        if not (root / part).exists():
+            raise FileNotFoundError(part)
+    try:
+        for whole in (root / part for part in parts):
+            for path in (whole,) if whole.is_file() else sorted(whole.rglob("*.py")):
+                name = path.relative_to(root).as_posix()
+                content = path.read_bytes()
+                digest.update(f"{name}\0{len(content)}\0".encode())
+                digest.update(content)
+    except OSError as error:
+        raise EffectError(f"the tool's own code cannot be read: {reason(error)}") from None
+    return digest.hexdigest()

@@ -7,7 +7,7 @@
 - what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`), made dependencies of by
   `notes`
 - `dask_runner` (with `dask_task`): the same on a cluster
-- `conditions`, `packages`, `code`, `versions`: what results depend on, as it is now
+- `surroundings`, `packages`, `versions`: what results depend on, as it is now
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
 - `lab_engine` (with `lab_pieces.js`), `lab_files`, `native` (with `native_worker`): labs in the
