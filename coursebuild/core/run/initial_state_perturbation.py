@@ -21,17 +21,15 @@ The model, the time, controls and forces stay as they are.
 
 from __future__ import annotations
 
-import _weakref
+import contextlib
 import sys
+import weakref
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
 
 from coursebuild.core.run import mujoco_tracing
 from coursebuild.core.run.trajectory_extent import TrajectoryExtent
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from types import ModuleType
-    from typing import Any
 
 SIZE = 1e-12
 """Relative; of what is all zero absolute, in rad, m, or what else the coordinate is in."""
@@ -89,24 +87,14 @@ class _Perturbation:
         self._count = 0
         self._numbers = 0
         self._rollout = False
-        self._told = False
+        self._has_moved = False
 
     def install(self) -> None:
-        mujoco, tracing = self._mujoco, mujoco_tracing
-        functions = [(name, self._before) for name in _COMPUTING]
-        functions += [(name, self._nothing) for name in _INTEGRATING]
-        for name, before in functions:
-            real = getattr(mujoco, name, None)
-            if real is not None:
-                made = tracing.wrapped(real, before, self._after)
-                tracing.replace_function(mujoco, name, made)
-        for name in ("mj_stateSize", "mj_getState"):
-            real = getattr(mujoco, name, None)
-            if real is not None:
-                tracing.replace_function(mujoco, name, tracing.wrapped(real, self._look_for))
-        data: Any = mujoco.MjData
-        real = data.__dict__["__init__"].__get__(None, data)
-        data.__init__ = tracing.wrapped(real, self._look_for)
+        wrap, mujoco = mujoco_tracing.wrap_functions, self._mujoco
+        wrap(mujoco, _COMPUTING, self._before, self._after)
+        wrap(mujoco, _INTEGRATING, None, self._after)
+        wrap(mujoco, ("mj_stateSize", "mj_getState"), self._look_for)
+        mujoco_tracing.wrap_method(mujoco.MjData, "__init__", self._look_for)
 
     # --- before and after MuJoCo computes
 
@@ -126,9 +114,6 @@ class _Perturbation:
         if extent is not None and extent.of() is data:
             extent.cover(data)
             self._remember(extent, data)
-
-    def _nothing(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        """It goes on with a state that was looked at."""
 
     def _remember(self, extent: TrajectoryExtent, data: Any) -> None:
         extent.time = data.time
@@ -152,8 +137,8 @@ class _Perturbation:
             extent.begin(data.time)
         extent.cover(data)
         extent.from_zero = extent.from_zero or bool((qpos[zeros] != 0).any())
-        if moved and not self._told:
-            self._told = True
+        if moved and not self._has_moved:
+            self._has_moved = True
             self._note("p")
         self._remember(extent, data)
 
@@ -175,7 +160,7 @@ class _Perturbation:
         if known is not None and known[0]() is model:
             return known[1]
         plan = _Plan(self._mujoco, self._numpy, model, self._run)
-        self._plans[id(model)] = _weakref.ref(model), plan
+        self._plans[id(model)] = weakref.ref(model), plan
         return plan
 
     # --- rollouts
@@ -191,10 +176,8 @@ class _Perturbation:
 
         def rollout(*args: Any, **keywords: Any) -> Any:
             """As MuJoCo's, from states that were moved."""
-            try:  # noqa: SIM105 (contextlib may not be loaded)
+            with contextlib.suppress(Exception):  # MuJoCo says what is wrong with its arguments
                 args = self._moved_rollout(args)
-            except Exception:  # MuJoCo itself says what is wrong with its arguments
-                pass
             return real(*args, **keywords)
 
         owner.rollout = rollout
@@ -211,8 +194,8 @@ class _Perturbation:
             act = row[1 + nq + nv : 1 + nq + nv + na]
             fields = (qpos, qvel, act)
             new = [self._new(k, array, None, True) for k, array in enumerate(fields)]
-            if self._plan(model).move(*fields, new, True) and not self._told:
-                self._told = True
+            if self._plan(model).move(*fields, new, True) and not self._has_moved:
+                self._has_moved = True
                 self._note("p")
         return (*args[:5], states, *args[6:])
 

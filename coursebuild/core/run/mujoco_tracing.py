@@ -10,20 +10,17 @@ of whatever that raises.
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Callable, Iterable, Mapping
+from types import ModuleType
+from typing import Any
 
 from coursebuild.core.run.mujoco_files import ModelFiles
+from coursebuild.core.run.tracing import Tracer
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from types import ModuleType
-    from typing import Any
-
-    from coursebuild.core.run.tracing import Tracer
-
-    _Before = Callable[[tuple[Any, ...], Mapping[str, Any]], None]
-    _After = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
+Before = Callable[[tuple[Any, ...], Mapping[str, Any]], None]
+After = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
 
 tracer: Tracer | None = None
 """Who takes the notes; nobody does before it is set."""
@@ -70,7 +67,7 @@ def wrap(mujoco: ModuleType) -> None:
     def attach(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         files.of_spec(_get(args, keywords, 1, "child"))
 
-    of_class: tuple[tuple[Any, str, _Before], ...] = (
+    of_class: tuple[tuple[Any, str, Before], ...] = (
         (model, "from_xml_path", path),
         (model, "from_xml_string", string),
         (model, "from_binary_path", binary),
@@ -80,25 +77,14 @@ def wrap(mujoco: ModuleType) -> None:
     for owner, name, before in of_class:
         if hasattr(owner, name):
             setattr(owner, name, staticmethod(wrapped(getattr(owner, name), before)))
-    of_spec: tuple[tuple[str, _Before], ...] = (
-        ("compile", compile),
-        ("recompile", compile),
-        ("attach", attach),
-        ("to_file", _writer(1)),
-    )
-    for name, before in of_spec:
-        if name in getattr(spec, "__dict__", ()):
-            setattr(spec, name, wrapped(vars(spec)[name].__get__(None, spec), before))
-    functions: list[tuple[str, _Before]] = [
-        ("mj_loadPluginLibrary", _library),
-        ("mj_loadAllPluginLibraries", _library),
-        ("mju_getXMLDependencies", path),
-        *[(name, _writer(position)) for name, position in _WRITERS],
-    ]
-    for name, before in functions:
-        real = getattr(mujoco, name, None)
-        if real is not None:
-            replace_function(mujoco, name, wrapped(real, before))
+    wrap_method(spec, "compile", compile)
+    wrap_method(spec, "recompile", compile)
+    wrap_method(spec, "attach", attach)
+    wrap_method(spec, "to_file", _writer(1))
+    wrap_functions(mujoco, ("mj_loadPluginLibrary", "mj_loadAllPluginLibraries"), _library)
+    wrap_functions(mujoco, ("mju_getXMLDependencies",), path)
+    for name, position in _WRITERS:
+        wrap_functions(mujoco, (name,), _writer(position))
 
 
 def _library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
@@ -107,7 +93,7 @@ def _library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         tracer.library(at)
 
 
-def _writer(position: int) -> _Before:
+def _writer(position: int) -> Before:
     """Notes a file that is written, whose name is at a position."""
 
     def write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
@@ -120,8 +106,8 @@ def _writer(position: int) -> _Before:
 
 def wrapped(
     real: Callable[..., Any],
-    before: _Before,
-    after: _After | None = None,
+    before: Before | None = None,
+    after: After | None = None,
     *,
     like: Callable[..., Any] | None = None,
 ) -> Callable[..., Any]:
@@ -131,11 +117,9 @@ def wrapped(
     """
 
     def wrapper(*args: Any, **keywords: Any) -> Any:
-        if tracer is not None:
-            try:  # noqa: SIM105 (contextlib may not be loaded)
+        if before is not None and tracer is not None:
+            with contextlib.suppress(Exception):  # MuJoCo says what is wrong with its arguments
                 before(args, keywords)
-            except Exception:  # MuJoCo itself says what is wrong with its arguments
-                pass
         try:
             result = real(*args, **keywords)
         except BaseException as error:
@@ -143,15 +127,33 @@ def wrapped(
                 error.__traceback__ = error.__traceback__.tb_next
             raise  # which, unlike naming the error, adds no entry to the traceback
         if after is not None and tracer is not None:
-            try:  # noqa: SIM105
+            with contextlib.suppress(Exception):  # what was asked for has been done
                 after(args, keywords, result)
-            except Exception:  # what was asked for has been done
-                pass
         return result
 
     for attribute in ("__module__", "__name__", "__qualname__", "__doc__"):
         setattr(wrapper, attribute, getattr(like or real, attribute, None))
     return wrapper
+
+
+def wrap_functions(
+    mujoco: ModuleType,
+    names: Iterable[str],
+    before: Before | None = None,
+    after: After | None = None,
+) -> None:
+    """Wrap those of MuJoCo's functions that there are, wherever they are found."""
+    for name in names:
+        real = getattr(mujoco, name, None)
+        if real is not None:
+            replace_function(mujoco, name, wrapped(real, before, after))
+
+
+def wrap_method(owner: Any, name: str, before: Before | None, after: After | None = None) -> None:
+    """Wrap a method of one of MuJoCo's classes, if there is such."""
+    real = getattr(owner, "__dict__", {}).get(name)
+    if real is not None:
+        setattr(owner, name, wrapped(real.__get__(None, owner), before, after))
 
 
 def replace_function(mujoco: ModuleType, name: str, new: Callable[..., Any]) -> None:

@@ -12,14 +12,12 @@ Ours may be called in any thread, also in one of MuJoCo's own: nothing that it d
 
 from __future__ import annotations
 
+import ctypes
 import posix
+from collections.abc import Callable
+from typing import Any
 
 from coursebuild.core.run import mujoco_tracing
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from typing import Any
 
 
 class Warnings:
@@ -37,8 +35,6 @@ class Warnings:
 
     def install(self) -> None:
         """Set our handler, where this MuJoCo lets us, and see to it that it stays."""
-        import ctypes  # which importing MuJoCo has imported
-
         try:
             library = ctypes.PyDLL(self._mujoco._functions.__file__)
             pointer = ctypes.c_void_p.in_dll(library, "mju_user_warning")
@@ -47,13 +43,13 @@ class Warnings:
         if pointer.value is not None:  # somebody's that was set when MuJoCo was imported
             return
         if not hasattr(library, "mju_setLogHandler"):  # before MuJoCo 3.10
-            self._print = _to_standard_output(ctypes)
+            self._print = _to_standard_output()
         self._ours = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(self._raised)
         self._pointer = pointer
         pointer.value = self._address = ctypes.cast(self._ours, ctypes.c_void_p).value
         self._set, self._get = self._mujoco.set_mju_user_warning, self._mujoco.get_mju_user_warning
         for real, new in ((self._set, self._set_handler), (self._get, self._get_handler)):
-            wrapper = mujoco_tracing.wrapped(new, _nothing, like=real)
+            wrapper = mujoco_tracing.wrapped(new, like=real)
             mujoco_tracing.replace_function(self._mujoco, real.__name__, wrapper)
 
     def _raised(self, message: bytes) -> None:
@@ -94,11 +90,7 @@ def _to_standard_error(message: bytes) -> object:
     return posix.write(2, b"WARNING: " + message + b"\n\n")
 
 
-def _to_standard_output(ctypes: Any) -> Callable[[bytes], object]:
+def _to_standard_output() -> Callable[[bytes], object]:
     """As MuJoCo did, through the buffers of the C library."""
     write = ctypes.PyDLL(None).printf
     return lambda message: write(b"WARNING: %s\n\n", message)
-
-
-def _nothing(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-    """There is nothing to be done before."""

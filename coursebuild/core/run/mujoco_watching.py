@@ -16,18 +16,14 @@ but this holds it, it is looked at and let go as well.
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Mapping
+from types import FrameType, ModuleType
+from typing import Any
 
 from coursebuild.core.run import initial_state_perturbation, mujoco_tracing
 from coursebuild.core.run.mujoco_warnings import Warnings
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from types import FrameType, ModuleType
-    from typing import Any
-
-    _After = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
 
 DEEP = 1.0
 """A contact is deep where the smaller of two geoms has sunk in by more than this part of its
@@ -61,10 +57,8 @@ def watch(mujoco: ModuleType) -> None:
 def finish() -> None:
     """Look at every `MjData` that there is: the script has come to its end."""
     if _watch is not None and mujoco_tracing.tracer is not None:
-        try:  # noqa: SIM105 (contextlib may not be loaded)
+        with contextlib.suppress(Exception):  # the script's own end must not fail for this
             _watch.finish()
-        except Exception:  # the script's own end must not fail for this
-            pass
 
 
 _watch: _Watch | None = None
@@ -88,19 +82,15 @@ class _Watch:
 
     def install(self) -> None:
         """Hear of warnings, and of data that is made and reset."""
-        data = self._mujoco.MjData
-        wrapped = mujoco_tracing.wrapped
+        data, wrap = self._mujoco.MjData, mujoco_tracing.wrap_method
         for name in ("__init__", "__setstate__"):
-            self._follow(data, name, self._made_self)
+            wrap(data, name, None, self._made_self)
         for name in ("__copy__", "__deepcopy__"):
-            self._follow(data, name, lambda args, keywords, made: self._made(made))
+            wrap(data, name, None, lambda args, keywords, made: self._made(made))
         spec = getattr(self._mujoco, "MjSpec", None)  # there was none before MuJoCo 3.2
-        if spec is not None:
-            self._follow(spec, "recompile", lambda args, keywords, made: self._made(made[1]))
-        for name in ("mj_resetData", "mj_resetDataKeyframe", "mj_resetDataDebug"):
-            real = getattr(self._mujoco, name, None)
-            if real is not None:
-                mujoco_tracing.replace_function(self._mujoco, name, wrapped(real, self._reset))
+        wrap(spec, "recompile", None, lambda args, keywords, made: self._made(made[1]))
+        resets = ("mj_resetData", "mj_resetDataKeyframe", "mj_resetDataDebug")
+        mujoco_tracing.wrap_functions(self._mujoco, resets, self._reset)
         self._warnings.install()
 
     def finish(self) -> None:
@@ -127,12 +117,6 @@ class _Watch:
         return names.pop() if len(names) == 1 else ""
 
     # --- looks
-
-    def _follow(self, owner: Any, name: str, after: _After) -> None:
-        real = owner.__dict__.get(name)
-        if real is not None:
-            real = real.__get__(None, owner)
-            setattr(owner, name, mujoco_tracing.wrapped(real, _nothing, after))
 
     def _made_self(self, args: tuple[Any, ...], keywords: Mapping[str, Any], made: Any) -> None:
         self._made(args[0])
@@ -214,10 +198,6 @@ def _references(held: Mapping[int, object], key: int) -> int:
     """How many hold a value, with those of this function."""
     value = held[key]
     return sys.getrefcount(value)
-
-
-def _nothing(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-    """There is nothing to be done before."""
 
 
 def _name(data: Any) -> str:

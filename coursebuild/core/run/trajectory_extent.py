@@ -11,11 +11,8 @@ the trembling that moving it has left.
 
 from __future__ import annotations
 
-import _weakref
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from typing import Any
+import weakref
+from typing import Any
 
 _LOST = 1e10
 """Larger numbers, and none, are those of a simulation that is lost."""
@@ -25,7 +22,7 @@ class TrajectoryExtent:
     """What MuJoCo last computed from, or led to, and how far it came."""
 
     def __init__(self, data: Any, number: int) -> None:
-        self.of: Any = _weakref.ref(data)
+        self.of: Any = weakref.ref(data)
         self.number = number
         """Data in the order in which they were first computed with."""
         self.time = float("inf")

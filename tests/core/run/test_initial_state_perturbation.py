@@ -92,7 +92,6 @@ def test_an_ordinary_run_is_as_ever(told: Told) -> None:
     assert told(text, 0) != told(text, 1)
 
 
-@both_ways
 def test_a_state_is_moved_before_anything_is_computed_from_it(told: Told) -> None:
     for function in ("mj_forward", "mj_step1", "mj_kinematics", "mj_inverse", "mj_fwdPosition"):
         found = told(f"{PULL}mujoco.{function}(model, data)\ntell('q', data.qpos)")
@@ -301,7 +300,6 @@ tell("end", end[:, -1, 1:3])
     assert all(moved(a, b) for a, b in zip(found["end"], found["given"], strict=True))
 
 
-@both_ways
 def test_what_became_of_the_states_is_noted(run: Callable[..., ScriptRun]) -> None:
     trace = run(PULL + STEP, 1).trace
     assert trace is not None

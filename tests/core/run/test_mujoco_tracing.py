@@ -19,7 +19,6 @@ import pytest
 
 from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.runner import ScriptServer, clean_environment
-from support.runners import both_ways
 
 pytestmark = pytest.mark.site
 
@@ -363,7 +362,6 @@ def test_the_files_of_a_model(name: str, tmp_path: Path, server: ScriptServer) -
         shutil.rmtree(less)
 
 
-@both_ways
 def test_files_that_mujoco_writes(tmp_path: Path, server: ScriptServer) -> None:
     code = "model = text('<mujoco/>')\n{}\n"
     for call in (
@@ -379,14 +377,12 @@ def test_files_that_mujoco_writes(tmp_path: Path, server: ScriptServer) -> None:
         )
 
 
-@both_ways
 def test_plugins_of_the_project(tmp_path: Path, server: ScriptServer) -> None:
     (tmp_path / "plugins").mkdir()
     done = run(server, tmp_path, "mujoco.mj_loadAllPluginLibraries('plugins')")
     assert done.trace is not None and done.trace.opaque == "it loads native code of the project"
 
 
-@both_ways
 def test_wrappers_look_like_what_they_wrap(tmp_path: Path, server: ScriptServer) -> None:
     code = (
         "for f in (load, text, Spec.from_file, Spec.compile, Spec().attach, mujoco.mj_saveModel):"

@@ -192,7 +192,6 @@ pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
     assert (one.sign, one.model, one.line) == (Sign.VELOCITIES, "spinner", 0)
 
 
-@both_ways
 def test_a_state_that_is_no_number_at_the_end(run: Run) -> None:
     text = HEAD + STEP + "data.qvel[0] = float('nan')\n"
     assert found(run(text)) == (Divergence(Sign.STATE, "0.002", "spinner", "", 0),)
@@ -208,7 +207,6 @@ def test_copies_are_looked_at_as_well(run: Run) -> None:
     assert [one.sign for one in found(run(text))] == [Sign.STATE]
 
 
-@both_ways
 @pytest.mark.parametrize(
     "imported",
     [

@@ -27,7 +27,6 @@ pytestmark = pytest.mark.site
 
 
 class TestOutcomes:
-    @both_ways
     def test_ok(self, run: Run) -> None:
         result = run("import sys\nprint('out')\nprint('err', file=sys.stderr)\n")
         assert (result.outcome, result.status) == (Outcome.OK, 0)

@@ -109,7 +109,6 @@ class TestFiles:
         assert trace.folders == (".", "data", "examples", "lib", "none")
         assert trace.opaque == ""
 
-    @both_ways
     @pytest.mark.parametrize("end", ["os._exit(0)", "os.abort()", "os.kill(os.getpid(), 9)"])
     def test_it_is_known_however_the_script_ends(self, run: Run, end: str) -> None:
         result = run(f"import os\nopen('data/a.txt')\n{end}\n")
@@ -140,7 +139,6 @@ class TestFiles:
 
 
 class TestImports:
-    @both_ways
     def test_a_sibling(self, traced: Traced, root: Path) -> None:
         (root / "examples/sibling.py").write_text("value = 1")
         (root / "examples/pack").mkdir()
