@@ -227,7 +227,7 @@ def test_a_damaged_note_is_not_believed(root: Path) -> None:
     assert keep(root)
     [file] = (root / ".coursebuild/unchanged").iterdir()
     whole = file.read_bytes()
-    for at in range(len(whole)):
+    for at in range(0, len(whole), 7):
         for damaged in (whole[:at] + bytes((whole[at] ^ 4,)) + whole[at + 1 :], whole[:at]):
             file.write_bytes(damaged)
             assert said(root) is None, at

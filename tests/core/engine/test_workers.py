@@ -216,7 +216,7 @@ def test_workers_end_with_the_process(how: signal.Signals, tmp_path: Path) -> No
         "from coursebuild.core.engine.workers import Workers\n"
         "def work(n):\n"
         "    os.write(1, b'%d\\n' % os.getpid())\n"
-        "    time.sleep(1.0)\n"
+        "    time.sleep(0.1)\n"
         "with Workers(work, 2) as workers: workers.map([(None, n) for n in range(99)])\n"
     )
     with subprocess.Popen(
