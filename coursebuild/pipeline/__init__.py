@@ -5,13 +5,12 @@ course's root and options, tells a `Progress` what it does, and gives what it fo
 a `Report`.
 
 1. `options`, `progress`: what every command needs
-2. `load`: disk → course, by `documents` (with `reading`, `tasks`), which
+2. `load`: disk → course. Its parser is `documents` (with `reading`, `tasks`, `fingerprints`), which
    parses only what nobody has parsed
-3. `verify`: course → results, by `remember` and `remember_models`, which give what is known;
-   `shards` leaves out the parts of other machines. `labs` (with
-   `lab_inputs`, `lab_models`, `lab_export`, `custom_labs`) tries labs
-4. `judge`: findings → report; `depends`: the files that it depends on
-5. `site` (with `pages`): course and results → the files of a site; `kept`: what is made of the
-   tool's own files for that
+3. `verify`: course → results. `scripts` runs scripts, by `remember`, which gives what is known;
+   `remember_models` compiles models; `labs` (with `lab_inputs`, `lab_models`, `lab_export`,
+   `custom_labs`) tries labs; `shards` leaves out the parts of other machines
+4. `judge`: findings → report, and the files for which it holds
+5. `site` (with `pages`, `page_index`): course and results → the files of a site
 6. `preview`: the same in memory, for `serve`
 """

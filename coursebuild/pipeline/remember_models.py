@@ -13,7 +13,7 @@ import contextlib
 import functools
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
 
@@ -53,39 +53,25 @@ def compile_all(
     `stage` is entered where anything has to be compiled.
     """
     memory = _Models(root, store)
-    of_models = [memory.recall(m.source.path, m.source.text) for m in models]
-    of_texts = [memory.recall("", text) for text in texts]
-    left = [m for m, found in zip(models, of_models, strict=True) if found is None]
-    rest = list(dict.fromkeys(t for t, found in zip(texts, of_texts, strict=True) if not found))
+    named = [(model.source.path, model.source.text) for model in models]
+    unnamed = [("", text) for text in texts]
+    found: dict[tuple[str, str], CompileResult] = {}
+    for key in (*named, *unnamed):
+        known = memory.recall(*key)
+        if known is not None:
+            found[key] = known
+    left = [model for model, key in zip(models, named, strict=True) if key not in found]
+    rest = [text for text in dict.fromkeys(texts) if ("", text) not in found]
     if left or rest:
         memory.begin()
         with stage():
             made, parts = mjcf.compile_all(root, left, rest)
-        for model, result in zip(left, made, strict=True):
-            memory.keep(model.source.path, model.source.text, result)
-        for text, result in zip(rest, parts, strict=True):
-            memory.keep("", text, result)
-        of_models = _filled(of_models, made)
-        by_text = dict(zip(rest, parts, strict=True))
-        of_texts = [
-            by_text[text] if found is None else found
-            for text, found in zip(texts, of_texts, strict=True)
-        ]
+        keys = [*((m.source.path, m.source.text) for m in left), *(("", text) for text in rest)]
+        for key, result in zip(keys, (*made, *parts), strict=True):
+            memory.keep(*key, result)
+            found[key] = result
     memory.states.save()
-    return tuple(_whole(of_models)), tuple(_whole(of_texts))
-
-
-def _filled(
-    found: Iterable[CompileResult | None], made: Iterable[CompileResult]
-) -> list[CompileResult | None]:
-    rest = iter(made)
-    return [next(rest) if result is None else result for result in found]
-
-
-def _whole(results: Iterable[CompileResult | None]) -> Iterator[CompileResult]:
-    for result in results:
-        assert result is not None
-        yield result
+    return tuple(found[key] for key in named), tuple(found[key] for key in unnamed)
 
 
 class _Models:

@@ -1,6 +1,6 @@
 """The scripts of a course: written to `examples/`, remembered or run.
 
-Entry points: `extract_scripts`, `run`, `script_lines`.
+Entry points: `extract_scripts`, `run`, `recorded_outputs`, `script_lines`.
 
 One that was edited in `examples/` by hand is reported and not run. Of the others those run, the
 longest first, of which no result is remembered that still holds.
@@ -8,7 +8,7 @@ longest first, of which no result is remembered that still holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, assert_never
 
 from msgspec import Struct, field
@@ -16,7 +16,7 @@ from msgspec import Struct, field
 from coursebuild.core.files.errors import OutsideProjectError
 from coursebuild.core.files.examples import Blocked, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
-from coursebuild.core.model import Course
+from coursebuild.core.model import Course, Recording, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
@@ -189,6 +189,17 @@ def _run(
             runs = run_all(options.root, ordered, parallel=options.jobs, on_event=told)
     memory.close()
     return runs
+
+
+def recorded_outputs(course: Course, documents: Collection[str] | None = None) -> list[Recording]:
+    """The outputs of scripts in these documents, or in all, that can be compared."""
+    return [
+        block
+        for document in course.documents
+        if documents is None or document.source.path in documents
+        for block in document_blocks(document)
+        if isinstance(block, Recording) and block.script is not None and block.readable
+    ]
 
 
 def script_lines(

@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection, Sequence
 
-from coursebuild.core.model import Course, Recording, document_blocks
+from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.model.sensitivity import RUNS, Sensitivity
 from coursebuild.core.run.runner import ScriptServer
@@ -21,7 +21,7 @@ from coursebuild.core.scripts.sensitivity import sensitivity, worth_moving
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
-from coursebuild.pipeline.scripts import run
+from coursebuild.pipeline.scripts import recorded_outputs, run
 
 _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
 
@@ -39,7 +39,10 @@ def measure(
     `runs` are theirs, in the same order; `documents` the paths of those whose recorded outputs
     count, all of them without it.
     """
-    recordings = _recordings(course, documents)
+    recordings: dict[str, list[Recording]] = {}
+    for recording in recorded_outputs(course, documents):
+        assert recording.script is not None
+        recordings.setdefault(recording.script, []).append(recording)
     pairs = [
         (script, base)
         for script, base in zip(scripts, runs, strict=True)
@@ -78,16 +81,4 @@ def _moved(
             stage = f"moving initial states, {number} of {RUNS}"
             for one in run(scripts, options, progress, stage, memory, run_all, perturbation=number):
                 found[one.path].append(one)
-    return found
-
-
-def _recordings(course: Course, documents: Collection[str] | None) -> dict[str, list[Recording]]:
-    """The recorded outputs that can be compared, by the path of their script."""
-    found: dict[str, list[Recording]] = {}
-    for document in course.documents:
-        if documents is not None and document.source.path not in documents:
-            continue
-        for block in document_blocks(document):
-            if isinstance(block, Recording) and block.script is not None and block.readable:
-                found.setdefault(block.script, []).append(block)
     return found

@@ -25,7 +25,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import check_writable, write_atomic
-from coursebuild.core.model import Course, Recording, document_blocks
+from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.run.runner import RunAll, ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
@@ -39,7 +39,13 @@ from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
-from coursebuild.pipeline.scripts import ExtractedScripts, extract_scripts, run, script_lines
+from coursebuild.pipeline.scripts import (
+    ExtractedScripts,
+    extract_scripts,
+    recorded_outputs,
+    run,
+    script_lines,
+)
 from coursebuild.report import Report
 
 
@@ -74,7 +80,11 @@ def _update(
     found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
     found += _afterwards(course, now.course or course, scripts, first, again)
     if edits and not dry_run and now.course is not None:
-        changed = {r.script for r in _recordings(course, chosen) if _is_touched(r, edits, ())}
+        changed = {
+            r.script
+            for r in recorded_outputs(course, chosen.documents)
+            if _is_touched(r, edits, ())
+        }
         found += _noise(now.course, chosen, changed, first, options, progress)
     if not remarks and all(d.severity is not Severity.ERROR for d in found):
         remarks = ("every recorded output is up to date",)
@@ -100,7 +110,11 @@ def _again(
 ) -> tuple[ScriptRun, ...]:
     """The second runs; a remembered first one that is recorded already stands for both."""
     edits, refused = _edits(course, chosen, first, first, frozenset())
-    wrong = {r.script for r in _recordings(course, chosen) if _is_touched(r, edits, refused)}
+    wrong = {
+        r.script
+        for r in recorded_outputs(course, chosen.documents)
+        if _is_touched(r, edits, refused)
+    }
     left = [
         extraction
         for extraction, one in zip(scripts, first, strict=True)
@@ -148,21 +162,11 @@ def _is_touched(
     return written or any(whole.contains(d.span) for d in refused)
 
 
-def _recordings(course: Course, chosen: Selection) -> list[Recording]:
-    return [
-        block
-        for document in course.documents
-        if chosen.documents is None or document.source.path in chosen.documents
-        for block in document_blocks(document)
-        if isinstance(block, Recording) and block.script is not None and block.readable
-    ]
-
-
 def _with_recordings(
     course: Course, chosen: Selection, runnable: Sequence[Extraction]
 ) -> tuple[Extraction, ...]:
     """The scripts that have an output to bring up to date."""
-    wanted = {recording.script for recording in _recordings(course, chosen)}
+    wanted = {recording.script for recording in recorded_outputs(course, chosen.documents)}
     return tuple(e for e in runnable if e.path in wanted)
 
 
@@ -187,7 +191,7 @@ def _edits(
     }
     edits: dict[Source, list[Edit]] = {}
     refused: list[Diagnostic] = []
-    for recording in _recordings(course, chosen):
+    for recording in recorded_outputs(course, chosen.documents):
         if recording.script not in good or recording.script in doubtful:
             continue
         comparison = recording.comparison or course.comparison
