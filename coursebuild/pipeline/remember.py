@@ -35,7 +35,6 @@ from coursebuild.core.scripts.dependencies import (
     folded,
     forgotten,
     group_key,
-    inputs_by,
     inputs_of,
     is_perturbed,
     needs,
@@ -137,10 +136,6 @@ class Memory:
     def inputs(self, job: ScriptJob, text: bytes) -> Inputs:
         """What is known of a script before it runs."""
         return inputs_of(job, text, self.states.around)
-
-    def inputs_by(self, job: ScriptJob, digest: str) -> Inputs:
-        """The same by the SHA-256 of its file."""
-        return inputs_by(job, digest, self.states.around)
 
     def recall(self, wanted: Sequence[Inputs]) -> dict[str, ScriptRun]:
         """The results, by path, that hold; none where everything is to run."""

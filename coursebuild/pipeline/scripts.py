@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, assert_never
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 from coursebuild.core.files.errors import OutsideProjectError
 from coursebuild.core.files.examples import Blocked, Obstacle, write_examples
@@ -41,8 +41,6 @@ class ExtractedScripts(Struct, frozen=True):
     written: tuple[str, ...]
     removed: tuple[str, ...]
     blocked: tuple[Blocked, ...]
-    digests: Mapping[str, str] = field(default_factory=dict)
-    """The SHA-256 of the file of each, as far as it is known."""
 
 
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
@@ -67,7 +65,6 @@ def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
         report.written,
         report.removed,
         report.blocked,
-        report.digests,
     )
 
 
@@ -110,23 +107,21 @@ def run(
     memory: Memory | None = None,
     run_all: RunAll | None = None,
     perturbation: int = 0,
-    digests: Mapping[str, str] | None = None,
     known: Mapping[str, ScriptRun] | None = None,
 ) -> tuple[ScriptRun, ...]:
     """The results of the chosen scripts: remembered ones, and those of the others run now.
 
-    What begins and ends is told. `memory` is what is remembered; another one than that of the
-    options where everything is to run. `run_all` is what runs them, where it
-    is not `run_scripts`.
-    `perturbation`: with initial states moved, in the direction that has this number. `digests`:
-    of files, by path, as far as they are known. `known`: results, by path, that hold.
+    What begins and ends is told. `memory` is what is remembered, where it is not that of the
+    options. `run_all` is what runs them, where it is not `run_scripts`. `perturbation`: with
+    initial states moved, in the direction that has this number. `known`: results, by path, that
+    hold.
     """
     chosen = tuple(chosen)
     memory = Memory(options.root, options.store) if memory is None else memory
     todo = jobs(chosen, perturbation)
     done = dict(known or {})
     inputs = {
-        job.path: _inputs(memory, job, extraction, digests or {})
+        job.path: memory.inputs(job, extraction.data)
         for job, extraction in zip(todo, chosen, strict=True)
         if not job.norun and job.path not in done
     }
@@ -136,13 +131,6 @@ def run(
     for finished in _run(left, inputs, options, progress, stage, memory, run_all):
         done[finished.path] = finished
     return tuple(done[job.path] for job in todo)
-
-
-def _inputs(
-    memory: Memory, job: ScriptJob, extraction: Extraction, digests: Mapping[str, str]
-) -> Inputs:
-    known = digests.get(job.path)
-    return memory.inputs(job, extraction.data) if known is None else memory.inputs_by(job, known)
 
 
 def _run(

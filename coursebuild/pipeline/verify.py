@@ -93,7 +93,6 @@ def verify(
         progress,
         memory=memory,
         run_all=run_all,
-        digests=extracted.digests,
         known=known,
     )
     labs: tuple[LabResult, ...] = ()

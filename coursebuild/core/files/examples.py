@@ -23,7 +23,7 @@ import stat
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError, reason
 from coursebuild.core.files.write import remove_leftovers, resolve_inside, write_atomic
@@ -67,8 +67,6 @@ class ExamplesReport(Struct, frozen=True):
     unchanged: tuple[str, ...]
     removed: tuple[str, ...]
     blocked: tuple[Blocked, ...]
-    digests: Mapping[str, str] = field(default_factory=dict)
-    """The SHA-256 that each script should have, in hexadecimal digits."""
 
 
 def write_examples(
@@ -116,7 +114,6 @@ class _Update:
         self.unchanged: list[str] = []
         self.removed: list[str] = []
         self.blocked: list[Blocked] = []
-        self.digests: dict[str, str] = {}
 
     def run(self) -> ExamplesReport:
         for path in sorted(self.wanted):
@@ -142,12 +139,11 @@ class _Update:
             tuple(self.unchanged),
             tuple(self.removed),
             tuple(sorted(self.blocked, key=lambda b: b.path)),
-            self.digests,
         )
 
     def _plan_write(self, path: str) -> None:
         data = self.wanted[path]
-        digest = self.digests[path] = _hash(data)
+        digest = _hash(data)
         obstacle, current = self._look(path)
         if obstacle is not None:
             self._block(path, obstacle, None)

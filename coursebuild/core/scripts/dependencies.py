@@ -95,11 +95,7 @@ class Inputs(Struct, frozen=True):
 
 def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) -> Inputs:
     """What is known of a job whose file holds this text."""
-    return inputs_by(job, hashlib.sha256(text).hexdigest(), around)
-
-
-def inputs_by(job: ScriptJob, digest: str, around: tuple[tuple[str, str], ...]) -> Inputs:
-    """The same by the SHA-256 of the file, in hexadecimal digits."""
+    digest = hashlib.sha256(text).hexdigest()
     if job.perturbation:
         around = tuple(sorted((*around, (_PERTURBATION, str(job.perturbation)))))
     return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, around)
