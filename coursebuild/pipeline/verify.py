@@ -61,60 +61,48 @@ def verify(
     static: bool = False,
     shard: Shard | None = None,
     run_all: RunAll | None = None,
-    held: BindingMemory | None = None,
+    bindings: BindingMemory | None = None,
     known: Mapping[str, ScriptRun] | None = None,
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`. `held`:
-    bound numbers that held before; what the store has, where nothing is said. `known`: what scripts
-    do, by path, that need not be looked at.
+    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`. `bindings`: bound
+    numbers that held before, where it is not what the store has. `known`: what scripts do, by path,
+    that need not be looked at.
     """
     options.store.listen(progress.say)
     extracted = extract_scripts(course, options)
-    chosen: Sequence[Extraction] = extracted.runnable
-    if documents is not None:
-        leaned_on = _leaned_on(course, documents)
-        chosen = [e for e in chosen if e.document in documents or e.path in leaned_on]
-    only = None
-    if shard is not None:
-        from coursebuild.pipeline.lab_inputs import labs_of
-
-        names = (name for _, name, lab in labs_of(course) if _is_in(lab, documents))
-        only = shard.takes([*(e.path for e in chosen), *names])
-        chosen = [e for e in chosen if e.path in only]
+    chosen, only = _chosen(course, extracted.runnable, documents, shard)
     models, compiled = compile_models(course, options, progress)
     memory = Memory(options.root, options.store)
     scripts = functools.partial(
-        run,
-        chosen,
-        options,
-        progress,
-        memory=memory,
-        run_all=run_all,
-        known=known,
+        run, chosen, options, progress, memory=memory, run_all=run_all, known=known
     )
     labs: tuple[LabResult, ...] = ()
-    lab_findings: tuple[Diagnostic, ...] = ()
-    if _has_labs(course):
+    found = [*extracted.diagnostics, *compiled]
+    if any(document_has(document, Lab) for document in course.documents):
         from coursebuild.pipeline.labs import Engines, Tried, run_scripts_and_labs, try_labs
-
-        by_name = dict(models)
 
         def trials(engines: Engines) -> Tried:
             return try_labs(
-                course, by_name, options, engines, documents, compiled, static=static, only=only
+                course,
+                dict(models),
+                options,
+                engines,
+                documents,
+                compiled,
+                static=static,
+                only=only,
             )
 
-        runs, (labs, lab_findings) = run_scripts_and_labs(scripts, trials, options.root, progress)
+        runs, (labs, wrong) = run_scripts_and_labs(scripts, trials, options.root, progress)
+        found += wrong
     else:
         runs = scripts()
     verdicts = compare_all(course, runs)
-    found = [*extracted.diagnostics, *compiled, *lab_findings]
-    kept = KeptBindings(options.store) if held is None else None
-    bindings = held if kept is None else kept
-    found += script_findings(course, chosen, runs, verdicts, bindings, extracted.all)
+    kept = KeptBindings(options.store) if bindings is None else None
+    found += script_findings(course, chosen, runs, verdicts, kept or bindings, extracted.all)
     if kept is not None:
         kept.save()
     if memory.differing:
@@ -122,20 +110,33 @@ def verify(
 
         found += repeat_findings(course, chosen, memory.differing)
     found += check_runs(course, runs)
-    versions = python_version(), engine_version()
-    results = Results(runs, verdicts, (), models, *versions, labs)
+    results = Results(runs, verdicts, (), models, python_version(), engine_version(), labs)
     return Verified(results, tuple(found), script_lines(chosen, runs, verdicts), lab_lines(labs))
 
 
-def _has_labs(course: Course) -> bool:
-    return any(document_has(document, Lab) for document in course.documents)
+def _chosen(
+    course: Course,
+    runnable: Sequence[Extraction],
+    documents: Collection[str] | None,
+    shard: Shard | None,
+) -> tuple[Sequence[Extraction], frozenset[str] | None]:
+    """The scripts to run, and the names of the scripts and labs of this part, if it is one."""
+    chosen = runnable
+    if documents is not None:
+        quoted = _quoted_scripts(course, documents)
+        chosen = [e for e in chosen if e.document in documents or e.path in quoted]
+    if shard is None:
+        return chosen, None
+    from coursebuild.pipeline.lab_inputs import labs_of
+
+    labs = (
+        name for _, name, lab in labs_of(course) if documents is None or lab.span.path in documents
+    )
+    only = shard.takes([*(e.path for e in chosen), *labs])
+    return [e for e in chosen if e.path in only], only
 
 
-def _is_in(lab: Lab, documents: Collection[str] | None) -> bool:
-    return documents is None or lab.span.path in documents
-
-
-def _leaned_on(course: Course, documents: Collection[str]) -> set[str]:
+def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
     """Scripts, of any lesson, whose output the numbers and questions of these documents quote."""
     paths: set[str] = set()
     for document in course.documents:

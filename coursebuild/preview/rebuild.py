@@ -171,7 +171,7 @@ class BackgroundRebuild:
                 self._progress,
                 static=True,
                 run_all=self._run_all(scripts),
-                held=self._bindings,
+                bindings=self._bindings,
                 known=known,
             )
         except BaseException as error:
