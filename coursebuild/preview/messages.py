@@ -19,8 +19,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from msgspec import Struct
-
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import (
@@ -46,20 +44,14 @@ _IN_PLACE = ("output-drift", "binding-mismatch")
 """Rules whose mistakes a page shows where they are."""
 
 
-class AcceptableOutput(Struct, frozen=True):
-    """An edit that an author may accept."""
-
-    edit: Edit
-
-    @property
-    def id(self) -> str:
-        """By which it is accepted; another text or another edit has another."""
-        span = self.edit.span
-        parts = (span.path, str(span.start), str(span.end), self.edit.text, span.source.text)
-        digest = hashlib.sha256()
-        for part in parts:
-            digest.update(f"{len(part)}:{part}".encode("utf-8", "surrogatepass"))
-        return digest.hexdigest()[:24]
+def offer_id(edit: Edit) -> str:
+    """By which an edit is accepted; another text or another edit has another."""
+    span = edit.span
+    parts = (span.path, str(span.start), str(span.end), edit.text, span.source.text)
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(f"{len(part)}:{part}".encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()[:24]
 
 
 def report_now(session: Session) -> Report:
@@ -167,7 +159,7 @@ def _drift(session: Session, course: Course, verdict: Verdict, run: ScriptRun) -
     offered = _update(session, course, verdict, run)
     told: dict[str, Any] = {"rows": [_row(row) for row in rows], "offer": None, "refused": ""}
     if isinstance(offered, Edit):
-        told["offer"] = AcceptableOutput(offered).id
+        told["offer"] = offer_id(offered)
     elif offered is not None:
         told["refused"] = offered.message
     return told
@@ -215,7 +207,7 @@ def _number(binding: NumberBinding, nth: int, told: Diagnostic) -> dict[str, Any
         "message": told.message,
         "label": told.label,
         "better": "" if edit is None else edit.text,
-        "offer": None if edit is None else AcceptableOutput(edit).id,
+        "offer": None if edit is None else offer_id(edit),
     }
 
 
@@ -228,7 +220,7 @@ def accept(session: Session, path: str, id: str) -> str:
     The lock is held, so that two browsers cannot accept the same at once.
     """
     with session.changed:
-        edit = next((offer.edit for offer in _offers(session, path) if offer.id == id), None)
+        edit = next((e for e in _offers(session, path) if offer_id(e) == id), None)
         if edit is None:
             return "this is no longer what the page offers; look at it again"
         source = edit.span.source
@@ -240,7 +232,8 @@ def accept(session: Session, path: str, id: str) -> str:
         return ""
 
 
-def _offers(session: Session, path: str) -> Iterator[AcceptableOutput]:
+def _offers(session: Session, path: str) -> Iterator[Edit]:
+    """What may be accepted on a page."""
     document, course, library = session.files.document(path), session.course, session.library
     if document is None or course is None or library is None:
         return
@@ -249,7 +242,7 @@ def _offers(session: Session, path: str) -> Iterator[AcceptableOutput]:
         if verdict is not None and verdict.status == "drift" and run is not None:
             edit = _update(session, course, verdict, run)
             if isinstance(edit, Edit):
-                yield AcceptableOutput(edit)
+                yield edit
     for diagnostic in session.diagnostics():
         if diagnostic.rule == "binding-mismatch" and diagnostic.span.path == document.source.path:
-            yield from (AcceptableOutput(edit) for edit in diagnostic.edits)
+            yield from diagnostic.edits
