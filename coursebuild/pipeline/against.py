@@ -52,9 +52,9 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
         loaded = load(options.root)
         course = loaded.course
         if course is None:
-            told = next(d for d in loaded.diagnostics if d.severity is Severity.ERROR)
+            wrong = next(d for d in loaded.diagnostics if d.severity is Severity.ERROR)
             raise EffectError(
-                f"the course cannot be read: {told.span.path}:{told.span.line}: {told.message}",
+                f"the course cannot be read: {wrong.span.path}:{wrong.span.line}: {wrong.message}",
                 help="`coursebuild check` tells all that is wrong",
             )
         documents = select(course, names, options.root).documents
@@ -94,9 +94,9 @@ class _Work(Struct):
         control, trouble = self._control(differing)
         lines = []
         for extraction in self.chosen:
-            path, told = extraction.path, kept[extraction.path]
-            if told is not None:
-                lines.append(ScriptAgainst(path, extraction.owner, told.status, told.why))
+            path, reason = extraction.path, kept[extraction.path]
+            if reason is not None:
+                lines.append(ScriptAgainst(path, extraction.owner, reason.status, reason.why))
             elif there[path].holds:
                 lines.append(ScriptAgainst(path, extraction.owner, "same"))
             else:

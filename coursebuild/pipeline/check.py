@@ -137,8 +137,8 @@ def _no_scripts(
 ) -> list[Diagnostic]:
     """That nothing was verified, where no other mistake says why."""
     wrong = {d.span.path for d in found if d.severity is Severity.ERROR}
-    told = wrong if chosen.documents is None else wrong & {*chosen.documents, course.map.path}
-    if told or any(line.status not in ("skipped", "norun") for line in scripts):
+    explained = wrong if chosen.documents is None else wrong & {*chosen.documents, course.map.path}
+    if explained or any(line.status not in ("skipped", "norun") for line in scripts):
         return []
     which = "none that can run here" if scripts else "none"
     message = f"no script was run, so that nothing was verified: {_chosen(chosen)} {which}"

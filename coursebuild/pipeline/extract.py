@@ -39,23 +39,23 @@ def _extract(options: Options, *, adopt: bool) -> Report:
     if course is None:
         return judge(None, loaded.diagnostics, began)
     extracted = extract_scripts(course, options)
-    remarks = _told(extracted)
+    remarks = _remarks(extracted)
     refused: list[Diagnostic] = []
     if adopt and extracted.blocked:
         adoptions, refused, read = _adopt(options, extracted)
         if read:
             loaded = load(options.root)
             course = loaded.course or course
-            _settle(options, course, read)
+            _write_as_extracted(options, course, read)
             extracted = extract_scripts(course, options)
-        remarks += [*adoptions, *_told(extracted)]
+        remarks += [*adoptions, *_remarks(extracted)]
     found = [*loaded.diagnostics, *extracted.diagnostics, *refused]
     if not remarks and all(d.severity is not Severity.ERROR for d in found):
         remarks.append("every script is extracted already")
     return judge(course, found, began, remarks=tuple(remarks))
 
 
-def _told(extracted: ExtractedScripts) -> list[str]:
+def _remarks(extracted: ExtractedScripts) -> list[str]:
     removed = (f"removed {path}, which no lesson has any more" for path in extracted.removed)
     return [*(f"wrote {path}" for path in extracted.written), *removed]
 
@@ -92,7 +92,7 @@ def _adopt(
     return remarks, refused, read
 
 
-def _settle(options: Options, course: Course, read: Mapping[str, bytes]) -> None:
+def _write_as_extracted(options: Options, course: Course, read: Mapping[str, bytes]) -> None:
     """Make each adopted file what its block extracts to now.
 
     An editor's line ends or blank lines at the end are nothing that a block holds; without this the

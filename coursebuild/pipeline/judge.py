@@ -47,12 +47,12 @@ def judge(
     if lessons is None:
         everything = () if course is None else course.lessons
         lessons = sum(lesson.document is not None for lesson in everything)
-    told = sort_diagnostics(diagnostics)
+    found = sort_diagnostics(diagnostics)
     if documents is not None and course is not None:
         wanted = {*documents, course.map.path}
-        told = tuple(d for d in told if d.span.path in wanted or d.rule in _OF_RUNS)
+        found = tuple(d for d in found if d.span.path in wanted or d.rule in _OF_RUNS)
     silences = course.silences if course is not None else ()
-    kept = tuple(d for d in told if not _silenced(d, silences))
+    kept = tuple(d for d in found if not _silenced(d, silences))
     errors = sum(d.severity is Severity.ERROR for d in kept)
     summary = Summary(
         lessons=lessons,
@@ -61,7 +61,7 @@ def judge(
         skipped=sum(line.status == "skipped" for line in scripts),
         errors=errors,
         warnings=len(kept) - errors,
-        silenced=len(told) - len(kept),
+        silenced=len(found) - len(kept),
         seconds=0.0 if began is None else time.monotonic() - began,
         cached=sum(line.cached for line in scripts),
     )

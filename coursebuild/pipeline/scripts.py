@@ -52,8 +52,10 @@ def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
         report = write_examples(options.root, {e.path: e.data for e in parsed.value})
     except OutsideProjectError as error:
         place = parsed.value[0].script.path_span if parsed.value else course.map.span(0, 0)
-        told = diagnose("script-path", place, error.message, help="make it a folder of the course")
-        return ExtractedScripts(parsed.value, (), (*parsed.diagnostics, told), (), (), ())
+        diagnostic = diagnose(
+            "script-path", place, error.message, help="make it a folder of the course"
+        )
+        return ExtractedScripts(parsed.value, (), (*parsed.diagnostics, diagnostic), (), (), ())
     by_path = {e.path: e for e in parsed.value}
     blocked = {example.path for example in report.blocked}
     found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
@@ -153,7 +155,7 @@ def _run(
     lasted = {job.path: memory.last(job.path) for job in todo}
     seconds = {path: None if last is None else last.seconds for path, last in lasted.items()}
 
-    def told(event: RunEvent) -> None:
+    def note(event: RunEvent) -> None:
         match event:
             case RunStarted():
                 memory.started(event.path)
@@ -171,10 +173,10 @@ def _run(
         if options.executor is not None:
             from coursebuild.core.run.dask_runner import run_on_dask
 
-            runs = run_on_dask(options.executor, options.root, ordered, on_event=told)
+            runs = run_on_dask(options.executor, options.root, ordered, on_event=note)
         else:
             run_all = run_all or options.run_all or run_scripts
-            runs = run_all(options.root, ordered, parallel=options.jobs, on_event=told)
+            runs = run_all(options.root, ordered, parallel=options.jobs, on_event=note)
     memory.close()
     return runs
 

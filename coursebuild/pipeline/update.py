@@ -92,7 +92,7 @@ def _update(
         course,
         found,
         began,
-        scripts=script_lines(scripts, _told(first, again), ()),
+        scripts=script_lines(scripts, _as_they_ran(first, again), ()),
         lessons=len(chosen.lessons),
         documents=chosen.documents,
         remarks=remarks,
@@ -126,7 +126,7 @@ def _again(
     return tuple(ran.get(one.path, one) for one in first)
 
 
-def _told(first: Sequence[ScriptRun], again: Sequence[ScriptRun]) -> list[ScriptRun]:
+def _as_they_ran(first: Sequence[ScriptRun], again: Sequence[ScriptRun]) -> list[ScriptRun]:
     """The runs as they are told of: one that was remembered, and had to run again, did run."""
     return [
         one if two.cached or not one.cached else replace(one, cached=False, seconds=two.seconds)
