@@ -108,7 +108,7 @@ class FolderWatcher:
 
     def _folders(self) -> dict[str, tuple[int, ...]]:
         """The folders of the course that there are, and which they are: device and inode."""
-        found = {}
+        found: dict[str, tuple[int, ...]] = {}
         for name in FOLDERS:
             with contextlib.suppress(OSError):
                 status = (self._root / name).stat()
