@@ -7,111 +7,117 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from coursebuild.cli.commands import options_of
 from coursebuild.cli.output import CLEAN, WRONG, style_of, write
 
 if TYPE_CHECKING:
-    from coursebuild.pipeline.bench import Benched
     from coursebuild.pipeline.options import Options
-    from coursebuild.pipeline.stability import Cases
+    from coursebuild.pipeline.reports import Measurement
+    from coursebuild.report.terminal import Style
 
-_RECORDED = ("failures", "checked", "remarks")
-"""What commands say of recorded reports."""
-_NOTHING_TO_MEASURE = "there is no model to measure\n"
+_AROUND = ("diagnostics", "failures", "checked", "remarks")
+"""What is said around the figures."""
 
 
 def bench(arguments: argparse.Namespace) -> int:
     """Report speed against error of the course's models."""
     from msgspec.structs import replace
 
-    from coursebuild.pipeline.bench import plot_file, write_plots
+    from coursebuild.pipeline import bench as benching
     from coursebuild.report.bench import bench_text
     from coursebuild.report.bench_json import bench_values
-    from coursebuild.report.measuring import measured_json, measured_text
 
-    options = options_of(arguments)
-    plot = None if arguments.plot is None else plot_file(arguments.plot)
-    try:
-        found = _benched(options, arguments)
-        if plot is not None:
-            found = replace(found, remarks=(*found.remarks, *write_plots(plot, found.scenes)))
-    finally:
-        options.store.close()
-    status = CLEAN if found.ok else WRONG
-    around = {name: getattr(found, name) for name in ("diagnostics", *_RECORDED)}
-    if arguments.format == "json":
-        return write(measured_json(bench_values(found.scenes), **around), status)
-    style = style_of(sys.stdout)
-    shown = bench_text(() if arguments.check else found.scenes, style)
-    return write(measured_text(shown, style, **around) or _NOTHING_TO_MEASURE, status)
+    work = benching.bench
+    if arguments.record or arguments.check:
+        work = benching.record if arguments.record else benching.check
+    plot = None if arguments.plot is None else benching.plot_file(arguments.plot)
 
+    def measure(options: Options) -> Measurement[Any]:
+        found = work(options, tuple(arguments.scenes), quick=arguments.quick)
+        if plot is None:
+            return found
+        return replace(found, remarks=(*found.remarks, *benching.write_plots(plot, found.reports)))
 
-def _benched(options: Options, arguments: argparse.Namespace) -> Benched:
-    from coursebuild.pipeline import bench as benching
-
-    names, quick = tuple(arguments.scenes), arguments.quick
-    if arguments.record:
-        return benching.record(options, names, quick=quick)
-    if arguments.check:
-        return benching.check(options, names, quick=quick)
-    return benching.bench(options, names, quick=quick)
+    _, found = _measured(arguments, measure)
+    shown = () if arguments.check else found.reports
+    return _write(
+        arguments,
+        found,
+        lambda style: bench_text(shown, style),
+        bench_values(found.reports),
+        empty="there is no model to measure\n",
+    )
 
 
 def stability(arguments: argparse.Namespace) -> int:
     """Measure MuJoCo on hard cases, beside theory."""
-    from coursebuild.report.measuring import measured_json, measured_text, stability_text
+    from coursebuild.pipeline import stability as cases
+    from coursebuild.report.measuring import stability_text
     from coursebuild.report.values import json_text
 
-    options = options_of(arguments)
-    try:
-        found = _cases(options, arguments)
-    finally:
-        options.store.close()
-    status = CLEAN if found.ok else WRONG
-    around = {name: getattr(found, name) for name in _RECORDED}
-    if arguments.format == "json":
-        if arguments.record or arguments.check:
-            return write(measured_json({"cases": found.cases}, **around), status)
-        return write(json_text(found.cases), status)
-    style = style_of(sys.stdout)
-    shown = stability_text(() if arguments.check else found.cases, style)
-    return write(measured_text(shown, style, **around), status)
-
-
-def _cases(options: Options, arguments: argparse.Namespace) -> Cases:
-    from coursebuild.pipeline.stability import Cases, check_stability, record_stability
-    from coursebuild.pipeline.stability import stability as measured
-
-    names = tuple(arguments.problems)
-    if arguments.record:
-        return record_stability(options, names)
-    if arguments.check:
-        return check_stability(options, names)
-    return Cases(measured(options, names))
+    work = cases.stability
+    if arguments.record or arguments.check:
+        work = cases.record_stability if arguments.record else cases.check_stability
+    _, found = _measured(arguments, lambda options: work(options, tuple(arguments.problems)))
+    if arguments.format == "json" and not (arguments.record or arguments.check):
+        return write(json_text(found.reports), CLEAN)
+    shown = () if arguments.check else found.reports
+    values = {"cases": found.reports}
+    return _write(arguments, found, lambda style: stability_text(shown, style), values)
 
 
 def diet(arguments: argparse.Namespace) -> int:
     """Say what models hold that their scenarios do not need."""
+    from msgspec.structs import replace
+
     from coursebuild.pipeline import diet as dieting
     from coursebuild.report.diet import diet_text, diet_values
-    from coursebuild.report.measuring import measured_json, measured_text
 
-    options = options_of(arguments)
     work = dieting.fix if arguments.fix else dieting.record if arguments.record else dieting.diet
-    try:
-        found = work(options, tuple(arguments.models), quick=arguments.quick)
-    finally:
-        options.store.close()
-    status = CLEAN if found.ok else WRONG
+    options, found = _measured(
+        arguments,
+        lambda options: work(options, tuple(arguments.models), quick=arguments.quick),
+    )
     if options.quiet and arguments.format == "text":
         if found.ok:
-            return status
-        found = found.wrong
-    around = {name: getattr(found, name) for name in ("diagnostics", "failures", "remarks")}
+            return CLEAN
+        found = replace(found, reports=tuple(one for one in found.reports if not one.ok))
+    return _write(
+        arguments,
+        found,
+        lambda style: diet_text(found.reports, style),
+        diet_values(found.reports),
+        empty="there is no model to look at\n",
+    )
+
+
+def _measured(
+    arguments: argparse.Namespace, measure: Callable[[Options], Measurement[Any]]
+) -> tuple[Options, Measurement[Any]]:
+    options = options_of(arguments)
+    try:
+        return options, measure(options)
+    finally:
+        options.store.close()
+
+
+def _write(
+    arguments: argparse.Namespace,
+    found: Measurement[Any],
+    text: Callable[[Style], str],
+    values: dict[str, object],
+    *,
+    empty: str = "",
+) -> int:
+    """Print what was measured, as text or as JSON; the exit status."""
+    from coursebuild.report.measuring import measured_json, measured_text
+
+    status = CLEAN if found.ok else WRONG
+    around = {name: getattr(found, name) for name in _AROUND}
     if arguments.format == "json":
-        return write(measured_json(diet_values(found.reports), **around), status)
+        return write(measured_json(values, **around), status)
     style = style_of(sys.stdout)
-    told = measured_text(diet_text(found.reports, style), style, **around)
-    return write(told or "there is no model to look at\n", status)
+    return write(measured_text(text(style), style, **around) or empty, status)

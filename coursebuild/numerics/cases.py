@@ -43,7 +43,7 @@ from coursebuild.numerics.problem import (
     Problem,
     Reference,
     ScalarCheck,
-    Setup,
+    Scenario,
 )
 from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.reports.bench import OrderRow
@@ -167,7 +167,7 @@ def closed_motion(
     if (there.jnt_type.tolist(), there.nq) != (model.jnt_type.tolist(), model.nq):
         message = f"the model has other joints than the hard case `{declared.closed}`"
         raise SceneError(message, place)
-    here, start = _start(model, Setup(scenario=scene.scenario)), _start(there, problem)
+    here, start = _start(model, scene.scenario), _start(there, problem.scenario)
     shift = here.position - start.position
     free = np.concatenate(
         [
@@ -187,8 +187,8 @@ def closed_motion(
     return problem.reference, Motion(times, motion.position + shift, attitude, motion.velocity)
 
 
-def _start(model: Any, setup: Setup) -> Motion:
-    data = initial_data(setup, model)
+def _start(model: Any, scenario: Scenario) -> Motion:
+    data = initial_data(scenario, model)
     return motion_of(
         model, EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None])
     )

@@ -24,7 +24,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.numerics.detector import Peaks, RunJudgement, deepest_contact, judge, peaks
-from coursebuild.numerics.problem import Array, Integrator, Motion, Setup
+from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
 
 _CODE = {
     Integrator.EULER: mujoco.mjtIntegrator.mjINT_EULER,
@@ -114,10 +114,9 @@ def bounds_of(setup: Setup) -> Peaks:
     return Peaks(setup.position_bound, setup.velocity_bound, setup.penetration_bound)
 
 
-def initial_data(setup: Setup, model: Any) -> Any:
+def initial_data(scenario: Scenario, model: Any) -> Any:
     """`mjData` in the initial state of a scenario."""
     data = mujoco.MjData(model)
-    scenario = setup.scenario
     if scenario.keyframe >= 0:
         mujoco.mj_resetDataKeyframe(model, data, scenario.keyframe)
         data.time = 0.0
@@ -211,7 +210,7 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
     """
     scenario, step = setup.scenario, float(model.opt.timestep)
     every, times = scenario.steps(step), scenario.times
-    data, other = initial_data(setup, model), initial_data(setup, model)
+    data, other = initial_data(scenario, model), initial_data(scenario, model)
     qpos, qvel, act = (np.full((len(times), n), np.nan) for n in (model.nq, model.nv, model.na))
     table = np.full((len(times) + 1, 5), np.nan)
     table[0] = invariants(model, other, data.qpos, data.qvel)

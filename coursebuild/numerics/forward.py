@@ -11,6 +11,7 @@ changes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
@@ -49,7 +50,7 @@ Method: TypeAlias = Callable[[Rate, State, Array], State]
 
 
 def forward_motion(
-    mjcf: str, scenario: Scenario, times: Array, *, tolerance: float = 1e-13
+    mjcf: str, scenario: Scenario, times: Array, *, tolerance: float = 1e-13, order: int = 16
 ) -> Motion:
     """The motion of a smooth scene at the rising times (n,) s.
 
@@ -60,13 +61,18 @@ def forward_motion(
     model = compiled(mjcf, Integrator.EULER, 1e-3)
 
     def method(rate: Rate, start: State, offsets: Array) -> State:
-        return bulirsch_stoer(rate, start, offsets, tolerance)
+        return bulirsch_stoer(rate, start, offsets, tolerance, columns=order // 2)
 
-    return motion_of(model, forward_states(model, Setup(scenario=scenario), times, method))
+    return motion_of(model, forward_states(model, scenario, times, method))
 
 
 def forward_states(
-    model: Any, setup: Setup, times: Array, method: Method, *, evaluations: float = float("inf")
+    model: Any,
+    scenario: Scenario,
+    times: Array,
+    method: Method,
+    *,
+    evaluations: float = math.inf,
 ) -> EngineStates:
     """The states of a smooth scene at the rising times (n,) s.
 
@@ -75,11 +81,11 @@ def forward_states(
     Raises:
         NoConvergenceError: the scene is not smooth, or it takes more evaluations.
     """
-    data = initial_data(setup, model)
+    data = initial_data(scenario, model)
     state = np.concatenate([data.qpos, data.qvel, data.act])
     rate = _rate(model, data, evaluations)
     states = np.empty((len(times), len(state)))
-    for begin, end, command in _holds(setup.scenario, float(times[-1])):
+    for begin, end, command in _holds(scenario, float(times[-1])):
         if command:
             data.ctrl[:] = command
         here = (times > begin + 1e-12) & (times <= end + 1e-12)

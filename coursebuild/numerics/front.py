@@ -2,17 +2,12 @@
 
 Entry points: `front(points)`, `verdict(rows, points, own)`.
 
-1. A setting is dominated where another costs no more and errs no more, and is clearly better in one
-   of the two. What differs by less than 3 % in cost or 5 % in error is no difference.
-2. Errors are the same in every run, and costs repeat to a few per cent only. The slack in cost is
-   between 3 % and 12 %, away from every cost that decides whether a point is dominated: so the
-   front is the same again.
+A setting is dominated where another costs no more and errs no more, and is clearly better in one of
+the two. What differs by less than 3 % in cost or 5 % in error is no difference.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Sequence
 
 from msgspec import Struct
@@ -20,10 +15,8 @@ from msgspec import Struct
 from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict
 from coursebuild.numerics.reports.points import seconds_text
 
-COST_SLACK = (0.03, 0.12)
-"""Relative: no difference in cost below the first is one, and every one beyond the second is."""
-ERROR_SLACK = 0.05
-"""Relative."""
+COST_SLACK, ERROR_SLACK = 0.03, 0.05
+"""Relative: costs repeat to a few per cent only."""
 
 
 class FrontPoint(Struct, frozen=True):
@@ -33,6 +26,13 @@ class FrontPoint(Struct, frozen=True):
     """Relative to the scene's own setting."""
     error: float
     """In any unit; 0 is as good as can be told."""
+
+    def beats(self, other: FrontPoint) -> bool:
+        """Whether it is clearly better in one respect, and no worse in the other."""
+        cost, error = 1 + COST_SLACK, 1 + ERROR_SLACK
+        cheaper, exacter = self.cost * cost < other.cost, self.error * error < other.error
+        no_dearer, no_worse = self.cost <= other.cost * cost, self.error <= other.error * error
+        return (cheaper and no_worse) or (exacter and no_dearer)
 
 
 class PlacedPoint(Struct, frozen=True):
@@ -45,69 +45,28 @@ class PlacedPoint(Struct, frozen=True):
 
 def front(points: Sequence[FrontPoint | None]) -> tuple[PlacedPoint, ...]:
     """Which points no other dominates; `None` is a setting that was lost."""
-    logs = [None if p is None else (math.log(p.cost), _log_error(p.error)) for p in points]
-    slack = _slack(logs)
     better = [
-        [] if mine is None else [j for j, other in enumerate(logs) if _beats(other, mine, slack)]
-        for mine in logs
+        [] if mine is None else [j for j, one in enumerate(points) if one and one.beats(mine)]
+        for mine in points
     ]
-    on_it = [mine is not None and not found for mine, found in zip(logs, better, strict=True)]
+    on_it = [mine is not None and not found for mine, found in zip(points, better, strict=True)]
     return tuple(
-        PlacedPoint(there, _best(logs, found, on_it))
+        PlacedPoint(there, _best(points, found, on_it))
         for there, found in zip(on_it, better, strict=True)
     )
 
 
-_Log = tuple[float, float]
-_ERROR = math.log(1 + ERROR_SLACK)
-
-
-def _log_error(error: float) -> float:
-    return math.log(error) if error > 0 else -1e9
-
-
-def _beats(other: _Log | None, mine: _Log, slack: float) -> bool:
-    """Whether another is clearly better in one respect, and no worse in the other."""
-    if other is None:
-        return False
-    cheaper, exacter = mine[0] - other[0], mine[1] - other[1]
-    return (cheaper > slack and exacter >= -_ERROR) or (exacter > _ERROR and cheaper >= -slack)
-
-
-def _slack(logs: Sequence[_Log | None]) -> float:
-    """Between the two slacks of cost, away from what decides about a point: rather a large one."""
-    low, high = (math.log(1 + part) for part in COST_SLACK)
-    there = [one for one in logs if one is not None]
-    edges = {low, high}
-    for mine in there:
-        # A point is dominated where the slack is less than `tied`, or more than `exact`.
-        tied = max((mine[0] - o[0] for o in there if abs(mine[1] - o[1]) <= _ERROR), default=0.0)
-        exact = min((o[0] - mine[0] for o in there if mine[1] - o[1] > _ERROR), default=math.inf)
-        if exact <= low or tied >= high:
-            continue  # dominated whatever the slack
-        edges |= {edge for edge in (tied, exact) if low < edge < high}
-    cuts = sorted(edges)
-    if len(cuts) == 2:
-        return low
-    gaps = [(b - a, (a + b) / 2) for a, b in itertools.pairwise(cuts)]
-    wide = [middle for width, middle in gaps if width >= _WIDE]
-    return wide[-1] if wide else max(gaps)[1]
-
-
-_WIDE = 0.03
-"""A gap between costs (logarithms) that their noise does not cross."""
-
-
-def _best(logs: Sequence[_Log | None], found: Sequence[int], on_it: Sequence[bool]) -> int | None:
+def _best(
+    points: Sequence[FrontPoint | None], found: Sequence[int], on_it: Sequence[bool]
+) -> int | None:
     """Of those that are better, the one whose cost and error together are least."""
-    chosen = [j for j in found if on_it[j]] or list(found)
 
     def worth(index: int) -> tuple[float, int]:
-        log = logs[index]
-        assert log is not None
-        return sum(log), index
+        one = points[index]
+        assert one is not None
+        return one.cost * one.error, index
 
-    return min(chosen, key=worth, default=None)
+    return min([j for j in found if on_it[j]] or found, key=worth, default=None)
 
 
 # --------------------------------------------------------------------------------------- verdict

@@ -1,7 +1,7 @@
 """What is looked at in the states of a scene: errors in a picture, declared quantities, contacts.
 
 Entry points: `visible_error(model, scene, states, exact)`; `quantity_name`, `quantity_values`, of
-what a scenario declares to be measured; `touched_pairs(model, scenes)`; `sticking` and `slip`.
+what a scenario declares to be measured; `sticking` and `slip`.
 
 1. In the reference, two geoms stick to each other between two samples where a point in which they
    touch hardly moves along the surface, at both of them. A body that rolls sticks too.
@@ -12,14 +12,13 @@ what a scenario declares to be measured; `touched_pairs(model, scenes)`; `sticki
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import EngineStates, advance, initial_data
-from coursebuild.numerics.problem import Array, Setup
+from coursebuild.numerics.engine import EngineStates, initial_data
+from coursebuild.numerics.problem import Array
 from coursebuild.numerics.scene import Scene
 from mjcourse.spatial import angular_distance
 
@@ -91,7 +90,7 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     """What the scenario measures, at every sample: (n, d)."""
     assert scene.declared is not None and scene.declared.measure is not None
     wanted = scene.declared.measure
-    data = initial_data(Setup(scenario=scene.scenario), model)
+    data = initial_data(scene.scenario, model)
     found = []
     rows = zip(states.qpos, states.qvel, states.act, strict=True)
     for look, (qpos, qvel, act) in enumerate(rows):
@@ -124,35 +123,6 @@ _STILL = 1e-3
 """m/s, where nothing falls."""
 
 
-def touched_pairs(model: Any, scenes: Iterable[Scene]) -> frozenset[Pair]:
-    """Pairs of geoms with a contact that counts, in any scenario, with the model's own setting.
-
-    A run ends where it is lost: what touches after that says nothing.
-    """
-    found: set[Pair] = set()
-    for scene in scenes:
-        found |= _touched(model, scene)
-    return frozenset(found)
-
-
-def _touched(model: Any, scene: Scene) -> set[Pair]:
-    scenario = scene.scenario
-    data = initial_data(Setup(scenario=scenario), model)
-    found: set[Pair] = set()
-    for look in range(len(scenario.times)):
-        if scenario.controls:
-            data.ctrl[:] = scenario.command(look)
-        for _ in range(scenario.steps(scene.own)):
-            before = data.time
-            advance(model, data)
-            if not data.time > before:  # it was lost, and reset
-                return found
-            if data.ncon:
-                geoms = np.sort(data.contact.geom[data.contact.exclude == 0], axis=1)
-                found |= {(int(a), int(b)) for a, b in np.unique(geoms, axis=0) if a >= 0}
-    return found
-
-
 def sticking(model: Any, scene: Scene, states: EngineStates) -> Sticks:
     """What sticks in a motion, from sample to sample."""
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
@@ -178,7 +148,7 @@ def slip(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> floa
 
 def speeds_of(model: Any, scene: Scene, states: EngineStates) -> list[dict[Pair, float]]:
     """At every sample the least speed along the surface, m/s, of pairs of geoms that touch."""
-    data = initial_data(Setup(scenario=scene.scenario), model)
+    data = initial_data(scene.scenario, model)
     found = []
     for qpos, qvel, act in zip(states.qpos, states.qvel, states.act, strict=True):
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act

@@ -68,8 +68,7 @@ def pilot(model: Any, scene: Scene) -> Pilot:
     """
     step, scenario = min(scene.timesteps), scene.scenario
     own = varied(model, integrator_of(model), step)
-    setup = Setup(scenario=scenario)
-    data, twin = initial_data(setup, own), initial_data(setup, own)
+    data, twin = initial_data(scenario, own), initial_data(scenario, own)
     _nudge(own, twin)
     look = _Look(own)
     seen = peaks(data, Peaks())

@@ -145,7 +145,7 @@ def _integrated(model: Any, first: Pilot, quick: bool) -> Known:
     most = QUICK_EVALUATIONS if quick else EVALUATIONS
 
     def run(method: Method) -> EngineStates:
-        return forward_states(exact, first.setup, times, method, evaluations=most)
+        return forward_states(exact, first.scene.scenario, times, method, evaluations=most)
 
     states = run(_bulirsch_stoer)
     source = "Bulirsch–Stoer over mj_forward"
@@ -297,8 +297,9 @@ class Conserved(Struct, frozen=True):
 
 def conserved(model: Any, first: Pilot, known: Known) -> Conserved:
     """What the author says is conserved, or else what the reference conserves."""
+    scenario = first.scene.scenario
     declared = first.scene.declared.conserved if first.scene.declared is not None else None
-    data, other = initial_data(first.setup, model), initial_data(first.setup, model)
+    data, other = initial_data(scenario, model), initial_data(scenario, model)
     states = [(data.qpos, data.qvel), *zip(known.states.qpos, known.states.qvel, strict=True)]
     table = np.array([invariants(model, other, qpos, qvel) for qpos, qvel in states])
     run = Run(known.states, table[:, :2], table[:, 2:], 0.0, RunJudgement(RunStatus.OK))

@@ -71,6 +71,8 @@ class Scene(Struct, frozen=True):
 def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) -> tuple[Scene, ...]:
     """The scenarios of a model (`mjModel`); none of one in which nothing can move.
 
+    What they name is in the model, and states have as many numbers as it takes: that was checked.
+
     Raises:
         SceneError: one does not fit the model.
     """
@@ -111,15 +113,6 @@ def thickness(model: Any) -> Array:
 def _declared(
     model: Any, declared: DeclaredScenario, visible: Visible, powers: Sequence[int]
 ) -> Scene:
-    key = _keyframe(model, declared)
-    for name, given, wanted in (
-        ("qpos", declared.qpos, model.nq),
-        ("qvel", declared.qvel, model.nv),
-        ("controls", declared.controls[0] if declared.controls else (), model.nu),
-    ):
-        if given and len(given) != wanted:
-            message = f"`{name}` has {len(given)} numbers, and the model takes {wanted}"
-            raise SceneError(message, declared.place(name))
     step = float(model.opt.timestep)
     times = _timed(step, declared.duration, declared.sample, declared.hold, declared.controls)
     scenario = Scenario(
@@ -129,7 +122,7 @@ def _declared(
         qvel=declared.qvel,
         controls=declared.controls,
         hold=times.hold,
-        keyframe=key,
+        keyframe=_keyframe(model, declared.keyframe),
     )
     ladder = _ladder(scenario, step, powers)
     if declared.timesteps:
@@ -142,18 +135,10 @@ def _declared(
     return Scene(declared.name, title, scenario, ladder, step, visible, declared)
 
 
-def _keyframe(model: Any, declared: DeclaredScenario) -> int:
-    wanted = declared.keyframe
-    if wanted is None:
-        return -1
-    if isinstance(wanted, int):
-        if wanted >= model.nkey:
-            raise SceneError(f"the model has no keyframe {wanted}", declared.place("keyframe"))
-        return wanted
-    found = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, wanted))
-    if found < 0:
-        raise SceneError(f"the model has no keyframe `{wanted}`", declared.place("keyframe"))
-    return found
+def _keyframe(model: Any, wanted: str | int | None) -> int:
+    if isinstance(wanted, str):
+        return int(model.key(wanted).id)
+    return -1 if wanted is None else wanted
 
 
 def _unit(model: Any, qpos: tuple[float, ...]) -> tuple[float, ...]:

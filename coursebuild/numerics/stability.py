@@ -167,7 +167,7 @@ def attempted(
     A command changes with the first step that begins after its time: the timestep need not divide
     the hold.
     """
-    data = initial_data(setup, model)
+    data = initial_data(setup.scenario, model)
     timestep = float(model.opt.timestep)
     chunk = max(1, steps // _LOOKS)
     sizes: list[float] = []

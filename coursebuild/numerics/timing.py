@@ -31,10 +31,11 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 from msgspec import Struct
+from numpy.typing import ArrayLike
 
 from coursebuild.numerics.engine import advance, initial_data, integrator_of, silent, varied
 from coursebuild.numerics.pilot import Pilot
-from coursebuild.numerics.problem import Array, Setup
+from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.settings import apply, with_setting
 
@@ -75,6 +76,11 @@ class Timing(Struct, frozen=True):
     """Median over least time."""
     rounds: int
 
+    @property
+    def certain(self) -> bool:
+        """Whether the ratio is another than 1 beyond what the measurement can tell."""
+        return abs(self.ratio - 1.0) > max(0.03, 2 * self.uncertainty)
+
 
 def timed(
     jobs: Sequence[Job],
@@ -92,37 +98,34 @@ def timed(
     Returns:
         A timing for each job; the ratio of `own` is 1.
     """
+    times: list[list[float]] = [[] for _ in jobs]
+    others = [index for index in range(len(jobs)) if index != own]
     collecting = gc.isenabled()
     gc.disable()
     try:
         for job in jobs:  # caches are warm, and memory is there
             job()
-        times = _rounds(jobs, own, clock, idle or [0.0] * len(jobs), most, enough)
+        for turn in range(most):
+            for place, index in enumerate(others or [own]):
+                for one in (own, index) if (turn + place) % 2 else (index, own):
+                    spent = _once(jobs[one], clock) - (idle[one] if idle else 0.0)
+                    times[one].append(max(0.0, spent))
+            known = (_uncertainty(times[index], times[own]) <= enough for index in others)
+            if turn + 1 >= FEWEST and all(known):
+                break
     finally:
         if collecting:
             gc.enable()
-    return tuple(_timing(mine, times[own], exact=index == own) for index, mine in enumerate(times))
-
-
-def _rounds(
-    jobs: Sequence[Job],
-    own: int,
-    clock: Clock,
-    idle: Sequence[float],
-    most: int,
-    enough: float,
-) -> list[list[float]]:
-    times: list[list[float]] = [[] for _ in jobs]
-    others = [index for index in range(len(jobs)) if index != own]
-    for turn in range(most):
-        for place, index in enumerate(others or [own]):
-            for one in (own, index) if (turn + place) % 2 else (index, own):
-                times[one].append(max(0.0, _once(jobs[one], clock) - idle[one]))
-        if turn + 1 >= FEWEST and all(
-            _uncertainty(times[index], times[own]) <= enough for index in others
-        ):
-            break
-    return times
+    return tuple(
+        Timing(
+            ratio=1.0 if index == own else _ratio(mine, times[own]),
+            uncertainty=0.0 if index == own else _uncertainty(mine, times[own]),
+            least=min(mine),
+            spread=statistics.median(mine) / min(mine) if min(mine) > 0 else math.inf,
+            rounds=len(mine),
+        )
+        for index, mine in enumerate(times)
+    )
 
 
 def _once(job: Job, clock: Clock) -> int:
@@ -131,45 +134,21 @@ def _once(job: Job, clock: Clock) -> int:
     return clock() - before
 
 
-def _timing(times: Sequence[float], own: Sequence[float], *, exact: bool) -> Timing:
-    least = min(times)
-    return Timing(
-        ratio=1.0 if exact else _ratio(times, own),
-        uncertainty=0.0 if exact else _uncertainty(times, own),
-        least=least,
-        spread=statistics.median(times) / least if least > 0 else math.inf,
-        rounds=len(times),
-    )
-
-
-def _ratio(times: Sequence[float], own: Sequence[float]) -> float:
-    ours = _low(own)
-    return _low(times) / ours if ours > 0 else math.nan
-
-
-def _low(times: Sequence[float]) -> float:
-    """The lowest tenth, between the two times that are nearest to it."""
-    ordered = sorted(times)
-    place = (len(ordered) - 1) / 10
-    below = math.floor(place)
-    above = min(below + 1, len(ordered) - 1)
-    return ordered[below] + (place - below) * (ordered[above] - ordered[below])
+def _ratio(times: ArrayLike, own: ArrayLike) -> float:
+    ours = float(np.quantile(own, 0.1))
+    return float(np.quantile(times, 0.1)) / ours if ours > 0 else math.nan
 
 
 def _uncertainty(times: Sequence[float], own: Sequence[float]) -> float:
     """Relative standard error of a ratio, from the ratios of parts of the rounds."""
     if len(times) < _PARTS:
         return math.inf
-    parts = [_ratio(a, b) for a, b in zip(_cut(times), _cut(own), strict=True)]
+    cuts = zip(np.array_split(times, _PARTS), np.array_split(own, _PARTS), strict=True)
+    parts = [_ratio(mine, ours) for mine, ours in cuts]
     middle = statistics.fmean(parts)
     if not middle > 0:
         return math.inf
     return statistics.stdev(parts) / (math.sqrt(_PARTS) * middle)
-
-
-def _cut(times: Sequence[float]) -> list[Sequence[float]]:
-    size = len(times) // _PARTS
-    return [times[at : at + size] for at in range(0, size * _PARTS, size)]
 
 
 # --------------------------------------------------------------------------------- jobs that step
@@ -199,8 +178,9 @@ def costs(
 ) -> tuple[Cost, ...]:
     """The costs of settings, of which number `own` is the scene's own."""
     one = with_setting(model, chosen[own])
-    data = initial_data(first.setup, one)
-    states = moments(one, data, first.setup)
+    scenario = first.scene.scenario
+    data = initial_data(scenario, one)
+    states = moments(one, data, scenario)
     jobs, steps, repeats = [], [], []
     with silent():
         for setting in chosen:
@@ -228,14 +208,14 @@ def costs(
 
 def subnormal(model: Any, first: Pilot) -> bool:
     """Whether the state holds numbers so small that processors compute with them slowly."""
+    scenario = first.scene.scenario
     one = varied(model, integrator_of(model), first.scene.own)
-    small = np.abs(np.concatenate(moments(one, initial_data(first.setup, one), first.setup)))
+    small = np.abs(np.concatenate(moments(one, initial_data(scenario, one), scenario)))
     return bool(np.any((small > 0) & (small < np.finfo(np.float64).tiny)))
 
 
-def moments(model: Any, data: Any, setup: Setup) -> tuple[Array, ...]:
+def moments(model: Any, data: Any, scenario: Scenario) -> tuple[Array, ...]:
     """Full states of the engine at a few times of a scenario, from the beginning on."""
-    scenario = setup.scenario
     every, looks = scenario.steps(float(model.opt.timestep)), len(scenario.times)
     wanted = {round(part * looks / _MOMENTS) for part in range(_MOMENTS)}
     found = []

@@ -17,12 +17,12 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.scenarios import Bands
-from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
+from coursebuild.core.text.diagnostics import sort_diagnostics
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
 from coursebuild.numerics.reports.records import (
@@ -33,28 +33,15 @@ from coursebuild.numerics.reports.records import (
     encode_bench,
 )
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.reports import command, read_record, recorded_models, write_record
+from coursebuild.pipeline.reports import (
+    Measurement,
+    command,
+    read_record,
+    recorded_models,
+    write_records,
+)
 from coursebuild.pipeline.scene_run import Measuring, SceneRun
 from coursebuild.pipeline.scenes import CourseScene, Scenes, find_scenes
-
-
-class Benched(Struct, frozen=True):
-    """What a run found."""
-
-    scenes: tuple[SceneReport, ...]
-    """By name."""
-    diagnostics: tuple[Diagnostic, ...]
-    """Of models and what is declared for them."""
-    checked: tuple[Checked, ...] = ()
-    failures: tuple[ReportFailure, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def ok(self) -> bool:
-        """Whether everything could be measured, and is as it was recorded."""
-        departed = any(one.departures for one in self.checked)
-        wrong = any(one.severity is Severity.ERROR for one in self.diagnostics)
-        return not (wrong or self.failures or departed)
 
 
 def bench(
@@ -63,27 +50,27 @@ def bench(
     *,
     quick: bool = False,
     measuring: Measuring | None = None,
-) -> Benched:
+) -> Measurement[SceneReport]:
     """Measure the models that the names mean; all where there are none.
 
     Raises:
         UsageError: no model is called so.
     """
-    return _bench(options, names, measuring, quick=quick)
+    return _measured(options, names, measuring, quick=quick)
 
 
-def _bench(
+def _measured(
     options: Options,
     names: tuple[str, ...],
     measuring: Measuring | None,
     *,
     quick: bool,
     cards: bool = False,
-) -> Benched:
+) -> Measurement[SceneReport]:
     found = find_scenes(options.root, names)
     run = SceneRun(options, measuring, quick=quick, cards=cards)
     reports = run.all(found.scenes)
-    return Benched(reports, sort_diagnostics((*found.diagnostics, *run.diagnostics)))
+    return Measurement(reports, sort_diagnostics((*found.diagnostics, *run.diagnostics)))
 
 
 def record(
@@ -92,26 +79,17 @@ def record(
     *,
     quick: bool = False,
     measuring: Measuring | None = None,
-) -> Benched:
+) -> Measurement[SceneReport]:
     """Measure, and write each model's report into the course.
 
     Raises:
         UsageError: no model is called so, or only a part is to be measured.
     """
     _whole("--record", quick=quick)
-    found = _bench(options, names, measuring, quick=False, cards=True)
-    failures: list[ReportFailure] = []
-    remarks: list[str] = []
-    for scene in found.scenes:
-        path = bench_path(scene.model)
-        said = write_record(options.root, path, encode_bench(scene))
-        if isinstance(said, ReportFailure):
-            failures.append(said)
-        else:
-            remarks.append(said)
-    return Benched(
-        found.scenes, found.diagnostics, failures=tuple(failures), remarks=tuple(remarks)
-    )
+    found = _measured(options, names, measuring, quick=False, cards=True)
+    records = ((bench_path(one.model), encode_bench(one)) for one in found.reports)
+    failures, remarks = write_records(options.root, records)
+    return replace(found, failures=failures, remarks=remarks)
 
 
 def check(
@@ -120,7 +98,7 @@ def check(
     *,
     quick: bool = False,
     measuring: Measuring | None = None,
-) -> Benched:
+) -> Measurement[SceneReport]:
     """Measure again, and hold it against what is recorded.
 
     A model without a recorded report, or with one that cannot be read, is not measured.
@@ -142,7 +120,7 @@ def check(
     reports = run.all([scene for scene in found.scenes if scene.name in recorded])
     bands = {scene.name: _bands(scene) for scene in found.scenes}
     checked = [_checked(recorded[one.model], one, bands[one.model]) for one in reports]
-    return Benched(
+    return Measurement(
         reports,
         sort_diagnostics((*found.diagnostics, *run.diagnostics)),
         tuple(checked),

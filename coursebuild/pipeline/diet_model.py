@@ -92,7 +92,7 @@ class DietModel:
         import mujoco
 
         from coursebuild.numerics.pruning.ablation import Order, survey
-        from coursebuild.numerics.pruning.compare import cases
+        from coursebuild.numerics.pruning.compare import pruning_scenes
         from coursebuild.numerics.pruning.markup import MarkupError
         from coursebuild.numerics.pruning.model_text import ModelTextError, open_model
         from coursebuild.numerics.scene import SceneError
@@ -103,7 +103,7 @@ class DietModel:
             declared = self.scene.declared
             order = Order(
                 text,
-                cases(text.model, declared, quick=quick),
+                pruning_scenes(text.model, declared, quick=quick),
                 self.readers,
                 self.keeps,
                 self.locked,
@@ -136,8 +136,8 @@ class DietModel:
             readers=tuple(one.path for one in self.readers.files),
             scenarios=tuple(
                 DietScenario(
-                    one.case.name,
-                    one.case.steps,
+                    one.scene.name,
+                    round(one.scene.scenario.duration / one.scene.own),
                     one.judgement.status.value,
                     one.judgement.reasons,
                 )

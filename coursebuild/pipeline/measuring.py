@@ -23,8 +23,8 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
-from coursebuild.numerics.observe import touched_pairs
 from coursebuild.numerics.problem import Scenario
+from coursebuild.numerics.pruning.compare import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
 from coursebuild.numerics.scene import Scene as PhysicsScene
@@ -120,7 +120,7 @@ def with_card(
             str(root / source.path), assets={str(root / source.path): source.text.encode()}
         )
         found = scenes(model, scene.declared)
-        touched = touched_pairs(model, found)
+        touched = {pair for one in found for pair in watch(model, one).touching}
     files = (root / path for path in parts(root, source.path, source.text))
     card = SceneCard(
         bodies=int(model.nbody) - 1,

@@ -5,19 +5,16 @@ Entry point: `SceneRun(options, …).all(scenes)`.
 
 from __future__ import annotations
 
-import hashlib
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.files.locks import project_lock
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import Machine, ScenarioReport, SceneReport
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.reports import MeasuringRun, digest_of, machine_parts
 from coursebuild.pipeline.scenes import CourseScene
 
 if TYPE_CHECKING:
@@ -28,7 +25,6 @@ _SCENE, _SCENARIO = "bench", "bench-scenarios"
 _T = TypeVar("_T")
 _CODE = ("coursebuild/numerics", "coursebuild/pipeline/measuring.py", "mjcourse/spatial")
 """What measures and says what was measured."""
-_LOCK = "bench-lock"
 
 
 class Measuring(Protocol):
@@ -51,7 +47,7 @@ class Measuring(Protocol):
         """What was measured in one of them, or why nothing can be."""
 
 
-class SceneRun:
+class SceneRun(MeasuringRun):
     """Measures scenes one after the other."""
 
     def __init__(
@@ -63,61 +59,46 @@ class SceneRun:
         again: bool = False,
         cards: bool = False,
     ) -> None:
-        self.options = options
+        super().__init__(options)
         self.quick = quick
         self.again = again
         """Whether nothing is taken from what is kept, and times do not matter."""
         self.cards = cards
         """Whether it is also told what the models are made of."""
-        self.diagnostics: list[Diagnostic] = []
-        self.progress = Progress(quiet=options.quiet)
         self._measuring = measuring
-        options.store.listen(self.progress.say)
 
     def all(self, scenes: Sequence[CourseScene]) -> tuple[SceneReport, ...]:
         """Every scene that can be measured."""
-        if not scenes:
-            return ()
         here, code = machine(), code_digest(*_CODE)
-        reports = []
-        with self.progress.stage("measuring", len(scenes)):
-            for scene in scenes:
-                report = self._one(scene, here, code)
-                if report is not None:
-                    reports.append(report)
-        return tuple(reports)
+        return self.each("measuring", scenes, lambda scene: self._one(scene, here, code))
 
     def _one(self, scene: CourseScene, here: Machine, code: str) -> SceneReport | None:
-        parts = (scene.name, scene.digest, f"{self.quick}", code, *_named(here))
-        kept = self._kept(_SCENE, parts, SceneReport)
-        if kept is not None and (kept.card is not None or not self.cards or not kept.scenarios):
-            self.progress.known()
-            return kept
-        with project_lock(self.options.root, self.progress.say, name=_LOCK):
-            self.progress.started(scene.name)
-            began = time.monotonic()
-            report = self._report(scene, here, parts)
-            verdict = "not measured" if report is None else "measured"
-            self.progress.finished(scene.name, verdict, time.monotonic() - began)
-            return report
+        parts = (scene.name, scene.digest, f"{self.quick}", code, *machine_parts(here))
+
+        def kept() -> SceneReport | None:
+            found = self._kept(_SCENE, parts, SceneReport)
+            whole = found and (found.card or not self.cards or not found.scenarios)
+            return found if whole else None
+
+        return self.one(scene.name, kept, lambda: self._report(scene, here, parts))
 
     def _report(
         self, scene: CourseScene, here: Machine, parts: tuple[str, ...]
     ) -> SceneReport | None:
-        kept = self._kept(_SCENE, parts, SceneReport)  # by whom we waited for, perhaps
-        if kept is None:
+        report = self._kept(_SCENE, parts, SceneReport)
+        if report is None:
             found = self._scenarios(scene, parts)
             if found is None:
                 return None
-            kept = SceneReport(scene.name, scene.digest, self.quick, here, found)
-            self._keep(_SCENE, parts, kept)
-        if self.cards and kept.card is None and kept.scenarios:
+            report = SceneReport(scene.name, scene.digest, self.quick, here, found)
+            self._keep(_SCENE, parts, report)
+        if self.cards and report.card is None and report.scenarios:
             from coursebuild.pipeline.measuring import with_card
 
             self.progress.doing(scene.name, "what it is made of")
-            kept = with_card(self.options.root, scene, kept)
-            self._keep(_SCENE, parts, kept)
-        return kept
+            report = with_card(self.options.root, scene, report)
+            self._keep(_SCENE, parts, report)
+        return report
 
     def _scenarios(
         self, scene: CourseScene, parts: tuple[str, ...]
@@ -159,16 +140,8 @@ class SceneRun:
     # --- what is kept
 
     def _kept(self, kind: str, parts: tuple[str, ...], what: type[_T]) -> _T | None:
-        return None if self.again else self.options.store.get_value(kind, _key(parts), what)
+        return None if self.again else self.options.store.get_value(kind, digest_of(parts), what)
 
     def _keep(self, kind: str, parts: tuple[str, ...], value: object) -> None:
         if not self.again:
-            self.options.store.put_value(kind, _key(parts), value, local=True)
-
-
-def _key(parts: tuple[str, ...]) -> str:
-    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
-
-
-def _named(here: Machine) -> tuple[str, ...]:
-    return here.engine, here.python, here.numpy, here.system, here.cpu
+            self.options.store.put_value(kind, digest_of(parts), value, local=True)

@@ -11,11 +11,7 @@ Entry points: `stability(options, names)`; `record_stability`, `check_stability`
 
 from __future__ import annotations
 
-import hashlib
 import platform
-import time
-
-from msgspec import Struct
 
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.model.scenarios import Bands
@@ -30,52 +26,58 @@ from coursebuild.numerics.reports.records import (
     encode_stability,
 )
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.reports import command, read_record, write_record
+from coursebuild.pipeline.reports import (
+    Measurement,
+    MeasuringRun,
+    command,
+    digest_of,
+    read_record,
+    write_records,
+)
 
 _KIND = "stability"
 _CODE = ("coursebuild/numerics", "mjcourse/spatial")
 """What measures and says what was measured."""
 
 
-def stability(
-    options: Options, names: tuple[str, ...] = (), *, again: bool = False
-) -> tuple[CaseReport, ...]:
+def stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
     """What was measured on the problems that the names mean; on all where there are none.
-
-    `again`: measured now, whatever is kept.
 
     Raises:
         UsageError: no problem is called so.
     """
+    return Measurement(_measured(options, names))
+
+
+def _measured(
+    options: Options, names: tuple[str, ...], *, again: bool = False
+) -> tuple[CaseReport, ...]:
+    """`again`: measured now, whatever is kept."""
     from coursebuild.numerics.cases import measure_case
     from coursebuild.numerics.problems import problem_named, problem_names
 
-    chosen = _chosen(names, problem_names())
-    progress = Progress(quiet=options.quiet)
-    options.store.listen(progress.say)
-    state = _state()
-    reports = []
-    with progress.stage("measuring", len(chosen)):
-        for name in chosen:
-            key = hashlib.sha256(f"{name}\0{state}".encode()).hexdigest()
-            report = None if again else options.store.get_value(_KIND, key, CaseReport)
-            if report is not None:
-                progress.known()
-            else:
-                progress.started(name)
-                began = time.monotonic()
-                report = measure_case(problem_named(name))
-                options.store.put_value(_KIND, key, report)
-                progress.finished(name, "measured", time.monotonic() - began)
-            reports.append(report)
-    return tuple(reports)
+    run, store, state = MeasuringRun(options), options.store, _state()
+
+    def one(name: str) -> CaseReport | None:
+        key = digest_of((name, *state))
+
+        def measure() -> CaseReport:
+            report = measure_case(problem_named(name))
+            store.put_value(_KIND, key, report)
+            return report
+
+        def kept() -> CaseReport | None:
+            return None if again else store.get_value(_KIND, key, CaseReport)
+
+        return run.one(name, kept, measure)
+
+    return run.each("measuring", _chosen(names, problem_names()), one)
 
 
-def _state() -> str:
+def _state() -> tuple[str, ...]:
     """All that a figure depends on beside the problem's name."""
     versions = (engine_version(), package_version("numpy"), python_version())
-    return "\0".join((*versions, platform.system(), platform.machine(), code_digest(*_CODE)))
+    return (*versions, platform.system(), platform.machine(), code_digest(*_CODE))
 
 
 def _chosen(names: tuple[str, ...], known: tuple[str, ...]) -> list[str]:
@@ -96,22 +98,7 @@ def _chosen(names: tuple[str, ...], known: tuple[str, ...]) -> list[str]:
 # ------------------------------------------------------------------------------------- the record
 
 
-class Cases(Struct, frozen=True):
-    """What a run found."""
-
-    cases: tuple[CaseReport, ...]
-    """Those that were measured."""
-    checked: tuple[Checked, ...] = ()
-    failures: tuple[ReportFailure, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def ok(self) -> bool:
-        """Whether all is as it was recorded, or could be recorded."""
-        return not self.failures and not any(one.departures for one in self.checked)
-
-
-def record_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
+def record_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
     """Measure the cases that the names mean, and write them into the course; all without names.
 
     Raises:
@@ -119,22 +106,21 @@ def record_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
     """
     from coursebuild.numerics.problems import problem_names
 
-    measured = stability(options, names)
+    measured = _measured(options, names)
     known = frozenset(problem_names())
     others: list[CaseReport] = []
     if names and (options.root / STABILITY_PATH).exists():
         found, failure = _recorded(options)
         if failure is not None:
-            return Cases(measured, failures=(failure,))
+            return Measurement(measured, failures=(failure,))
         new = {case.name for case in measured}
         others = [case for case in found or () if case.name in known - new]
-    said = write_record(options.root, STABILITY_PATH, encode_stability([*others, *measured]))
-    if isinstance(said, ReportFailure):
-        return Cases(measured, failures=(said,))
-    return Cases(measured, remarks=(said,))
+    record = STABILITY_PATH, encode_stability([*others, *measured])
+    failures, remarks = write_records(options.root, [record])
+    return Measurement(measured, failures=failures, remarks=remarks)
 
 
-def check_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
+def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
     """Measure again, and hold it against what is recorded.
 
     Nothing is measured where there is no record to hold it against.
@@ -144,15 +130,16 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Cases:
     """
     recorded, failure = _recorded(options)
     if recorded is None:
-        return Cases((), failures=() if failure is None else (failure,))
-    measured = stability(options, names, again=True)
+        return Measurement((), failures=() if failure is None else (failure,))
+    measured = _measured(options, names, again=True)
     new = {case.name for case in measured}
     old = [case for case in recorded if not names or case.name in new]
     engines = sorted({case.engine for case in old} - {case.engine for case in measured})
     here = ", ".join(sorted({case.engine for case in measured}))
     remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in engines)
     departures = case_departures(old, measured, Bands())
-    return Cases(measured, (Checked("stability", STABILITY_PATH, departures, remarks),))
+    checked = Checked("stability", STABILITY_PATH, departures, remarks)
+    return Measurement(measured, checked=(checked,))
 
 
 def _recorded(options: Options) -> tuple[tuple[CaseReport, ...] | None, ReportFailure | None]:

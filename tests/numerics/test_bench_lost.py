@@ -87,17 +87,6 @@ def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
         measured(stiff(1.0, 0.01), quick=True)
 
 
-def test_what_is_being_done_is_told() -> None:
-    said: list[str] = []
-    measure_scene(stiff(0.01, 0.1, 10), None, quick=True, clock=None, tell=said.append)
-    assert said[:3] == [
-        "keyframe-0: a first run",
-        "keyframe-0: the reference",
-        "keyframe-0: Euler at 20 ms",
-    ]
-    assert said[-1] == "keyframe-0: stable timesteps"
-
-
 def test_times_are_of_the_clock() -> None:
     """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
     ticks = iter(range(0, 10**15, 2_000_000))

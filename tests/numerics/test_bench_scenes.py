@@ -29,7 +29,7 @@ SERVO = """\
 SERVO_TOML = """\
 [[scenario]]
 name = "reach"
-controls = [[0.5], [-1], [0.2]]
+controls = [[0.5], [-1]]
 hold = 0.3
 sample = 0.05
 measure = "site:tip"
@@ -74,11 +74,11 @@ DOUBLE = """\
 def test_chaos_has_a_horizon_and_then_statistics() -> None:
     (report,) = measured(
         mujoco.MjModel.from_xml_string(DOUBLE),
-        '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 20\nsample = 0.04\n',
+        '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 6\nsample = 0.04\n',
         quick=True,
     )
     assert report.lyapunov is not None and 1 < report.lyapunov < 10
-    assert 1 < report.horizon < 20
+    assert 1 < report.horizon < 6
     assert any("errors count until" in note for note in report.notes)
     own = next(one for one in report.rows if one.own)
     assert own.mean_energy is not None and abs(own.mean_energy) < 0.5
@@ -132,6 +132,7 @@ def test_a_block_that_sticks_creeps(sticks: ScenarioReport) -> None:
     assert 5e-4 < creep["elliptic"] < creep["pyramidal"] < 5e-3
     errors = {one.setting.cone: one.model_error for one in report.rows}
     assert errors["elliptic"] is None
+    assert all(e is None or e >= 10 * report.floor > 0 for e in errors.values())
     assert errors["pyramidal"] == pytest.approx(creep["pyramidal"] - creep["elliptic"], rel=0.2)
     assert {one.energy_drift for one in report.rows} == {None}
 
@@ -164,22 +165,6 @@ def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
     assert report.verdict.noticeable is True
 
 
-def test_no_model_error_is_told_below_ten_floors() -> None:
-    mjcf = """\
-    <mujoco>
-      <option timestep="0.004"/>
-      <worldbody>
-        <geom type="plane" size="1 1 1"/>
-        <body pos="0 0 0.2"><freejoint/><geom size="0.1"/></body>
-      </worldbody>
-    </mujoco>
-    """
-    (report,) = measured(mujoco.MjModel.from_xml_string(mjcf), quick=True)
-    for one in report.rows:
-        assert (one.model_error is None) == (one.setting.cone == "elliptic")
-        assert one.model_error is None or one.model_error >= 10 * report.floor > 0
-
-
 def test_an_error_as_large_as_the_motion_has_no_order() -> None:
     spring = """\
     <mujoco>
@@ -190,7 +175,7 @@ def test_an_error_as_large_as_the_motion_has_no_order() -> None:
       <keyframe><key qpos="0.05"/></keyframe>
     </mujoco>
     """
-    short = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 0.4\nsample = 0.04\n'
+    short = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 0.12\nsample = 0.04\n'
     (report,) = measured(mujoco.MjModel.from_xml_string(spring), short, quick=True)
     errors = [
         one.position[0]
@@ -199,9 +184,3 @@ def test_an_error_as_large_as_the_motion_has_no_order() -> None:
     ]
     assert len(errors) == 4 and 0.04 < min(errors) <= max(errors) < 0.1
     assert orders(report, "position").get("discrete") is None
-
-
-def test_softened_contacts_are_told() -> None:
-    (report,) = measured(block(0.008), quick=True)
-    refsafe = {one.setting.timestep: one.refsafe for one in report.rows if not one.own}
-    assert refsafe == {0.002: False, 0.004: False, 0.008: False, 0.016: True}

@@ -67,16 +67,6 @@ def test_the_band_of_an_error(was: float, now: float, departs: bool) -> None:
     assert bool(of_rows(old, new)) == departs
 
 
-def test_a_band_of_ones_own() -> None:
-    old, new = scenario([row(position=(1.0, 1.0))]), scenario([row(position=(1.2, 1.0))])
-    assert len(between(old, new)) == 1
-    assert between(old, new, Bands(error=0.25)) == []
-    wide = replace(old, orders=(OrderRow("Euler", 1.0, None, None),))
-    other = replace(old, orders=(OrderRow("Euler", 1.2, None, None),))
-    assert len(between(wide, other)) == 1
-    assert between(wide, other, Bands(order=0.3)) == []
-
-
 def test_a_status_says_all_of_its_row() -> None:
     assert of_rows(row(), lost("Euler", 0.002)) == [("status", "ok", "diverged", "the same")]
 
@@ -238,12 +228,3 @@ def test_boundaries_and_runs_of_cases() -> None:
         ("Euler", "growth", "nothing", "1.5"),
         ("Euler at 100 ms", "status", "ok", "reset"),
     ]
-
-
-def test_drifts_of_a_case_are_compared_where_its_run_is_well() -> None:
-    for status, figures in (("ok", ["energy drift"]), ("diverged", [])):
-        old, new = (
-            replace(CASE, errors=(replace(CASE.errors[0], status=status, energy_drift=drift),))
-            for drift in (0.1, 0.2)
-        )
-        assert [found.figure for found in case_departures([old], [new], BANDS)] == figures

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.drawing.marks import Box, apart, clear_place, markup_text, text_width
+from coursebuild.core.drawing.marks import Box, apart, clear_place, markup_text
 from coursebuild.core.drawing.scales import decades, log_ticks, number_text, power_text
-from coursebuild.numerics.reports.strokes import cross, dash, mark
 
 
 @pytest.mark.parametrize(
@@ -59,12 +57,6 @@ def test_markup_can_hold_any_text(text: str) -> None:
     ElementTree.fromstring(f"<text>{markup_text(text)}</text>".encode())
 
 
-def test_width_grows_with_the_text() -> None:
-    assert text_width("", 12) == 0
-    assert text_width("ill", 12) < text_width("WWW", 12)
-    assert text_width("ab", 24) == 2 * text_width("ab", 12)
-
-
 @given(wanted=st.lists(st.floats(0, 100), max_size=6), gap=st.floats(1, 10))
 def test_labels_keep_apart(wanted: list[float], gap: float) -> None:
     places = apart(sorted(wanted), gap, 0, 100)
@@ -81,11 +73,3 @@ def test_a_label_goes_where_it_hides_nothing() -> None:
     box, hidden = clear_place((195, 50), (60, 15), inside, everywhere)
     assert hidden > 0
     assert box.right <= 200
-
-
-def test_marks_and_dashes_differ() -> None:
-    assert len({mark(n, 0, 0, 4) for n in range(7)}) == 7
-    assert len({dash(n) for n in range(7)}) == 7
-    assert mark(7, 1, 2, 4) == mark(0, 1, 2, 4)
-    assert cross(1, 2, 3) == "M-2.0 -1.0l6 6m0 -6l-6 6"
-    assert math.isfinite(float(mark(1, 0, 0, 4)[1:].split()[0]))

@@ -15,7 +15,6 @@ from coursebuild.core.drawing.marks import text_width
 from coursebuild.numerics.reports.bench import ScenarioReport, StableRow
 from coursebuild.numerics.reports.plot import STYLE, plot_svg
 from coursebuild.numerics.reports.points import chart, quantities, telling
-from coursebuild.numerics.reports.strokes import colour, cross, dash, mark
 from support.bench_reports import lost, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
@@ -77,47 +76,6 @@ def test_every_row_is_a_mark_that_says_what_it_is(narrow: bool) -> None:
     assert "error: position (m or rad)" in shown
     for name in ("Euler", "implicit", "RK4"):
         assert name in shown
-
-
-def test_lines_differ_by_colour_dash_and_mark() -> None:
-    root = drawn(swing())
-    for number in (0, 1, 3):
-        lines = [
-            path
-            for path in root.iter("path")
-            if path.attrib.get("stroke-width") == "1.7" and path.attrib["stroke"] == colour(number)
-        ]
-        assert len(lines) == 1
-        assert lines[0].attrib.get("stroke-dasharray", "") == dash(number)
-    assert len({re.sub(r"[\d.-]", "", mark(n, 0, 0, 4)) for n in (0, 1, 3)}) == 3
-
-
-def test_marks_of_the_front_are_filled_and_others_are_not() -> None:
-    report = swing()
-    marks = [path for path in drawn(report).iter("path") if list(path.iter("title"))]
-    fills = {titles_of(path)[0]: path.attrib["fill"] for path in marks}
-    for text, fill in fills.items():
-        if "on the Pareto front" in text:
-            assert fill == colour(3)
-        elif "diverged" in text:
-            assert fill == "none"
-        else:
-            assert fill == "var(--paper, Canvas)"
-
-
-def test_a_lost_run_is_a_cross_in_the_lane_of_its_integrator() -> None:
-    root = drawn(swing())
-    (gone,) = [p for p in root.iter("path") if any("diverged" in t for t in titles_of(p))]
-    assert gone.attrib["stroke"] == colour(0)
-    x, y = (float(v) + 3.6 for v in re.match(r"M(\S+) (\S+?)l", gone.attrib["d"]).groups())  # type: ignore[union-attr]
-    assert gone.attrib["d"] == cross(x, y, 3.6)
-    (edge,) = [p for p in root.iter("path") if p.attrib.get("stroke-opacity") == "0.7"]
-    top = float(edge.attrib["d"].split()[1].partition("V")[0])
-    assert y < top
-
-
-def titles_of(path: ElementTree.Element) -> list[str]:
-    return [title.text or "" for title in path.iter("title")]
 
 
 def test_what_is_not_resolved_is_a_band() -> None:

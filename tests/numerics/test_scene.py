@@ -101,10 +101,6 @@ def test_commands_are_all_given_before_the_end() -> None:
 @pytest.mark.parametrize(
     ("text", "message", "place"),
     [
-        ('keyframe = "hom"', "the model has no keyframe `hom`", '"hom"'),
-        ("keyframe = 2", "the model has no keyframe 2", "2"),
-        ("qpos = [1]", "`qpos` has 1 numbers, and the model takes 5", "["),
-        ("controls = [[1, 2]]", "`controls` has 2 numbers, and the model takes 1", "["),
         (
             "duration = 1.0001",
             "the model's timestep, 0.002 s, does not divide `duration` (1.0001 s)",

@@ -38,13 +38,13 @@ def test_bench_measures_every_model_that_is_no_part_of_another(course: Path) -> 
     write(course / "models" / "walker.xml", '<mujoco><include file="legs.xml"/></mujoco>')
     fake = Fake()
     found = bench(options(course), measuring=fake)
-    assert [scene.model for scene in found.scenes] == ["arms/left arm", "box", "walker"]
+    assert [scene.model for scene in found.reports] == ["arms/left arm", "box", "walker"]
     assert found.ok
     for name in ("arms/left arm", "models/arms/left arm.xml", "./models/arms/left arm.xml"):
-        assert [s.model for s in bench(options(course), (name,), measuring=fake).scenes] == [
+        assert [s.model for s in bench(options(course), (name,), measuring=fake).reports] == [
             "arms/left arm"
         ]
-    assert [s.model for s in bench(options(course), ("legs",), measuring=fake).scenes] == ["legs"]
+    assert [s.model for s in bench(options(course), ("legs",), measuring=fake).reports] == ["legs"]
 
 
 def test_unknown_model_name_is_wrong_usage(course: Path) -> None:
@@ -58,7 +58,7 @@ def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: 
     write(course / "models" / "bad.xml", BOX.replace('size="0.1"', 'size="-1"'))
     write(course / "models" / "worse.xml", "<mujoco>\n  <worldbody>\n")
     found = bench(options(course), measuring=Fake())
-    assert [scene.model for scene in found.scenes] == ["box"]
+    assert [scene.model for scene in found.reports] == ["box"]
     assert not found.ok
     first, second = found.diagnostics
     assert first.rule == second.rule == "model-error"
@@ -76,7 +76,7 @@ def test_mistakes_in_scenario_files_are_told(course: Path) -> None:
     write(course / "models" / "arm.toml", "[[scenarjo]]\n")
     write(course / "models" / "bocks.toml", TOML)
     found = bench(options(course), measuring=Fake())
-    assert found.scenes == ()
+    assert found.reports == ()
     assert found.diagnostics[0].message.startswith("unknown")
     assert "there is no model models/bocks.xml to which these scenarios belong" in {
         d.message for d in found.diagnostics
@@ -91,7 +91,7 @@ def test_a_scenario_that_cannot_be_measured_is_told(course: Path) -> None:
     scene = find_scenes(course, ("box",)).scenes[0]
     wrong = diagnose("scenario-model", scene.model.source.span(0, 0), "no way")
     found = bench(options(course), ("box",), measuring=Fake(swing(), wrong))
-    assert found.scenes == () and [d.message for d in found.diagnostics] == ["no way"]
+    assert found.reports == () and [d.message for d in found.diagnostics] == ["no way"]
 
 
 # --- what is kept
@@ -103,7 +103,7 @@ def test_model_is_measured_again_only_where_something_changed(course: Path) -> N
 
     def run(**how: Any) -> list[str]:
         found = bench(options(course, **how), measuring=fake)
-        assert found.scenes[0].scenarios == (swing(),)
+        assert found.reports[0].scenarios == (swing(),)
         return asked(fake)
 
     assert run() == ["box"]
@@ -138,7 +138,7 @@ def test_scenarios_measured_before_an_interruption_are_kept(course: Path) -> Non
     fake = Fake(swing(), replace(swing(), name="other"))
     found = bench(options(course), measuring=fake)
     assert [number for _, number, *_ in fake.asked] == [1]
-    assert [one.name for one in found.scenes[0].scenarios] == ["swing", "other"]
+    assert [one.name for one in found.reports[0].scenarios] == ["swing", "other"]
 
 
 def test_damaged_measurement_is_made_again(course: Path) -> None:

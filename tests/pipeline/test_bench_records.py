@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.records import decode_bench, encode_bench
-from coursebuild.pipeline.bench import Benched, check, record
+from coursebuild.pipeline.bench import check, record
 from coursebuild.pipeline.options import UsageError
+from coursebuild.pipeline.reports import Measurement
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, swing, write
 
@@ -23,7 +24,7 @@ def course(tmp_path: Path) -> Path:
     return bench_course(tmp_path)
 
 
-def recorded(course: Path, *found: ScenarioReport) -> Benched:
+def recorded(course: Path, *found: ScenarioReport) -> Measurement[SceneReport]:
     fake: Any = Fake(*found)
     return record(options(course), measuring=fake)
 

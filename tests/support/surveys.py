@@ -1,18 +1,18 @@
-"""Surveys of models given as texts, with a clock that only counts."""
+"""Surveys of models given as texts; nothing is timed but where a test gives a clock."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 
 import mujoco
 
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.numerics.pruning.ablation import Order, Survey, survey
-from coursebuild.numerics.pruning.compare import cases
+from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import Reader, Readers
 from coursebuild.numerics.reports.diet import Finding
+from coursebuild.numerics.timing import Clock
 
 PATH = "models/a.xml"
 PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
@@ -44,18 +44,18 @@ def tried(
     numbered: frozenset[str] = frozenset(),
     declared: Declarations | None = None,
     quick: bool = True,
+    clock: Clock | None = None,
 ) -> tuple[ModelText, Survey]:
     """The model, and what was found in it; `lesson` is what the course says of it."""
     model = opened(text if isinstance(text, Mapping) else {PATH: text})
-    ticks = itertools.count(0, 2_000_000)
     order = Order(
         model,
-        cases(model.model, declared, quick=quick),
+        pruning_scenes(model.model, declared, quick=quick),
         Readers((Reader("content/lessons/1.1-a.md", lesson),) if lesson else ()),
         keeps or {},
         locked or {},
         numbered,
-        lambda: next(ticks),
+        clock,
         quick,
         lambda _: None,
     )

@@ -1,9 +1,12 @@
 """A scenario that was measured, as pages show it: of a model's page, and of a lesson's `bench`.
 
-Entry point: `scenario_view(words, report, anchor)`; `largest`, a largest stable timestep in words.
+Entry point: `scenario_view(words, report, anchor)`; `largest`, a largest stable timestep in words;
+`lost_runs`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from msgspec import Struct
 
@@ -25,6 +28,7 @@ from coursebuild.numerics.reports.bench import (
     StableRow,
     WorkPrecisionRow,
 )
+from coursebuild.numerics.reports.cases import ErrorLine
 from coursebuild.numerics.reports.points import (
     FEWEST_STEPS,
     Quantity,
@@ -145,18 +149,22 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
 
 
 def _notes(words: Strings, report: ScenarioReport) -> list[str]:
-    """Why runs were lost, those with the same reasons together."""
+    """Why runs were lost, and which are of another model."""
     usual = usual_setting(report.rows)
-    together: dict[tuple[str, ...], list[str]] = {}
-    for row in report.rows:
-        if row.status != "ok":
-            told = (status_text(row.status), *row.reasons)
-            together.setdefault(told, []).append(setting_text(row.setting, usual))
-    notes = [f"{'; '.join(names)}: {'; '.join(told)}." for told, names in together.items()]
+    notes = lost_runs((setting_text(row.setting, usual), row) for row in report.rows)
     softened = [setting_text(row.setting, usual) for row in report.rows if row.refsafe]
     if softened:
         notes.append(words("measured.refsafe", settings="; ".join(softened)))
     return notes
+
+
+def lost_runs(runs: Iterable[tuple[str, WorkPrecisionRow | ErrorLine]]) -> list[str]:
+    """Why runs were lost, those with the same reasons together; each with its name."""
+    together: dict[tuple[str, ...], list[str]] = {}
+    for name, run in runs:
+        if run.status != "ok":
+            together.setdefault((status_text(run.status), *run.reasons), []).append(name)
+    return [f"{'; '.join(names)}: {'; '.join(told)}." for told, names in together.items()]
 
 
 def _orders(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:

@@ -23,10 +23,10 @@ from coursebuild.core.pages.figures import (
     sentence,
 )
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.scenarios import ORDERS, largest
+from coursebuild.core.pages.scenarios import ORDERS, largest, lost_runs
 from coursebuild.core.pages.strings import Strings
 from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
-from coursebuild.numerics.reports.points import FLOORS, KNOWN, seconds_text, status_text
+from coursebuild.numerics.reports.points import FLOORS, integrator_rank, seconds_text, status_text
 from coursebuild.numerics.reports.records import STABILITY_PATH
 
 _QUANTITIES = (
@@ -199,7 +199,7 @@ def _errors(words: Strings, report: CaseReport) -> list[Grid]:
     least = 0.0 if report.reference is None else FLOORS * report.reference.floor
     lines = {(one.timestep, one.integrator): one for one in report.errors}
     steps = sorted({one.timestep for one in report.errors}, reverse=True)
-    names = sorted({one.integrator for one in report.errors}, key=_rank)
+    names = sorted({one.integrator for one in report.errors}, key=integrator_rank)
     for quantity, key in _QUANTITIES:
         if all(getattr(one, quantity) is None for one in report.errors):
             continue
@@ -210,10 +210,6 @@ def _errors(words: Strings, report: CaseReport) -> list[Grid]:
         label = words("numerics.errors", quantity=words(key))
         found.append(grid(label, columns))
     return found
-
-
-def _rank(name: str) -> int:
-    return KNOWN.index(name) if name in KNOWN else len(KNOWN)
 
 
 def _error(line: ErrorLine | None, quantity: str, least: float) -> str:
@@ -234,11 +230,5 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
     if softened:
         times = ", ".join(seconds_text(step) for step in softened)
         notes.append(words("measured.refsafe", settings=times))
-    together: dict[tuple[str, ...], list[str]] = {}
-    for line in report.errors:
-        if line.status != "ok":
-            told = (status_text(line.status), *line.reasons)
-            text = f"{line.integrator} at {seconds_text(line.timestep)}"
-            together.setdefault(told, []).append(text)
-    notes += [f"{'; '.join(names)}: {'; '.join(told)}." for told, names in together.items()]
-    return notes
+    runs = ((f"{one.integrator} at {seconds_text(one.timestep)}", one) for one in report.errors)
+    return [*notes, *lost_runs(runs)]

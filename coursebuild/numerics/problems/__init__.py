@@ -19,7 +19,6 @@ from coursebuild.numerics.problems import (
     scales,
     stack,
     tops,
-    touching_cradle,
     tumbling_box,
 )
 
@@ -34,7 +33,6 @@ def all_problems() -> tuple[Problem, ...]:
         projectile.problem(),
         *incline.problems(),
         *impact.problems(),
-        touching_cradle.problem(),
         *stack.problems(),
         double_pendulum.problem(),
         *chains.problems(),

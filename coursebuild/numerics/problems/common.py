@@ -1,6 +1,7 @@
-"""What the hard cases share: their models' text, simulating for a while, motions of free bodies.
+"""What the hard cases share: their models' text, simulating for a while, a second reference.
 
-Entry points: `model_text`, `simulated`, `divisions`; `motion_without_attitude`, `free_body_motion`.
+Entry points: `model_text`, `simulated`, `divisions`; `motion_without_attitude`, `turning_at_rest`;
+`engine_reference`.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from coursebuild.numerics.engine import advance, compiled, initial_data
-from coursebuild.numerics.integrate import State, bulirsch_stoer, quaternion_rate
-from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
+from coursebuild.numerics.forward import forward_motion
+from coursebuild.numerics.problem import Array, Integrator, Motion, Reference, Scenario
 
 NO_CONTACT = '<flag contact="disable"/>'
 NO_GRAVITY = 'gravity="0 0 0"'
@@ -33,7 +34,7 @@ def simulated(
 ) -> Any:
     """`mjData` after so many steps from where a scenario begins."""
     model = compiled(mjcf, integrator, timestep)
-    data = initial_data(Setup(scenario=scenario), model)
+    data = initial_data(scenario, model)
     advance(model, data, steps)
     return data
 
@@ -54,23 +55,16 @@ def turning_at_rest(times: Array, attitude: Array, omega: Array) -> Motion:
     return Motion(times, still, attitude[:, None], np.concatenate([still, omega], axis=1))
 
 
-def free_body_motion(inertia: Array, omega: Array, times: Array) -> Motion:
-    """A body that turns freely about its resting centre, integrated: ω(0) (3,) in its frame, rad/s.
+def engine_reference(
+    mjcf: str, scenario: Scenario, tolerance: float = 1e-13, order: int = 16
+) -> Reference:
+    """MuJoCo's own accelerations, integrated: the second reference of most cases.
 
-    `inertia`: its principal moments (3,), kg m². At the beginning its axes are the world's.
-    Source: H. Goldstein, C. Poole, J. Safko, Classical Mechanics, 3rd ed., 5.5 (Euler's equations).
+    It shares nothing with a closed form but the model, and nothing with MuJoCo's integrators.
     """
-    i1, i2, i3 = inertia.tolist()
-
-    def rate(state: State) -> State:
-        w1, w2, w3 = state[4:].tolist()
-        euler = (i2 - i3) / i1 * w2 * w3, (i3 - i1) / i2 * w3 * w1, (i1 - i2) / i3 * w1 * w2
-        return np.concatenate([quaternion_rate(state[:4], state[4:]), euler])
-
-    start = np.concatenate([[1.0, 0.0, 0.0, 0.0], omega])
-    return turning_at_rest(times, *attitude_and_spin(bulirsch_stoer(rate, start, times)))
-
-
-def attitude_and_spin(states: State) -> tuple[Array, Array]:
-    """Unit quaternions (n, 4) and angular velocities (n, 3) of integrated states (n, 7)."""
-    return states[:, :4] / np.linalg.norm(states[:, :4], axis=1, keepdims=True), states[:, 4:]
+    return Reference(
+        "ode",
+        "MuJoCo's accelerations, Bulirsch–Stoer" + ("" if order == 16 else f" of order {order}"),
+        lambda times: forward_motion(mjcf, scenario, times, tolerance=tolerance, order=order),
+        floor=1e-11,
+    )

@@ -142,7 +142,7 @@ def lyapunov(integrator: Integrator, timestep: float = 1e-3, duration: float = 2
     """The largest Lyapunov exponent, 1/s: two runs, brought near to each other again and again."""
     one = problem()
     model = compiled(MJCF, integrator, timestep)
-    data, near = initial_data(one, model), initial_data(one, model)
+    data, near = initial_data(one.scenario, model), initial_data(one.scenario, model)
     distance, every, total = 1e-8, round(0.5 / timestep), 0.0
     near.qpos[0] += distance
     parts = round(duration / 0.5)

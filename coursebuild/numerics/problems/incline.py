@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from msgspec.structs import replace
 
-from coursebuild.numerics.integrate import State, bulirsch_stoer
+from coursebuild.numerics.integrate import bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -71,13 +71,7 @@ def _speed(text: str, integrator: Integrator, seconds: float) -> float:
     return math.hypot(data.qvel[0], data.qvel[1])
 
 
-def _straight(pull: float, turn: float, across: bool, times: Array) -> Motion:
-    """From rest with a constant acceleration (m/s²); a ball turns with it, `turn` 1/m."""
-    way, speed = pull * times**2 / 2, pull * times
-    return _as_motion(way, speed, turn, across)
-
-
-def _as_motion(way: Array, speed: Array, turn: float, across: bool) -> Motion:
+def _as_motion(times: Array, way: Array, speed: Array, turn: float, across: bool) -> Motion:
     along = np.array([1.0, 1.0, 0.0]) / math.sqrt(2) if across else np.array([1.0, 0.0, 0.0])
     axis = np.array([-along[1], along[0], 0.0])
     place = way[:, None] * along + np.array([0.0, 0.0, _HALF])
@@ -85,24 +79,7 @@ def _as_motion(way: Array, speed: Array, turn: float, across: bool) -> Motion:
     attitude = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * axis], axis=1)
     # Turning about an axis that does not move: the same in the body's frame and in the world's.
     velocity = np.concatenate([speed[:, None] * along, speed[:, None] * turn * axis], axis=1)
-    times = np.arange(len(way), dtype=np.float64)
     return Motion(times, place, attitude[:, None], velocity)
-
-
-def _integrated(force: float, inertia: float, turn: float, across: bool, times: Array) -> Motion:
-    """The same from the balance of energy and power, by Bulirsch–Stoer.
-
-    The kinetic energy E = (m + I/r²) v²/2 gains what gravity gives less what friction takes,
-    dE/dt = `force` v: with p = √E everything is smooth at rest.
-    """
-
-    def rate(state: State) -> State:
-        _, root = state.tolist()
-        speed = root * math.sqrt(2 / inertia)
-        return np.array([speed, force * math.sqrt(2 / inertia) / 2])
-
-    states = bulirsch_stoer(rate, np.zeros(2), times)
-    return _as_motion(states[:, 0], states[:, 1] * math.sqrt(2 / inertia), turn, across)
 
 
 def problems() -> tuple[Problem, ...]:
@@ -142,9 +119,7 @@ def _rolling(cone: Cone) -> Problem:
         f"rolling-ball-{cone}",
         f"Ball rolling, {cone} cone",
         text,
-        _references(
-            f"rolling without slipping, {law}", pull, inertia=7 / 5, turn=1 / _HALF, floor=1e-13
-        ),
+        _references(f"rolling without slipping, {law}", pull, turn=1 / _HALF, floor=1e-13),
         (_acceleration(name, text, pull, law),),
         "the ball sinks in, and so rolls on a shorter arm: the error is the model's",
     )
@@ -199,26 +174,21 @@ def _problem(
 
 
 def _references(
-    law: str,
-    pull: float,
-    *,
-    inertia: float = 1.0,
-    turn: float = 0.0,
-    across: bool = False,
-    floor: float,
+    law: str, pull: float, *, turn: float = 0.0, across: bool = False, floor: float
 ) -> tuple[Reference, Reference]:
-    """The closed form of a steady acceleration `pull` (m/s²), and the balance of energy.
+    """A steady acceleration `pull` (m/s²) from rest, by its formula and integrated.
 
-    `inertia` is that of the motion relative to the mass, `turn` rad for each metre.
+    A ball turns with it, `turn` rad for each metre.
     """
 
     def closed(times: Array) -> Motion:
-        return _straight(pull, turn, across, times)
+        return _as_motion(times, pull * times**2 / 2, pull * times, turn, across)
 
-    def balance(times: Array) -> Motion:
-        return _integrated(pull * inertia, inertia, turn, across, times)
+    def integrated(times: Array) -> Motion:
+        states = bulirsch_stoer(lambda s: np.array([s[1], pull]), np.zeros(2), times)
+        return _as_motion(times, states[:, 0], states[:, 1], turn, across)
 
     return (
         Reference("closed", law, closed, floor=floor),
-        Reference("ode", "the balance of energy, Bulirsch–Stoer", balance, floor=10 * floor),
+        Reference("ode", "the law of motion, Bulirsch–Stoer", integrated, floor=10 * floor),
     )

@@ -23,7 +23,6 @@ import math
 
 import numpy as np
 
-from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -37,6 +36,7 @@ from coursebuild.numerics.problems.common import (
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
+    engine_reference,
     model_text,
     motion_without_attitude,
 )
@@ -84,56 +84,30 @@ def oscillation(ratio: float, rate: float, x0: float, v0: float, times: Array) -
     return motion_without_attitude(times, place[:, None], speed[:, None])
 
 
-def integrated(ratio: float, rate: float, x0: float, v0: float, times: Array) -> Motion:
-    """The same by Bulirsch–Stoer."""
-
-    def slope(state: State) -> State:
-        x, v = state.tolist()
-        return np.array([v, -2 * ratio * rate * v - rate**2 * x])
-
-    states = bulirsch_stoer(slope, np.array([x0, v0]), times)
-    return motion_without_attitude(times, states[:, :1], states[:, 1:])
-
-
-def commanded(ratio: float, times: Array, *, closed: bool) -> Motion:
+def commanded(ratio: float, times: Array) -> Motion:
     """The servo following its commands from rest at 0, at the times (n,) s.
 
-    In each hold it is an oscillator about its target, by the closed form or integrated.
+    In each hold it is an oscillator about its target.
     """
-    form = oscillation if closed else integrated
     x, v, begin = 0.0, 0.0, 0.0
     place, speed = np.empty((len(times), 1)), np.empty((len(times), 1))
-    for index, target in enumerate(TARGETS):
-        last = index + 1 == len(TARGETS)
-        end = math.inf if last else begin + HOLD
-        here = (times > begin + 1e-12) & (times <= end + 1e-12)
-        until = max(HOLD, float(times[-1]) - begin) if last else HOLD
-        offsets = np.append(times[here] - begin, until)
-        part = form(ratio, SERVO_RATE, x - target, v, offsets)
+    for target in TARGETS:
+        here = times > begin + 1e-12  # what is after the hold is written again in the next one
+        at = np.append(times[here] - begin, HOLD)
+        part = oscillation(ratio, SERVO_RATE, x - target, v, at)
         place[here], speed[here] = part.position[:-1] + target, part.velocity[:-1]
-        if not last:
-            x, v = float(part.position[-1, 0]) + target, float(part.velocity[-1, 0])
-            begin = end
+        x, v = float(part.position[-1, 0]) + target, float(part.velocity[-1, 0])
+        begin += HOLD
     return motion_without_attitude(times, place, speed)
 
 
-def _references(
-    ratio: float, rate: float, source: str, *, floor: float
-) -> tuple[Reference, Reference]:
-    """The oscillator begun at `START`: its closed form, and an integration.
+def _begun(ratio: float, rate: float, source: str, *, floor: float) -> Reference:
+    """The oscillator begun at `START`.
 
     `floor` is for a rate of 1 rad/s: velocities are known worse by the rate.
     """
-
-    def closed(times: Array) -> Motion:
-        return oscillation(ratio, rate, *START, times)
-
-    def second(times: Array) -> Motion:
-        return integrated(ratio, rate, *START, times)
-
-    return (
-        Reference("closed", source, closed, floor * rate),
-        Reference("ode", "Bulirsch–Stoer", second, 1e-13 * rate),
+    return Reference(
+        "closed", source, lambda times: oscillation(ratio, rate, *START, times), floor * rate
     )
 
 
@@ -184,17 +158,18 @@ def _spring(ratio: float) -> Problem:
     rate, explicit = SPRING_RATE, Integrator.EULER_EXPLICIT
     damper = f'stiffness="{rate**2!r}" damping="{2 * ratio * rate!r}"'
     joint = f'<joint type="slide" axis="1 0 0" {damper}/>'
-    reference, second = _references(ratio, rate, "the linear oscillator", floor=1e-14)
+    mjcf = model_text(_ball(joint), NO_GRAVITY, NO_CONTACT)
+    scenario = Scenario(1.0, 0.1, START[:1], START[1:])
     return Problem(
         name=f"damped-spring-{ratio:g}",
         title=f"Damped spring, ζ = {ratio:g}",
         case=5,
-        mjcf=model_text(_ball(joint), NO_GRAVITY, NO_CONTACT),
-        scenario=Scenario(1.0, 0.1, START[:1], START[1:]),
+        mjcf=mjcf,
+        scenario=scenario,
         position_bound=BOUND,
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
-        reference=reference,
-        second=second,
+        reference=_begun(ratio, rate, "the linear oscillator", floor=1e-14),
+        second=engine_reference(mjcf, scenario),
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
         limit=lambda one: limit_of(ratio, rate, one, explicit),
         energy_conserved=ratio == 0,
@@ -206,27 +181,25 @@ def _servo(ratio: float) -> Problem:
     rate, explicit = SERVO_RATE, (Integrator.EULER, Integrator.EULER_EXPLICIT)
     gains = f'kp="{rate**2!r}" kv="{2 * ratio * rate!r}"'
     motor = f'  <actuator><position joint="slide" {gains}/></actuator>\n'
+    mjcf = model_text(_ball(_SLIDE), NO_GRAVITY, NO_CONTACT, motor)
+    commands = tuple((target,) for target in TARGETS)
+    scenario = Scenario(2 * HOLD, 0.01, controls=commands, hold=HOLD)
     bound = BOUND / 10
     return Problem(
         name=f"stiff-servo-{ratio:g}",
         title=f"Stiff servo, ζ = {ratio:g}",
         case=6,
-        mjcf=model_text(_ball(_SLIDE), NO_GRAVITY, NO_CONTACT, motor),
-        scenario=Scenario(2 * HOLD, 0.01, controls=tuple((x,) for x in TARGETS), hold=HOLD),
+        mjcf=mjcf,
+        scenario=scenario,
         position_bound=bound,
         velocity_bound=bound * rate * (1 + 4 * ratio),
         reference=Reference(
             "closed",
             "the linear oscillator about each target",
-            lambda times: commanded(ratio, times, closed=True),
+            lambda times: commanded(ratio, times),
             floor=1e-14 * rate,
         ),
-        second=Reference(
-            "ode",
-            "Bulirsch–Stoer, begun anew at each command",
-            lambda times: commanded(ratio, times, closed=False),
-            floor=1e-13 * rate,
-        ),
+        second=engine_reference(mjcf, scenario),
         timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e2 / rate),
@@ -240,17 +213,18 @@ def _equality(ratio: float) -> Problem:
     equality = f'  <equality><joint joint1="slide" {soft}/></equality>\n'
     flags = '<flag refsafe="disable" contact="disable"/>'
     source = "the linear oscillator of the constraint"
-    reference, second = _references(ratio, rate, source, floor=1e-13)
+    mjcf = model_text(_ball(_SLIDE), f'{NO_GRAVITY} tolerance="0"', flags, equality)
+    scenario = Scenario(0.2, 0.02, START[:1], START[1:])
     return Problem(
         name=f"soft-equality-{ratio:g}",
         title=f"Soft equality as an oscillator, ζ = {ratio:g}, refsafe off",
         case=12,
-        mjcf=model_text(_ball(_SLIDE), f'{NO_GRAVITY} tolerance="0"', flags, equality),
-        scenario=Scenario(0.2, 0.02, START[:1], START[1:]),
+        mjcf=mjcf,
+        scenario=scenario,
         position_bound=BOUND,
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
-        reference=reference,
-        second=second,
+        reference=_begun(ratio, rate, source, floor=1e-13),
+        second=engine_reference(mjcf, scenario),
         timesteps=divisions(0.02, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e1 / rate),

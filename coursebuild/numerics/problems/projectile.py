@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -19,7 +18,13 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import NO_CONTACT, divisions, model_text, simulated
+from coursebuild.numerics.problems.common import (
+    NO_CONTACT,
+    divisions,
+    engine_reference,
+    model_text,
+    simulated,
+)
 
 GRAVITY = 9.81
 """m/s²."""
@@ -32,27 +37,13 @@ _STONE = '    <body><freejoint/><geom size="0.05" mass="1"/></body>'
 MJCF = model_text(_STONE, f'gravity="0 0 -{GRAVITY}"', NO_CONTACT)
 
 
-def _motion(times: Array, place: Array, speed: Array) -> Motion:
-    upright = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (len(times), 1, 4))
-    velocity = np.concatenate([speed, np.zeros((len(times), 3))], axis=1)
-    return Motion(times, place, upright, velocity)
-
-
 def parabola(times: Array) -> Motion:
     """Launched at the origin, at the times (n,) s: x = v₀t + gt²/2."""
     t = times[:, None]
     launch, fall = np.array(LAUNCH), np.array([0.0, 0.0, -GRAVITY])
-    return _motion(times, launch * t + fall * t**2 / 2, launch + fall * t)
-
-
-def integrated(times: Array) -> Motion:
-    """The same by Bulirsch–Stoer."""
-
-    def rate(state: State) -> State:
-        return np.concatenate([state[3:], [0.0, 0.0, -GRAVITY]])
-
-    states = bulirsch_stoer(rate, np.array([0.0, 0.0, 0.0, *LAUNCH]), times)
-    return _motion(times, states[:, :3], states[:, 3:])
+    upright = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (len(times), 1, 4))
+    velocity = np.concatenate([launch + fall * t, np.zeros((len(times), 3))], axis=1)
+    return Motion(times, launch * t + fall * t**2 / 2, upright, velocity)
 
 
 def fall_error(integrator: Integrator) -> float:
@@ -77,7 +68,7 @@ def problem() -> Problem:
         position_bound=100.0,
         velocity_bound=100.0,
         reference=Reference("closed", "x = v₀t + gt²/2", parabola, floor=1e-15),
-        second=Reference("ode", "Bulirsch–Stoer", integrated, floor=1e-14),
+        second=engine_reference(MJCF, _SCENARIO),
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
         energy_conserved=True,
         checks=(

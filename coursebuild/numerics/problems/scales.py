@@ -9,9 +9,7 @@ import math
 
 import mujoco
 import numpy as np
-from msgspec.structs import replace
 
-from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -25,7 +23,7 @@ from coursebuild.numerics.problems.common import (
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
-    free_body_motion,
+    engine_reference,
     model_text,
     motion_without_attitude,
     simulated,
@@ -107,36 +105,23 @@ def _line(times: Array) -> Motion:
     )
 
 
-def _line_integrated(times: Array) -> Motion:
-    def rate(state: State) -> State:
-        return np.array([state[1], 0.0])
-
-    states = bulirsch_stoer(rate, np.array([FAR, CRAWL]), times)
-    return motion_without_attitude(times, states[:, :1], states[:, 1:])
-
-
 def problems() -> tuple[Problem, ...]:
     """The cube, the distant body and the plate."""
     return (_cube(), _distant(), _plate())
 
 
 def _cube() -> Problem:
-    moment = DENSITY * EDGE**5 / 6
+    scenario = Scenario(1.0, 0.05, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *_TURN))
     return Problem(
         name="millimetre-cube",
         title="Cube of 1 mm",
         case=13,
         mjcf=CUBE,
-        scenario=Scenario(1.0, 0.05, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *_TURN)),
+        scenario=scenario,
         position_bound=1.5,
         velocity_bound=100.0,
         reference=Reference("closed", "a steady turn", steady, floor=1e-14),
-        second=Reference(
-            "ode",
-            "Euler's equations and quaternions, Bulirsch–Stoer",
-            lambda times: free_body_motion(np.full(3, moment), np.array(_TURN), times),
-            floor=1e-13,
-        ),
+        second=engine_reference(CUBE, scenario),
         timesteps=divisions(0.05, 10, 20, 40, 80),
         checks=(
             ScalarCheck(
@@ -164,7 +149,7 @@ def _distant() -> Problem:
         position_bound=2 * FAR,
         velocity_bound=1.0,
         reference=Reference("closed", "a uniform motion", _line, floor=spacing),
-        second=Reference("ode", "Bulirsch–Stoer", _line_integrated, floor=spacing),
+        second=engine_reference(DISTANT, _FAR_AWAY),
         agreement=10 * spacing,
         timesteps=divisions(0.1, 10, 100, 1000),
         checks=tuple(
@@ -185,17 +170,17 @@ def _distant() -> Problem:
 
 def _plate() -> Problem:
     exact = FreeTop(1 / 12, 1 / 6, (1.0, 2.0, 3.0))
-    reference, second = exact.references()
+    mjcf = plate((1 / 12, 1 / 12, 1 / 6))
     return Problem(
         name="flat-plate",
         title="Flat plate, A + B = C",
         case=13,
-        mjcf=plate((1 / 12, 1 / 12, 1 / 6)),
+        mjcf=mjcf,
         scenario=exact.scenario(),
         position_bound=1.5,
         velocity_bound=100.0,
-        reference=reference,
-        second=replace(second, floor=1e-13),
+        reference=exact.reference,
+        second=engine_reference(mjcf, exact.scenario()),
         timesteps=divisions(0.05, 10, 20, 40, 80),
         checks=(
             ScalarCheck(

@@ -24,7 +24,12 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import model_text, motion_without_attitude, simulated
+from coursebuild.numerics.problems.common import (
+    engine_reference,
+    model_text,
+    motion_without_attitude,
+    simulated,
+)
 
 GRAVITY, RADIUS = 9.81, 0.1
 IMPEDANCE, TIMECONST = 0.99, 0.004
@@ -52,19 +57,6 @@ def depths(ratio: float) -> Array:
     forces = GRAVITY * np.array([1.0 + ratio, ratio])
     found: Array = forces * np.array([1.0, 1.0 + 1.0 / ratio]) * compliance
     return found
-
-
-def depths_by_solving(ratio: float) -> Array:
-    """The same from the equations of the whole stack: accelerations and violations that rest."""
-    jacobian = np.array([[1.0, 0.0], [-1.0, 1.0]])
-    masses = np.array([1.0, ratio])
-    delassus = jacobian / masses @ jacobian.T
-    regularizer = np.diag(np.diag(delassus)) * (1 - IMPEDANCE) / IMPEDANCE
-    # J (−g + M⁻¹Jᵀf) = 0 and k d r = R f
-    force = np.linalg.solve(delassus, jacobian @ np.full(2, GRAVITY))
-    stiffness = 1 / (IMPEDANCE * TIMECONST) ** 2
-    rest: Array = regularizer @ force / (stiffness * IMPEDANCE)
-    return rest
 
 
 def _resting(found: Array, times: Array) -> Motion:
@@ -95,12 +87,13 @@ def problems() -> tuple[Problem, ...]:
 
 def _problem(ratio: float) -> Problem:
     rest = depths(ratio)
+    scenario = Scenario(1.0, 0.1, (-float(rest[0]), -float(rest.sum())))
     return Problem(
         name=f"stack-{ratio:g}",
         title=f"Stack of 1 kg under {ratio:g} kg",
         case=9,
         mjcf=mjcf(ratio),
-        scenario=Scenario(1.0, 0.1, (-float(rest[0]), -float(rest.sum()))),
+        scenario=scenario,
         position_bound=1.0,
         velocity_bound=10.0,
         reference=Reference(
@@ -109,12 +102,7 @@ def _problem(ratio: float) -> Problem:
             lambda times: _resting(depths(ratio), times),
             floor=1e-15,
         ),
-        second=Reference(
-            "closed",
-            "the stack's equations of equilibrium, solved together",
-            lambda times: _resting(depths_by_solving(ratio), times),
-            floor=1e-15,
-        ),
+        second=engine_reference(mjcf(ratio), scenario),
         timesteps=(2e-3, 1e-3, 5e-4),
         checks=(
             ScalarCheck(

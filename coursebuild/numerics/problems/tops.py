@@ -20,12 +20,7 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.elliptic import jacobi
-from coursebuild.numerics.integrate import (
-    State,
-    bulirsch_stoer,
-    cumulative_integral,
-    quaternion_rate,
-)
+from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -39,9 +34,8 @@ from coursebuild.numerics.problem import (
 from coursebuild.numerics.problems.common import (
     NO_CONTACT,
     NO_GRAVITY,
-    attitude_and_spin,
     divisions,
-    free_body_motion,
+    engine_reference,
     model_text,
     simulated,
     turning_at_rest,
@@ -103,17 +97,10 @@ class FreeTop(Struct, frozen=True):
         about = axis_angle_to_quat(momentum, size / self.transverse * times)
         return turning_at_rest(times, quat_mul(about, axis_angle_to_quat(_Z, -turn)), omega)
 
-    def references(self) -> tuple[Reference, Reference]:
-        """The closed form, and an integration."""
-        return (
-            Reference("closed", "Goldstein, 5.6", self.motion, floor=1e-13),
-            Reference(
-                "ode",
-                "Euler's equations and quaternions, Bulirsch–Stoer",
-                lambda times: free_body_motion(self.inertia, np.array(self.omega), times),
-                floor=1e-12,
-            ),
-        )
+    @property
+    def reference(self) -> Reference:
+        """The closed form."""
+        return Reference("closed", "Goldstein, 5.6", self.motion, floor=1e-13)
 
 
 TOPS = {
@@ -165,7 +152,6 @@ def _growth(name: str, z: float) -> ScalarCheck:
 
 def _free(name: str) -> Problem:
     top = TOPS[name]
-    reference, second = top.references()
     return Problem(
         name=name,
         title=_TITLES[name],
@@ -174,8 +160,8 @@ def _free(name: str) -> Problem:
         scenario=top.scenario(),
         position_bound=1.5,
         velocity_bound=10 * abs(top.omega[2]),
-        reference=reference,
-        second=second,
+        reference=top.reference,
+        second=engine_reference(top.mjcf(), top.scenario()),
         timesteps=divisions(0.05, 40, 80, 160, 320, 640, 1280),
         checks=tuple(_growth(name, z) for z in (0.03, 0.1, 0.3)),
         limit=lambda integrator: _limit(top, integrator),
@@ -247,48 +233,26 @@ def heavy_motion(times: Array) -> Motion:
     return Motion(times, np.empty((len(times), 0)), attitude[:, None], omega)
 
 
-def heavy_integrated(times: Array) -> Motion:
-    """Euler's equations about the pivot with the torque of gravity, by Bulirsch–Stoer."""
-    load = MASS * GRAVITY * HEIGHT
-
-    def rate(state: State) -> State:
-        q0, q1, q2, q3, w1, w2, w3 = state.tolist()
-        # The vertical in the body's frame: the third row of the rotation matrix.
-        vx, vy = 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1)
-        euler = (
-            ((TRANSVERSE - AXIAL) * w2 * w3 + load * vy) / TRANSVERSE,
-            ((AXIAL - TRANSVERSE) * w3 * w1 - load * vx) / TRANSVERSE,
-            0.0,
-        )
-        return np.concatenate([quaternion_rate(state[:4], state[4:]), euler])
-
-    start = np.array([math.cos(TILT / 2), 0, math.sin(TILT / 2), 0, 0, 0, SPIN])
-    attitude, omega = attitude_and_spin(bulirsch_stoer(rate, start, times))
-    return Motion(times, np.empty((len(times), 0)), attitude[:, None], omega)
-
-
 def _heavy() -> Problem:
     """Half a second of the top, let go with spin only."""
     moments = f'diaginertia="{CENTRAL} {CENTRAL} {AXIAL}"'
     inertial = f'<inertial pos="0 0 {HEIGHT}" mass="{MASS}" {moments}/>'
     world = f'    <body><joint type="ball"/>{inertial}</body>'
+    mjcf = model_text(world, f'gravity="0 0 -{GRAVITY}"', NO_CONTACT)
+    turned = (math.cos(TILT / 2), 0, math.sin(TILT / 2), 0)
+    scenario = Scenario(0.5, 0.02, turned, (0, 0, SPIN))
     return Problem(
         name="heavy-top",
         title="Heavy top on a ball joint, 250 rad/s",
         case=3,
-        mjcf=model_text(world, f'gravity="0 0 -{GRAVITY}"', NO_CONTACT),
-        scenario=Scenario(0.5, 0.02, (math.cos(TILT / 2), 0, math.sin(TILT / 2), 0), (0, 0, SPIN)),
+        mjcf=mjcf,
+        scenario=scenario,
         position_bound=1.5,
         velocity_bound=4 * SPIN,
         reference=Reference(
             "closed", "Lagrange's top, Goldstein, 5.7, with quadratures", heavy_motion, floor=1e-12
         ),
-        second=Reference(
-            "ode",
-            "Euler's equations and quaternions, Bulirsch–Stoer",
-            heavy_integrated,
-            floor=1e-11,
-        ),
+        second=engine_reference(mjcf, scenario),
         timesteps=divisions(0.02, 40, 80, 160, 320, 640, 1280),
         search=(1e-5, 1.0),
         energy_conserved=True,

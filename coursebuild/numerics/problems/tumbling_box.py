@@ -31,7 +31,7 @@ from coursebuild.numerics.problems.common import (
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
-    free_body_motion,
+    engine_reference,
     model_text,
     simulated,
     turning_at_rest,
@@ -158,7 +158,7 @@ def measured_crossing(integrator: Integrator, nudge: float, timestep: float = 2e
     """When a simulation first has ω₂ = 0, s: by Hermite's cubic within the step that crosses."""
     one = _begun_with(nudge)
     model = compiled(one.mjcf, integrator, timestep)
-    data = initial_data(one, model)
+    data = initial_data(one.scenario, model)
     mujoco.mj_forward(model, data)
     before, slope = float(data.qvel[4]), float(data.qacc[4])
     for step in range(round(4 * Tumbling(nudge, SPIN).first_crossing / timestep)):
@@ -209,13 +209,13 @@ def problem() -> Problem:
     """
     nudge = 0.1
     form = Tumbling(nudge, SPIN)
-    start = np.array([nudge, SPIN, 0.0])
+    scenario = Scenario(2.0, 0.1, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, nudge, SPIN, 0))
     return Problem(
         name="tumbling-box",
         title="Tumbling box: rotation about the intermediate axis",
         case=1,
         mjcf=MJCF,
-        scenario=Scenario(2.0, 0.1, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *start.tolist())),
+        scenario=scenario,
         position_bound=1.5,
         velocity_bound=20 * SPIN,
         reference=Reference(
@@ -224,12 +224,7 @@ def problem() -> Problem:
             form.motion,
             floor=1e-12,
         ),
-        second=Reference(
-            "ode",
-            "Euler's equations and quaternions, Bulirsch–Stoer",
-            lambda times: free_body_motion(moments(), start, times),
-            floor=1e-12,
-        ),
+        second=engine_reference(MJCF, scenario),
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
         checks=(
             ScalarCheck(

@@ -17,11 +17,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.compare import Case, MotionComparison, Seen, watch
+from coursebuild.numerics.pruning.compare import Seen, watch
 from coursebuild.numerics.pruning.dynamics import collisions, idle, settings
 from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
-from coursebuild.numerics.pruning.meshes import meshes
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.pruning.scenery import scenery
@@ -31,22 +30,22 @@ from coursebuild.numerics.pruning.trials import (
     NotTriedError,
     PruningContext,
     PruningTrial,
-    PruningTrials,
-    Ratio,
+    Trials,
 )
-from coursebuild.numerics.pruning.unused import unused
+from coursebuild.numerics.pruning.unused import meshes, unused
 from coursebuild.numerics.reports.diet import (
     CHANGES,
     EQUAL,
     IDENTICAL,
     UNTOUCHED,
+    Finding,
     ModelPlace,
     Saving,
     TextEdit,
+    Tried,
 )
-from coursebuild.numerics.reports.diet import Finding as Finding
-from coursebuild.numerics.reports.diet import Tried as Tried
-from coursebuild.numerics.timing import Clock
+from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.timing import Clock, Timing
 
 NAMES = 6
 """Names that a message lists."""
@@ -57,15 +56,16 @@ LEAST = 1.05
 class Order(Struct, frozen=True, eq=False):
     """What is to be surveyed, and how."""
 
-    scene: ModelText
-    cases: tuple[Case, ...]
+    text: ModelText
+    scenes: tuple[Scene, ...]
     readers: Readers
     keeps: Mapping[str, str]
     """Reasons, by the finding: `KIND`, or `KIND NAME`."""
     locked: Mapping[str, str]
     """Files that are not to be changed, and why."""
     numbered: frozenset[str]
-    clock: Clock
+    clock: Clock | None
+    """`None`: nothing is timed."""
     quick: bool
     tell: Callable[[str], None]
     """Is told what is tried next."""
@@ -75,61 +75,59 @@ class Survey(Struct, frozen=True):
     """What was found."""
 
     seen: tuple[Seen, ...]
-    findings: tuple[Finding, ...]
-    tried: tuple[Tried, ...]
-    fixed: Saving | None
-    slim: Saving | None
-    slim_difference: float | None
-    stale: tuple[str, ...]
-    edits: tuple[ModelEdit, ...]
+    findings: tuple[Finding, ...] = ()
+    tried: tuple[Tried, ...] = ()
+    fixed: Saving | None = None
+    slim: Saving | None = None
+    slim_difference: float | None = None
+    stale: tuple[str, ...] = ()
+    edits: tuple[ModelEdit, ...] = ()
     """All that `--fix` changes."""
 
 
 def survey(order: Order) -> Survey:
     """Try everything on a model."""
-    return _Surveyor(order).all()
+    seen = tuple(watch(order.text.model, scene) for scene in order.scenes)
+    good = tuple(one for one in seen if one.judgement.ok)
+    return _Surveyor(order, seen, good).all() if good else Survey(seen)
 
 
 class _Surveyor:
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: Order, seen: tuple[Seen, ...], good: tuple[Seen, ...]) -> None:
         self.order = order
-        self.scene = order.scene
-        self.seen = tuple(watch(order.scene.model, case) for case in order.cases)
-        self.cases = [one.case for one in self.seen if one.judgement.ok]
-        self.trials = PruningTrials(order.scene, self.cases, order.clock, quick=order.quick)
+        self.seen, self.good = seen, good
+        scenes = [one.scene for one in good]
+        self.trials = Trials(order.text, scenes, order.clock, quick=order.quick)
         self.findings: list[Finding] = []
         self.tried: list[Tried] = []
         self.used: set[str] = set()
         self.fixes: list[Item] = []
         self.faults: list[Item] = []
-        self.fixed_items: list[Item] = []
 
     def all(self) -> Survey:
         """Every candidate, then all of what was found."""
-        if not self.cases:
-            return Survey(self.seen, (), (), None, None, None, (), ())
         for candidate in self._candidates():
             self.order.tell(candidate.kind)
             self._judge(candidate)
-        fixed, edits = self._together(self.fixes)
+        fixed, edits = self._fixed()
         slim, difference = self._slim(fixed)
-        stale = [one for one in self.order.keeps if one not in self.used]
-        found, tried = tuple(self.findings), tuple(self.tried)
-        return Survey(self.seen, found, tried, fixed, slim, difference, tuple(stale), edits)
+        return Survey(
+            self.seen,
+            tuple(self.findings),
+            tuple(self.tried),
+            fixed,
+            slim,
+            difference,
+            tuple(one for one in self.order.keeps if one not in self.used),
+            edits,
+        )
 
     def _candidates(self) -> Iterator[Candidate]:
-        good = tuple(one for one in self.seen if one.judgement.ok)
-        declared = any(one.case.declared for one in self.seen)
-        model = self.scene.model
-        keyframes = frozenset({one.case.scenario.keyframe for one in self.seen} - {-1})
-        look = PruningContext(
-            self.scene,
-            self.order.readers,
-            good,
-            keyframes if declared else frozenset(range(model.nkey)),
-            declared,
-            self.order.numbered,
-        )
+        order = self.order
+        declared = any(scene.declared is not None for scene in order.scenes)
+        begun = frozenset(scene.scenario.keyframe for scene in order.scenes)
+        keyframes = begun if declared else frozenset(range(order.text.model.nkey))
+        look = PruningContext(order.text, order.readers, self.good, keyframes, order.numbered)
         yield from unused(look, lambda kind, name: self._reason(kind, name) is not None)
         yield from meshes(look)
         yield from idle(look)
@@ -139,10 +137,8 @@ class _Surveyor:
 
     def _reason(self, kind: str, name: str) -> str | None:
         """Why the author keeps it; `None` where nothing says so."""
-        for key in (f"{kind} {name}", kind):
-            if key in self.order.keeps:
-                return self.order.keeps[key]
-        return None
+        keeps = self.order.keeps
+        return keeps.get(f"{kind} {name}", keeps.get(kind))
 
     def _judge(self, candidate: Candidate) -> None:
         by_reason: dict[str | None, list[Item]] = {}
@@ -150,8 +146,7 @@ class _Surveyor:
             by_reason.setdefault(self._reason(candidate.kind, item.name), []).append(item)
         for reason, items in by_reason.items():
             if candidate.is_setting:
-                told = self._setting(candidate, items, reason or "")
-                parts = [items] if told else []
+                parts = self._setting(candidate, items, reason or "")
             else:
                 parts = [
                     part
@@ -161,95 +156,81 @@ class _Surveyor:
             for part in parts:
                 self.used |= {candidate.kind, *(f"{candidate.kind} {item.name}" for item in part)}
 
-    def _setting(self, candidate: Candidate, items: Sequence[Item], reason: str) -> bool:
-        """Try a setting that saves time; whether it could be tried."""
+    def _setting(
+        self, candidate: Candidate, items: list[Item], reason: str
+    ) -> Sequence[Sequence[Item]]:
+        """Try a setting that saves time; for what a reason to keep it stands."""
         try:
-            edits, model, left = self.trials.changed(items)
-            ratio = self.trials.ratio(model, left)
-            if ratio is None or not (ratio.certain and ratio.value >= LEAST):
+            trial = self.trials.changed(items)
+            timing = self.trials.timing(trial)
+            if timing is None or not (timing.certain and timing.ratio >= LEAST):
                 self._note(candidate, items, None, "it saves no time")
-                return True
-            trial = PruningTrial(edits, model, left, self.trials.compared(model, left))
+                return [items]
+            trial = self.trials.compared(trial)
         except NotTriedError as error:
             self._note(candidate, items, None, str(error))
-            return False
-        return self._report(candidate, items, trial, ratio, reason) or bool(reason)
+            return []
+        return [items] if self._report(candidate, items, trial, timing, reason) or reason else []
 
     def _parts(
-        self, candidate: Candidate, items: Sequence[Item]
+        self, candidate: Candidate, items: list[Item]
     ) -> Iterator[tuple[list[Item], PruningTrial]]:
         """Items that go together, and how it went without them; what cannot be tried is noted."""
-        waiting = [list(items)]
-        same: list[tuple[list[Item], PruningTrial]] = []
-        near: list[tuple[list[Item], PruningTrial]] = []
-        while waiting:
-            part = waiting.pop()
+        whole = self._try(items)
+        if whole is not None and (len(items) == 1 or _label(candidate, whole) != CHANGES):
+            yield items, whole
+            return
+        alike: dict[str, list[tuple[Item, PruningTrial]]] = {}
+        for item in items:
             try:
-                trial = self.trials.run(part)
+                trial = self.trials.run([item])
             except NotTriedError as error:
-                if len(part) == 1:
-                    self._note(candidate, part, None, str(error))
-                    continue
+                self._note(candidate, [item], None, str(error))
             else:
-                if trial.result.identical:
-                    same.append((part, trial))
-                    continue
-                if trial.result.equal and (len(part) == 1 or not candidate.split):
-                    near.append((part, trial))
-                    continue
-                if len(part) == 1:
-                    yield part, trial
-                    continue
-            half = len(part) // 2
-            waiting += [part[half:], part[:half]]
-        yield from self._joined(same, identical=True)
-        yield from self._joined(near, identical=False)
+                alike.setdefault(_label(candidate, trial), []).append((item, trial))
+        for label, found in alike.items():
+            together = [item for item, _ in found]
+            joined = self._try(together) if label != CHANGES and len(found) > 1 else None
+            if joined is not None and _label(candidate, joined) == label:
+                yield together, joined
+            else:
+                yield from (([item], trial) for item, trial in found)
 
-    def _joined(
-        self, parts: Sequence[tuple[list[Item], PruningTrial]], *, identical: bool
-    ) -> Iterator[tuple[list[Item], PruningTrial]]:
-        """Parts that are alike, as one where that is like them."""
-        if len(parts) > 1:
-            items = [item for part, _ in parts for item in part]
-            try:
-                trial = self.trials.run(items)
-            except NotTriedError:
-                yield from parts
-                return
-            if trial.result.identical if identical else trial.result.equal:
-                yield items, trial
-                return
-        yield from parts
-
-    def _timed(self, candidate: Candidate, trial: PruningTrial) -> Ratio | None:
-        if not candidate.timed or not (trial.result.identical or trial.result.equal):
+    def _try(self, items: Sequence[Item]) -> PruningTrial | None:
+        try:
+            return self.trials.run(items)
+        except NotTriedError:
             return None
-        return self.trials.ratio(trial.model, trial.left)
+
+    def _timed(self, candidate: Candidate, trial: PruningTrial) -> Timing | None:
+        useful = candidate.timed and _label(candidate, trial) != CHANGES
+        return self.trials.timing(trial) if useful else None
 
     def _report(
         self,
         candidate: Candidate,
         items: Sequence[Item],
         trial: PruningTrial,
-        ratio: Ratio | None,
+        timing: Timing | None,
         reason: str | None,
     ) -> bool:
         """Note what was found; whether there was anything."""
-        label = _label(candidate, trial.result)
+        assert trial.result is not None
+        label = _label(candidate, trial)
         if label == CHANGES:
             self._note(candidate, items, trial.result.difference, "")
             return False
         unfixed = self._unfixed(candidate, trial, label, reason or "")
         finding = Finding(
             kind=candidate.kind,
-            message=_said(candidate, [item.name for item in items]),
-            places=tuple(self._place(item) for item in items if item.element is not None),
+            message=_message(candidate, [item.name for item in items]),
+            places=tuple(_place(item) for item in items if item.element is not None),
             label=label,
             difference=trial.result.difference,
-            scenarios=tuple(case.name for case in self.cases),
+            scenarios=tuple(one.scene.name for one in self.good),
             proof=candidate.proof,
             setting=candidate.is_setting,
-            saving=self.trials.saving(trial, ratio),
+            saving=self.trials.saving(trial, timing),
             edits=self._texts(trial.edits),
             fixable=not unfixed,
             unfixed=unfixed,
@@ -264,6 +245,7 @@ class _Surveyor:
         return True
 
     def _unfixed(self, candidate: Candidate, trial: PruningTrial, label: str, reason: str) -> str:
+        """Why `--fix` does not change it; empty where it does."""
         if reason:
             return "it is kept"
         if candidate.is_setting:
@@ -278,25 +260,14 @@ class _Surveyor:
         return candidate.doubt or candidate.blocked
 
     def _note(
-        self,
-        candidate: Candidate,
-        items: Sequence[Item],
-        difference: float | None,
-        why: str,
+        self, candidate: Candidate, items: Sequence[Item], difference: float | None, why: str
     ) -> None:
         finite = difference if difference is not None and math.isfinite(difference) else None
         names = tuple(item.name for item in items)
-        message = _said(candidate, names)
-        self.tried.append(Tried(candidate.kind, message, names, finite, why))
-
-    def _place(self, item: Item) -> ModelPlace:
-        element = item.element
-        assert element is not None
-        line, column = element.document.position(element.start)
-        return ModelPlace(item.name, place_of(element), element.document.path, line, column)
+        self.tried.append(Tried(candidate.kind, _message(candidate, names), names, finite, why))
 
     def _texts(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
-        by_path = {document.path: document for document in self.scene.documents}
+        by_path = {document.path: document for document in self.order.text.documents}
         found = []
         for edit in merge_edits(edits):
             document = by_path[edit.path]
@@ -306,38 +277,37 @@ class _Surveyor:
             found.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
         return tuple(found)
 
-    def _together(self, items: Sequence[Item]) -> tuple[Saving | None, tuple[ModelEdit, ...]]:
+    def _fixed(self) -> tuple[Saving | None, tuple[ModelEdit, ...]]:
         """All that is to be fixed at once; less, where that is no longer the same."""
-        left = list(items)
-        while left:
-            try:
-                trial = self.trials.run(left)
-            except NotTriedError:
-                trial = None
-            if trial is not None and trial.result.identical:
-                self.fixed_items = left
-                return self.trials.saving(
-                    trial, self.trials.ratio(trial.model, trial.left)
-                ), trial.edits
-            left.pop()
+        while self.fixes:
+            trial = self._try(self.fixes)
+            if trial is not None and trial.result is not None and trial.result.identical:
+                return self.trials.saving(trial, self.trials.timing(trial)), trial.edits
+            self.fixes.pop()
         return None, ()
 
     def _slim(self, fixed: Saving | None) -> tuple[Saving | None, float | None]:
         """What everything found saves; `fixed` is what all that is to be fixed does."""
         if not self.faults:
             return None, None
-        if fixed is not None and set(self.faults) == set(self.fixed_items):
+        if fixed is not None and set(self.faults) == set(self.fixes):
             return fixed, 0.0
-        try:
-            trial = self.trials.run(self.faults)
-        except NotTriedError:
+        trial = self._try(self.faults)
+        if trial is None or trial.result is None:
             return None, None
         difference = trial.result.difference
-        finite = difference if math.isfinite(difference) else None
-        return self.trials.saving(trial, self.trials.ratio(trial.model, trial.left)), finite
+        saving = self.trials.saving(trial, self.trials.timing(trial))
+        return saving, difference if math.isfinite(difference) else None
 
 
-def _said(candidate: Candidate, names: Sequence[str]) -> str:
+def _place(item: Item) -> ModelPlace:
+    element = item.element
+    assert element is not None
+    line, column = element.document.position(element.start)
+    return ModelPlace(item.name, place_of(element), element.document.path, line, column)
+
+
+def _message(candidate: Candidate, names: Sequence[str]) -> str:
     """Its message, with the first of the names."""
     shown = ", ".join(names[:NAMES])
     if len(names) > NAMES:
@@ -345,8 +315,9 @@ def _said(candidate: Candidate, names: Sequence[str]) -> str:
     return candidate.message.replace("{}", shown)
 
 
-def _label(candidate: Candidate, result: MotionComparison) -> str:
-    if result.identical:
+def _label(candidate: Candidate, trial: PruningTrial) -> str:
+    assert trial.result is not None
+    if trial.result.identical:
         certain = candidate.proof or candidate.is_setting
         return IDENTICAL if certain else UNTOUCHED
-    return EQUAL if result.equal else CHANGES
+    return EQUAL if trial.result.equal else CHANGES

@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 
 from coursebuild.numerics.pruning.edits import set_attributes
-from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.model_text import thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
 from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
@@ -45,13 +45,13 @@ def _tendons(look: PruningContext) -> Iterator[Candidate]:
         return
     used = {
         attribute.value
-        for one in look.scene.elements
+        for one in look.elements
         for attribute in one.attributes
         if attribute.name in _TENDON
     }
     items: list[Item] = []
-    for element in look.scene.elements:
-        thing, name = look.scene.ids(element), element.get("name") or ""
+    for element in look.elements:
+        thing, name = look.text.ids(element), element.get("name") or ""
         if thing is None or thing.kind != "tendon" or name in used or look.readers.named(name):
             continue
         if all(_slack(look.model, number) for number in thing.ids):
@@ -68,33 +68,26 @@ def _tendons(look: PruningContext) -> Iterator[Candidate]:
 
 _TENDON = frozenset(("tendon", "tendon1", "tendon2", "objname", "refname"))
 """Attributes that may name a tendon."""
+_FORCES = (
+    *("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "armature"),
+    "limited",
+)
+"""What makes a tendon exert a force of its own."""
 
 
 def _slack(model: Any, number: int) -> bool:
-    """Whether a tendon exerts no force of its own."""
-    return not any(
-        np.any(values[number])
-        for values in (
-            model.tendon_stiffness,
-            model.tendon_stiffnesspoly,
-            model.tendon_damping,
-            model.tendon_dampingpoly,
-            model.tendon_frictionloss,
-            model.tendon_armature,
-            model.tendon_limited,
-        )
-    )
+    return not any(np.any(getattr(model, f"tendon_{name}")[number]) for name in _FORCES)
 
 
 def _actuators(look: PruningContext) -> Iterator[Candidate]:
     if look.readers.whole("actuator"):
         return
     driven = _driven(look)
-    elements = [one for one in look.scene.elements if thing_kind(one) == "actuator"]
+    elements = [one for one in look.elements if thing_kind(one) == "actuator"]
     free: list[Item] = []
     held: list[Item] = []
     for element in elements:
-        thing = look.scene.ids(element)
+        thing = look.text.ids(element)
         if thing is None or look.readers.named(element.get("name") or ""):
             continue
         if any(number in driven for number in thing.ids):
@@ -121,7 +114,7 @@ def _driven(look: PruningContext) -> set[int]:
     for key in range(model.nkey):
         found |= set(np.nonzero(model.key_ctrl[key])[0].tolist())
     for seen in look.seen:
-        for row in seen.case.scenario.controls:
+        for row in seen.scene.scenario.controls:
             found |= set(np.nonzero(np.array(row))[0].tolist())
     return found
 
@@ -138,41 +131,31 @@ def _forceless(model: Any, number: int) -> bool:
 
 def _excludes_zero(model: Any, number: int) -> bool:
     """Whether a range would raise a command or a force of 0."""
-    ranges = []
-    if model.actuator_ctrllimited[number]:
-        ranges.append(model.actuator_ctrlrange[number])
-    if model.actuator_forcelimited[number]:
-        ranges.append(model.actuator_forcerange[number])
-    return any(low > 0 or high < 0 for low, high in ranges)
+    for name in ("ctrl", "force"):
+        low, high = getattr(model, f"actuator_{name}range")[number]
+        if getattr(model, f"actuator_{name}limited")[number] and (low > 0 or high < 0):
+            return True
+    return False
 
 
 def _fluid(look: PruningContext) -> Iterator[Candidate]:
-    model = look.model
-    options = [one for one in look.scene.elements if one.tag == "option"]
+    opt, names = look.model.opt, ("density", "viscosity", "wind")
     having = {
-        name: one for name in ("density", "viscosity", "wind") for one in options if _has(one, name)
+        name: one
+        for name in names
+        for one in look.elements
+        if one.tag == "option" and one.attribute(name) is not None
     }
-    if not having:
+    if not having or any(look.readers.named(name) for name in names):
         return
-    dense = model.opt.density != 0 or model.opt.viscosity != 0
-    windy = bool(np.any(model.opt.wind != 0))
-    if look.readers.named("density") or look.readers.named("viscosity"):
-        return
-    if look.readers.named("wind"):
-        return
-    if not dense and windy:
+    if opt.density != 0 or opt.viscosity != 0:
+        item = Item("fluid", next(iter(having.values())), options=tuple((n, None) for n in having))
+        proof = "" if look.model.nv else "nothing moves"
+        yield Candidate("fluid", "no body feels the fluid", (item,), proof)
+    elif np.any(opt.wind != 0):
         item = Item("wind", having["wind"], options=(("wind", None),))
         proof = "wind acts through a density or a viscosity, and both are 0"
         yield Candidate("fluid", "there is wind in a vacuum", (item,), proof)
-    elif dense:
-        names = tuple(having)
-        item = Item("fluid", having[names[0]], options=tuple((name, None) for name in names))
-        proof = "" if model.nv else "nothing moves"
-        yield Candidate("fluid", "no body feels the fluid", (item,), proof)
-
-
-def _has(element: Element, name: str) -> bool:
-    return element.attribute(name) is not None
 
 
 # --------------------------------------------------------------------------------------- collisions
@@ -214,8 +197,8 @@ def _geoms(
     far = {geom for pair in apart for geom in pair} - near
     explicit = {int(g) for g in (*look.model.pair_geom1, *look.model.pair_geom2)}
     items = []
-    for element in look.scene.elements:
-        thing = look.scene.ids(element)
+    for element in look.elements:
+        thing = look.text.ids(element)
         if element.tag != "geom" or thing is None or not far.issuperset(thing.ids):
             continue
         if explicit.isdisjoint(thing.ids):
@@ -279,7 +262,7 @@ def _dimensions(look: PruningContext) -> Iterator[Candidate]:
     """Contacts without rolling or torsional friction, and without any."""
     having = [
         one
-        for one in look.scene.elements
+        for one in look.elements
         if one.tag in ("geom", "pair") and (one.get("condim") or "") in ("3", "4", "6")
     ]
     for least, said in (("3", "no torsional or rolling friction"), ("1", "no friction")):

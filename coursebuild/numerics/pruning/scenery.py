@@ -17,14 +17,22 @@ Entry point: `scenery(look)`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
+import mujoco
 import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
 
-from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.markup import Element
+from coursebuild.numerics.pruning.model_text import is_repeated
 from coursebuild.numerics.pruning.reachability import moving_ball
-from coursebuild.numerics.pruning.trees import Bounds, References, Trees, Vector
 from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
+from coursebuild.numerics.pruning.unused import unread_sensors
+
+Vector = NDArray[np.float64]
+Ball = tuple[Vector, float]
+"""Centre and radius, m."""
 
 REGIONS = 5.0
 """Sizes of the region that what matters sweeps, or can reach."""
@@ -34,11 +42,12 @@ MOVES = 10.0
 """Ways that a body goes itself."""
 _VIEWS = frozenset(("camera", "light"))
 """What shows other things, wherever it is."""
+_NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
 
 
 def scenery(look: PruningContext) -> Iterator[Candidate]:
     """Geoms fixed to the world, and bodies that move, far from everything else."""
-    trees = Trees(look, References(look))
+    trees = Trees(look)
     focus = trees.focus()
     if not focus or not look.seen:
         return
@@ -53,13 +62,13 @@ def _bodies(
     far = _out_of_reach(trees, focus, region)
     items: list[Item] = []
     roots: set[int] = set()
-    for element in look.scene.elements:
-        thing = look.scene.ids(element)
+    for element in look.elements:
+        thing = look.text.ids(element)
         if thing is None or thing.kind != "body" or any(b.tag in _VIEWS for b in element.walk()):
             continue
         if far.issuperset(thing.ids):
             roots |= set(thing.ids)
-            items.append(named_item(element, *trees.references.of([element]).loose))
+            items.append(named_item(element, *trees.references([element])[0]))
     if items:
         nearest = min(region.distance(trees.region([root])) for root in roots)
         farthest = max(trees.way(root) for root in roots)
@@ -76,7 +85,6 @@ def _bodies(
             tuple(items),
             _FAR,
             by_runs=True,
-            split=False,
             blocked=blocked,
             doubt=f"{who} may count coordinates or bodies by number" if who else "",
         )
@@ -101,14 +109,7 @@ def _out_of_reach(trees: Trees, focus: frozenset[int], region: Bounds) -> frozen
             least = CLEAR * ball[1] if trees.is_rubble(root) else max(least, REGIONS * 2 * ball[1])
         if away > max(least, MOVES * trees.way(root)):
             far.add(root)
-    size = -1
-    while size != len(far):
-        size = len(far)
-        for a, b in trees.touching:
-            pair = {trees.of_geom[a], trees.of_geom[b]} - {-1}
-            if not pair <= far:
-                far -= pair
-    return frozenset(far)
+    return frozenset(trees.roots - trees.touched_by(trees.roots - far))
 
 
 def _geoms(
@@ -119,13 +120,13 @@ def _geoms(
     ball = moving_ball(model, moving) if focus == trees.roots else None
     items: list[Item] = []
     done: set[Element] = set()
-    for element in look.scene.elements:
+    for element in look.elements:
         if element in done or not _is_scenery(look, trees, element, region, ball):
             continue
-        refers = trees.references.of([element])
-        if not refers.others:
+        loose, others = trees.references([element])
+        if not others:
             done |= set(element.walk())
-            items.append(Item(_name(element), element, (element, *refers.loose)))
+            items.append(named_item(element, *loose))
     if items and not look.readers.whole("shape"):
         message = worded(items, "the geom {}", "the geoms {}")
         message += " of the world can be reached by nothing, and "
@@ -141,14 +142,14 @@ def _is_scenery(
     trees: Trees,
     element: Element,
     region: Bounds,
-    ball: tuple[Vector, float] | None,
+    ball: Ball | None,
 ) -> bool:
     """Whether it is a far geom of the world, or a body of the world with nothing but such geoms."""
     if element.tag not in ("geom", "body"):
         return False
     geoms: set[int] = set()
     for one in element.walk():
-        thing = look.scene.ids(one)
+        thing = look.text.ids(one)
         if one.tag not in ("geom", "body", "inertial", "frame", "replicate") or (
             one.tag in ("geom", "body") and thing is None
         ):
@@ -163,11 +164,7 @@ def _is_scenery(
     return bool(geoms) and all(_is_far(trees, geom, region, ball) for geom in geoms)
 
 
-def _name(element: Element) -> str:
-    return element.get("name") or place_of(element)
-
-
-def _is_far(trees: Trees, geom: int, region: Bounds, ball: tuple[Vector, float] | None) -> bool:
+def _is_far(trees: Trees, geom: int, region: Bounds, ball: Ball | None) -> bool:
     model = trees.model
     body = int(model.geom_bodyid[geom])
     size = float(model.geom_rbound[geom])
@@ -180,3 +177,174 @@ def _is_far(trees: Trees, geom: int, region: Bounds, ball: tuple[Vector, float] 
     if region.distance(near) < REGIONS * region.size:
         return False
     return ball is None or float(np.linalg.norm(place - ball[0])) > ball[1] + size
+
+
+# ------------------------------------------------------------------------ bodies that move together
+
+
+class Bounds(Struct, frozen=True, eq=False):
+    """A region, along the axes of the world."""
+
+    low: Vector
+    high: Vector
+
+    @property
+    def size(self) -> float:
+        """Its diagonal, m."""
+        return float(np.linalg.norm(self.high - self.low))
+
+    def distance(self, other: Bounds) -> float:
+        """Between the nearest points of two, m."""
+        gap = np.maximum(0.0, np.maximum(self.low - other.high, other.low - self.high))
+        return float(np.linalg.norm(gap))
+
+
+class Trees:
+    """Bodies that move together: each by the body at its root."""
+
+    def __init__(self, look: PruningContext) -> None:
+        self.look = look
+        self._unread = set(unread_sensors(look))
+        self._by_name: dict[str, list[Element]] = {}
+        for element in look.elements:
+            for one in element.attributes:
+                if one.name not in _NOT_REFERENCES:
+                    self._by_name.setdefault(one.value, []).append(element)
+        self.model = model = look.model
+        self.of_body = [-1] * model.nbody
+        """The root of the tree that a body is in; −1 for what is fixed to the world."""
+        for body in range(1, model.nbody):
+            above = self.of_body[int(model.body_parentid[body])]
+            moves = model.body_jntnum[body] > 0 or model.body_mocapid[body] >= 0
+            self.of_body[body] = above if above >= 0 else body if moves else -1
+        self.bodies: dict[int, list[int]] = {}
+        for body, root in enumerate(self.of_body):
+            if root >= 0:
+                self.bodies.setdefault(root, []).append(body)
+        self.roots = frozenset(self.bodies)
+        self.of_dof = np.array([self.of_body[int(b)] for b in model.dof_bodyid], dtype=np.int64)
+        self.of_geom = [self.of_body[int(b)] for b in model.geom_bodyid]
+        self.touching = frozenset(pair for seen in look.seen for pair in seen.touching)
+        self.touched = frozenset(geom for pair in self.touching for geom in pair)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        self.place = np.asarray(data.geom_xpos, dtype=np.float64)
+        """(ngeom, 3) m: right for geoms that are fixed to the world."""
+        self._elements: dict[int, list[Element]] = {root: [] for root in self.roots}
+        for element in look.elements:
+            thing = look.text.ids(element)
+            if thing is None or thing.kind not in ("body", "joint", "geom", "site"):
+                continue
+            for root in {self.of_body[self._body(thing.kind, i)] for i in thing.ids} - {-1}:
+                self._elements[root].append(element)
+
+    def _body(self, kind: str, number: int) -> int:
+        model = self.model
+        if kind == "body":
+            return number
+        ids = {"joint": model.jnt_bodyid, "geom": model.geom_bodyid, "site": model.site_bodyid}
+        return int(ids[kind][number])
+
+    def focus(self) -> frozenset[int]:
+        """The trees that the scene is about, and what touches them."""
+        if self.model.nflex:
+            return self.roots
+        found = {root for root in self.roots if self._matters(root)} | self._thrown()
+        for likely in (self._sensed, self._jointed, self._named):
+            if not found:
+                found = {root for root in self.roots if likely(root)}
+        return self.touched_by(found)
+
+    def touched_by(self, roots: Iterable[int]) -> frozenset[int]:
+        """These trees, what touches them in a run, what touches that, and so on."""
+        found = set(roots)
+        pairs = [{self.of_geom[a], self.of_geom[b]} - {-1} for a, b in self.touching]
+        while more := {root for pair in pairs if pair & found for root in pair - found}:
+            found |= more
+        return frozenset(found)
+
+    def _thrown(self) -> set[int]:
+        """Those that a scenario sets in motion."""
+        found: set[int] = set()
+        for case in (seen.scene.scenario for seen in self.look.seen):
+            velocity = np.array(case.qvel)
+            if not case.qvel and case.keyframe >= 0:
+                velocity = self.model.key_qvel[case.keyframe]
+            found |= set(self.of_dof[np.nonzero(velocity)[0]].tolist())
+        return found
+
+    def is_rubble(self, root: int) -> bool:
+        """Whether it is one free body to which nobody gave a name."""
+        return not (self._jointed(root) or self._named(root))
+
+    def _sensed(self, root: int) -> bool:
+        return bool(self.references(self._elements[root])[0])
+
+    def _jointed(self, root: int) -> bool:
+        """Whether it is more than one free body."""
+        first = int(self.model.body_jntadr[root])
+        free = self.model.jnt_type[first] == int(mujoco.mjtJoint.mjJNT_FREE)
+        return len(self.bodies[root]) > 1 or not free
+
+    def _named(self, root: int) -> bool:
+        return any(one.get("name") for one in self._elements[root] if one.tag == "body")
+
+    def _matters(self, root: int) -> bool:
+        if any(int(self.model.body_mocapid[b]) >= 0 for b in self.bodies[root]):
+            return True
+        elements = self._elements[root]
+        names = {one.get("name") for one in elements} - {None, ""}
+        if any(self.look.readers.named(str(name)) for name in names):
+            return True
+        return bool(self.references(elements)[1])
+
+    def region(self, roots: Iterable[int]) -> Bounds:
+        """What trees sweep in all the runs."""
+        bodies = [b for root in roots for b in self.bodies[root]]
+        sizes = np.array([self._size(b) for b in bodies])[:, None]
+        low = np.min([s.low[bodies] - sizes for s in self.look.seen], axis=(0, 1))
+        high = np.max([s.high[bodies] + sizes for s in self.look.seen], axis=(0, 1))
+        return Bounds(low, high)
+
+    def way(self, root: int) -> float:
+        """How far a tree's bodies go in a run, m."""
+        bodies = self.bodies[root]
+        return max(
+            float(np.max(np.linalg.norm(s.high[bodies] - s.low[bodies], axis=1)))
+            for s in self.look.seen
+        )
+
+    def _size(self, body: int) -> float:
+        """Of a ball about the body's centre of mass that holds its geoms, m."""
+        model = self.model
+        start, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
+        most = 0.0
+        for geom in range(start, start + count):
+            away = float(np.linalg.norm(model.geom_pos[geom] - model.body_ipos[body]))
+            most = max(most, away + float(model.geom_rbound[geom]))
+        return most
+
+    def references(self, elements: Iterable[Element]) -> tuple[list[Element], list[Element]]:
+        """What refers to elements by their names, from outside of them.
+
+        First what would go with them (unread sensors, excluded and explicit pairs), then what needs
+        them.
+        """
+        below = {one: None for element in elements for one in element.walk()}
+        found = [one for element in below for one in self._naming(element) if one not in below]
+        loose = [one for one in found if one in self._unread or _is_pair(one)]
+        return loose, [one for one in found if one not in loose]
+
+    def _naming(self, element: Element) -> list[Element]:
+        name = element.get("name")
+        if not name:
+            return []
+        found = self._by_name.get(name, [])
+        if is_repeated(element):
+            longer = (key for key in self._by_name if key.startswith(name) and key[-1].isdigit())
+            found = [*found, *(one for key in longer for one in self._by_name[key])]
+        return found
+
+
+def _is_pair(element: Element) -> bool:
+    return element.above is not None and element.above.tag == "contact"

@@ -1,6 +1,6 @@
 """What could be left out of a model, and models without it, run and timed beside the original.
 
-Entry points: `Candidate`, `Item`, `PruningContext`; `PruningTrials`.
+Entry points: `Candidate`, `Item`, `PruningContext`; `Trials`.
 
 1. A candidate is a kind of thing that may be in vain, with every place where the model has it. Why
    it must be in vain whatever happens is its `proof`; without one only runs speak for it.
@@ -17,18 +17,19 @@ import mujoco
 from msgspec import Struct
 
 from coursebuild.numerics.engine import initial_data
-from coursebuild.numerics.pruning.compare import Case, MotionComparison, Seen, compare
+from coursebuild.numerics.pruning.compare import MotionComparison, Seen, compare
 from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove, set_options
-from coursebuild.numerics.pruning.mapping import Gone, fits, mapping_without, transfer
-from coursebuild.numerics.pruning.mapping import Mapping as Left
+from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import ModelText, saved
 from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.reports.diet import Saving
+from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import (
     STATE,
     Clock,
     Stepped,
+    Timing,
     full_state,
     moments,
     time_ratio,
@@ -63,9 +64,6 @@ class Candidate(Struct, frozen=True, eq=False):
     """Whether nothing is taken out: only the time that it saves speaks for it."""
     by_runs: bool = False
     """Whether runs are enough, in full length; the proof only says what they show."""
-    split: bool = True
-    """Whether to look for those of its items without which every bit is the same, where that is
-    not so of all together."""
     timed: bool = True
     """Whether it may change the time of a step."""
     blocked: str = ""
@@ -77,20 +75,23 @@ class Candidate(Struct, frozen=True, eq=False):
 class PruningContext(Struct, frozen=True, eq=False):
     """All that is known before anything is tried."""
 
-    scene: ModelText
+    text: ModelText
     readers: Readers
     seen: tuple[Seen, ...]
     """Of the scenarios that went well."""
     used_keyframes: frozenset[int]
-    declared: bool
-    """Whether `models/NAME.toml` declares scenarios."""
     numbered: frozenset[str]
-    """What these give by number: `qpos`, `qvel`, `controls`."""
+    """What scenarios give by number: `qpos`, `qvel`, `controls`."""
 
     @property
     def model(self) -> Any:
         """The whole model, compiled."""
-        return self.scene.model
+        return self.text.model
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """All elements of its files."""
+        return self.text.elements
 
 
 def worded(items: Sequence[Item], one: str, many: str) -> str:
@@ -111,36 +112,23 @@ class PruningTrial(Struct, frozen=True, eq=False):
 
     edits: tuple[ModelEdit, ...]
     model: Any
-    left: Left
-    result: MotionComparison
-
-
-class Ratio(Struct, frozen=True):
-    """How much faster a model is than another."""
-
-    value: float
-    """Over 1 where it is faster."""
-    spread: float
-    """Its standard error, relative."""
-
-    @property
-    def certain(self) -> bool:
-        """Whether it is another than 1 beyond what the measurement can tell."""
-        return abs(self.value - 1.0) > max(0.03, 2 * self.spread)
+    index: IndexMap
+    result: MotionComparison | None
+    """`None` where it was not compared yet."""
 
 
 class NotTriedError(Exception):
     """A change that makes no model, or one that cannot be compared."""
 
 
-class PruningTrials:
+class Trials:
     """Tries a model without things, in its scenarios."""
 
     def __init__(
-        self, scene: ModelText, cases: Sequence[Case], clock: Clock, *, quick: bool
+        self, text: ModelText, scenes: Sequence[Scene], clock: Clock | None, *, quick: bool
     ) -> None:
-        self.scene = scene
-        self.cases = cases
+        self.text = text
+        self.scenes = scenes
         self.clock = clock
         self.quick = quick
 
@@ -150,99 +138,91 @@ class PruningTrials:
         Raises:
             NotTriedError: it is no model, or cannot be compared.
         """
-        edits, model, left = self.changed(items)
-        return PruningTrial(edits, model, left, self.compared(model, left))
+        return self.compared(self.changed(items))
 
-    def changed(self, items: Iterable[Item]) -> tuple[tuple[ModelEdit, ...], Any, Left]:
-        """The edits without these, the model that they give, and what is left of the original.
+    def changed(self, items: Iterable[Item]) -> PruningTrial:
+        """The model without these, not compared yet.
 
         Raises:
             NotTriedError: it is no model, or not the one that it should be.
         """
-        scene = self.scene
-        edits, gone = change(scene, items)
-        left = mapping_without(scene.model, gone)
+        edits, gone = changes(self.text, list(items))
+        index = index_map(self.text.model, gone)
         try:
-            model = scene.compiled(edits)
+            model = self.text.compiled(edits)
         except ValueError as error:
             raise NotTriedError(" ".join(str(error).split())) from None
-        if not fits(left, scene.model, model):
+        if not fits(index, self.text.model, model):
             raise NotTriedError("what is left cannot be told from what is gone")
-        return edits, model, left
+        return PruningTrial(edits, model, index, None)
 
-    def compared(self, model: Any, left: Left) -> MotionComparison:
+    def compared(self, trial: PruningTrial) -> PruningTrial:
         """How a changed model does.
 
         Raises:
             NotTriedError: that cannot be compared.
         """
         try:
-            return compare(self.scene.model, model, left, self.cases)
+            result = compare(self.text.model, trial.model, trial.index, self.scenes)
         except (ValueError, mujoco.FatalError) as error:
             raise NotTriedError(" ".join(str(error).split())) from None
+        return PruningTrial(trial.edits, trial.model, trial.index, result)
 
-    def ratio(self, model: Any, left: Left) -> Ratio | None:
+    def timing(self, trial: PruningTrial) -> Timing | None:
         """Time of the original over that of a changed model; `None` where it cannot be told."""
-        whole = self.scene.model
+        if self.clock is None:
+            return None
+        whole, model = self.text.model, trial.model
         data, other = mujoco.MjData(whole), mujoco.MjData(model)
         states = []
         try:
             for state in self._states:
                 mujoco.mj_setState(whole, data, state, STATE)
-                transfer(whole, data, left, model, other)
+                transfer(whole, data, trial.index, model, other)
                 states.append(full_state(model, other))
             one, two = Stepped(whole, data, self._states), Stepped(model, other, states)
-            found = time_ratio(one, two, self.clock, quick=self.quick)
+            return time_ratio(one, two, self.clock, quick=self.quick)
         except (ValueError, mujoco.FatalError):
             return None
-        return None if found is None else Ratio(found.ratio, found.uncertainty)
 
     @cached_property
     def _states(self) -> list[Any]:
         """States of the original, from which steps are timed."""
-        model = self.scene.model
-        setups = [case.setup for case in self.cases]
-        return [s for one in setups for s in moments(model, initial_data(one, model), one)]
+        model = self.text.model
+        found = []
+        for scene in self.scenes:
+            found += moments(model, initial_data(scene.scenario, model), scene.scenario)
+        return found
 
-    def saving(self, trial: PruningTrial, ratio: Ratio | None) -> Saving:
+    def saving(self, trial: PruningTrial, timing: Timing | None) -> Saving:
         """What a change saves, in time and bytes."""
-        files = self.scene.files(trial.edits)
-        before = {one.path: len(one.data) for one in self.scene.documents}
+        before = {one.path: len(one.data) for one in self.text.documents}
+        files = self.text.files(trial.edits)
         text = sum(before[path] - len(data) for path, data in files.items())
-        memory = len(saved(self.scene.model)) - len(saved(trial.model))
-        if ratio is None:
+        memory = len(saved(self.text.model)) - len(saved(trial.model))
+        if timing is None:
             return Saving(None, None, False, memory, text)
-        return Saving(ratio.value, ratio.spread, ratio.certain, memory, text)
+        return Saving(timing.ratio, timing.uncertainty, timing.certain, memory, text)
 
 
-# ----------------------------------------------------------------------------------------- changes
-
-
-def change(scene: ModelText, items: Iterable[Item]) -> tuple[tuple[ModelEdit, ...], Gone]:
+def changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Gone]:
     """All the edits that items make together, and what they take out of the compiled model."""
-    some = list(items)
-    gone = list(dict.fromkeys(one for item in some for one in item.gone))
-    below = [one for element in gone for one in element.walk()]
-    lost = Gone(
-        scene.ids_of(below, "body"),
-        scene.ids_of(below, "geom"),
-        scene.ids_of(below, "sensor"),
-        scene.ids_of(below, "actuator"),
-    )
-    edits = [*remove(gone), *_keyframes(scene, lost, set(below))]
-    edits += [edit for item in some for edit in item.edits]
-    options = dict(pair for item in some for pair in item.options)
-    flags = dict(pair for item in some for pair in item.flags)
+    elements = list(dict.fromkeys(one for item in items for one in item.gone))
+    below = [one for element in elements for one in element.walk()]
+    gone = Gone(*(text.ids_of(below, kind) for kind in ("body", "geom", "sensor", "actuator")))
+    edits = [*remove(elements), *_keyframes(text, gone, set(below))]
+    edits += [edit for item in items for edit in item.edits]
+    options = dict(pair for item in items for pair in item.options)
+    flags = dict(pair for item in items for pair in item.flags)
     if options or flags:
-        edits += set_options(scene.main, tuple(options.items()), tuple(flags.items()))
-    return _outermost(edits), lost
+        edits += set_options(text.main, tuple(options.items()), tuple(flags.items()))
+    return _outermost(edits), gone
 
 
 def _outermost(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
     """Without those inside of what another one takes out."""
-    some = sorted(set(edits), key=lambda one: (one.path, one.start, -one.end))
     found: list[ModelEdit] = []
-    for edit in some:
+    for edit in sorted(set(edits), key=lambda one: (one.path, one.start, -one.end)):
         last = found[-1] if found else None
         inside = last is not None and last.path == edit.path and not last.new
         if last is None or not (inside and last.start <= edit.start and edit.end <= last.end):
@@ -250,24 +230,23 @@ def _outermost(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
     return tuple(found)
 
 
-def _keyframes(scene: ModelText, gone: Gone, removed: set[Element]) -> Sequence[ModelEdit]:
+def _keyframes(text: ModelText, gone: Gone, removed: set[Element]) -> Sequence[ModelEdit]:
     """Keyframes list a number for every coordinate: those of what is gone go too."""
     if not (gone.bodies or gone.actuators):
         return ()
-    model = scene.model
-    left = mapping_without(model, gone)
+    model, left = text.model, index_map(text.model, gone)
 
-    def lost(size: int, kept: Any) -> frozenset[int]:
-        return frozenset(range(size)) - frozenset(kept.tolist())
+    def lost(size: int, kept: Any, width: int = 1) -> frozenset[int]:
+        things = frozenset(range(size)) - frozenset(kept.tolist())
+        return frozenset(width * thing + k for thing in things for k in range(width))
 
-    mocap = lost(model.nmocap, left.mocap)
     places = {
         "qpos": lost(model.nq, left.qpos),
         "qvel": lost(model.nv, left.dof),
         "act": lost(model.na, left.act),
         "ctrl": lost(model.nu, left.ctrl),
-        "mpos": frozenset(3 * i + k for i in mocap for k in range(3)),
-        "mquat": frozenset(4 * i + k for i in mocap for k in range(4)),
+        "mpos": lost(model.nmocap, left.mocap, 3),
+        "mquat": lost(model.nmocap, left.mocap, 4),
     }
-    keys = [one for one in scene.elements if one.tag == "key" and one not in removed]
+    keys = [one for one in text.elements if one.tag == "key" and one not in removed]
     return [e for key in keys for name, at in places.items() for e in drop_numbers(key, name, at)]

@@ -1,6 +1,7 @@
 """Things of a model that nothing uses: assets, classes, sites, keyframes, sensors, flags.
 
-Entry point: `unused(look, kept)`.
+Entry points: `unused(look, kept)`; `meshes(look)`, that are only looked at, where a primitive has
+the same shape.
 
 References inside the model are found by the attributes that can hold one; whether that was all of
 them is told by MuJoCo, which does not compile a model without a thing that something names.
@@ -8,10 +9,16 @@ them is told by MuJoCo, which does not compile a model without a thing that some
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator
 from pathlib import PurePosixPath
+from typing import Any
 
-from coursebuild.numerics.pruning.markup import Element
+import mujoco
+import numpy as np
+
+from coursebuild.numerics.pruning.edits import ModelEdit, drop_attribute, set_attributes
+from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import thing_kind
 from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
 
@@ -26,10 +33,9 @@ Kept = Callable[[str, str], bool]
 
 def unused(look: PruningContext, kept: Kept) -> Iterator[Candidate]:
     """What nothing refers to and nobody reads."""
-    assets = _Assets(look, kept)
-    yield from assets.candidates()
+    yield from _assets(look, kept)
     yield from _some("unused-default", "no element is of the {}", _classes(look), _UNNAMED, "class")
-    sensors = _sensors(look)
+    sensors = [named_item(one) for one in unread_sensors(look)]
     yield from _some("sensor-unread", "nobody reads the {}", sensors, _UNREAD, "sensor")
     gone = [i.gone[0] for i in sensors if not kept("sensor-unread", i.name)]
     sites = _sites(look, gone)
@@ -54,45 +60,37 @@ def _some(kind: str, message: str, items: list[Item], proof: str, what: str) -> 
 _PLURALS = {"class": "classes", "mesh": "meshes"}
 
 
-class _Assets:
+def _assets(look: PruningContext, kept: Kept) -> Iterator[Candidate]:
     """Assets, from those that elements refer to down to those that assets refer to."""
-
-    def __init__(self, look: PruningContext, kept: Kept) -> None:
-        self._look = look
-        self._kept = kept
-        self._gone: list[Element] = []
-
-    def candidates(self) -> Iterator[Candidate]:
-        for kind, attributes in (
-            ("material", ("material",)),
-            ("texture", ("texture", "material")),
-            ("mesh", ("mesh",)),
-            ("hfield", ("hfield",)),
-            ("model", ("model",)),
-        ):
-            items = list(self._unused(kind, (*attributes, "objname")))
-            found = f"unused-{kind}"
-            self._gone += [i.gone[0] for i in items if not self._kept(found, i.name)]
-            yield from _some(found, "nothing uses the {}", items, _UNNAMED, kind)
-
-    def _unused(self, kind: str, attributes: Collection[str]) -> Iterator[Item]:
-        look = self._look
-        for element in look.scene.elements:
-            above = element.above
-            if element.tag != kind or above is None or above.tag != "asset":
-                continue
+    gone: list[Element] = []
+    for kind, attributes in (
+        ("material", ("material",)),
+        ("texture", ("texture", "material")),
+        ("mesh", ("mesh",)),
+        ("hfield", ("hfield",)),
+        ("model", ("model",)),
+    ):
+        items = []
+        for element in look.elements:
             name = asset_name(element)
-            if not name or element.get("type") == "skybox":
+            if not _is_asset(element, kind) or not name or element.get("type") == "skybox":
                 continue
             if look.readers.named(name) or (kind != "model" and look.readers.whole(kind)):
                 continue
             using = [
                 one
-                for one in look.scene.elements
-                if one is not element and any(one.get(a) == name for a in attributes)
+                for one in look.elements
+                if one is not element and any(one.get(a) == name for a in (*attributes, "objname"))
             ]
-            if all(one in self._gone for one in using):
-                yield Item(name, element, (element, *using))
+            if all(one in gone for one in using):
+                items.append(Item(name, element, (element, *using)))
+        found = f"unused-{kind}"
+        gone += [item.gone[0] for item in items if not kept(found, item.name)]
+        yield from _some(found, "nothing uses the {}", items, _UNNAMED, kind)
+
+
+def _is_asset(element: Element, kind: str) -> bool:
+    return element.tag == kind and element.above is not None and element.above.tag == "asset"
 
 
 def asset_name(element: Element) -> str:
@@ -108,13 +106,13 @@ def _classes(look: PruningContext) -> list[Item]:
     """Default classes that neither they nor one below them is used."""
     used = {
         value
-        for one in look.scene.elements
+        for one in look.elements
         for value in (one.get("childclass"), one.get("class") if one.tag != "default" else None)
         if value is not None
     }
     found: list[Item] = []
     taken: set[Element] = set()
-    for element in look.scene.elements:
+    for element in look.elements:
         if element.tag != "default" or element in taken:
             continue
         name, above = element.get("class"), element.above
@@ -133,12 +131,12 @@ def _sites(look: PruningContext, gone: Collection[Element]) -> list[Item]:
     if look.readers.whole("site"):
         return []
     using: dict[str, list[Element]] = {}
-    for one in look.scene.elements:
+    for one in look.elements:
         for attribute in one.attributes:
             if attribute.name in _SITE:
                 using.setdefault(attribute.value, []).append(one)
     found = []
-    for one in look.scene.elements:
+    for one in look.elements:
         name = one.get("name") or ""
         if one.tag != "site" or thing_kind(one) != "site" or look.readers.named(name):
             continue
@@ -149,7 +147,11 @@ def _sites(look: PruningContext, gone: Collection[Element]) -> list[Item]:
 
 
 def _keyframes(look: PruningContext) -> Iterator[Candidate]:
-    keys = [one for one in look.scene.elements if one.tag == "key" and _in_keyframe(one)]
+    keys = [
+        one
+        for one in look.elements
+        if one.tag == "key" and one.above is not None and one.above.tag == "keyframe"
+    ]
     if look.readers.whole("keyframe") or look.readers.whole("keyframe-number"):
         return
     if len(keys) != look.model.nkey:
@@ -163,14 +165,6 @@ def _keyframes(look: PruningContext) -> Iterator[Candidate]:
     yield from _some("unused-keyframe", "nothing begins at the {}", items, proof, "keyframe")
 
 
-def _in_keyframe(element: Element) -> bool:
-    return element.above is not None and element.above.tag == "keyframe"
-
-
-def _sensors(look: PruningContext) -> list[Item]:
-    return [named_item(one) for one in unread_sensors(look)]
-
-
 _UNREAD = "what a sensor says changes nothing that moves"
 
 
@@ -180,23 +174,124 @@ def unread_sensors(look: PruningContext) -> list[Element]:
         return []
     return [
         one
-        for one in look.scene.elements
+        for one in look.elements
         if thing_kind(one) == "sensor" and not look.readers.named(one.get("name") or "")
     ]
 
 
 def _flags(look: PruningContext) -> Iterator[Candidate]:
-    for flag, what in (("energy", "energy"), ("fwdinv", "fwdinv")):
-        having = [
-            one
-            for one in look.scene.elements
-            if one.tag == "flag" and one.get(flag) == "enable" and one.above is not None
-        ]
-        if not having or look.readers.whole(what):
+    for flag, said in (
+        ("energy", "energy is computed in every step, and nobody reads it"),
+        ("fwdinv", "forward and inverse dynamics are compared in every step, for nobody"),
+    ):
+        having = [one for one in look.elements if one.tag == "flag" and one.get(flag) == "enable"]
+        if having and not look.readers.whole(flag):
+            item = Item(flag, having[-1], flags=((flag, None),))
+            yield Candidate(f"{flag}-flag", said, (item,), "it is computed beside the motion")
+
+
+# ------------------------------------------------------------------------- meshes to be looked at
+
+SHARE = 0.02
+"""Of its size and its volume, by which a primitive may be another shape than a mesh."""
+_SHAPES = ("box", "sphere", "cylinder", "ellipsoid", "capsule")
+_PLACED = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "fromto", "size", "mesh", "type")
+_MOST = 100
+"""Geoms that are tried; each is compiled a few times."""
+
+
+def meshes(look: PruningContext) -> Iterator[Candidate]:
+    """Geoms that only show a mesh, and could be a primitive: MuJoCo itself fits one.
+
+    The fitted one has the mesh's inertia; it does where its volume and its box are the mesh's too.
+    """
+    items: list[Item] = []
+    for element, geom in list(_shown_meshes(look))[:_MOST]:
+        for shape in _SHAPES:
+            try:
+                other = look.text.compiled(set_attributes(element, (("type", shape),)))
+            except ValueError:
+                continue
+            if other.ngeom == look.model.ngeom and _alike(look.model, other, geom, shape):
+                edits = _as_primitive(element, shape, other, geom)
+                name = element.get("name") or place_of(element)
+                items.append(Item(name, element, _unshared(look, element), edits))
+                break
+    if items:
+        yield Candidate(
+            "mesh-primitive",
+            worded(items, "the geom {} is", "the geoms {} are")
+            + " a mesh with the shape of a primitive",
+            tuple(items),
+            "it is only looked at",
+            timed=False,
+            blocked="whether the shape is near enough to look at is for a person to say",
+        )
+
+
+def _shown_meshes(look: PruningContext) -> Iterator[tuple[Element, int]]:
+    """Geoms that are meshes of their own, and touch nothing."""
+    model = look.model
+    paired = {int(g) for g in (*model.pair_geom1, *model.pair_geom2)}
+    for element in look.elements:
+        thing, name = look.text.ids(element), element.get("mesh")
+        if element.tag != "geom" or not name or thing is None or len(thing.ids) != 1:
             continue
-        said = {
-            "energy": "energy is computed in every step, and nobody reads it",
-            "fwdinv": "forward and inverse dynamics are compared in every step, for nobody",
-        }[flag]
-        item = Item(flag, having[-1], flags=((flag, None),))
-        yield Candidate(f"{flag}-flag", said, (item,), "it is computed beside the motion")
+        (geom,) = thing.ids
+        touches = model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in paired
+        held = element.above is not None and element.above.tag in ("body", "worldbody")
+        is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
+        if is_mesh and held and not touches and not look.readers.reads("mesh", name):
+            yield element, geom
+
+
+def _alike(model: Any, other: Any, geom: int, shape: str) -> bool:
+    size = other.geom_size[geom].tolist()
+    box, fitted = model.geom_aabb[geom], other.geom_aabb[geom]
+    same_box = np.allclose(box, fitted, rtol=0, atol=SHARE * max(size))
+    volume = _mesh_volume(model, int(model.geom_dataid[geom]))
+    return bool(same_box and math.isclose(_volume(shape, *size), volume, rel_tol=SHARE))
+
+
+def _mesh_volume(model: Any, mesh: int) -> float:
+    """m³: of the tetrahedra from the origin to each face."""
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    start, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    points = np.asarray(model.mesh_vert[first : first + count], dtype=np.float64)
+    corners = points[model.mesh_face[start : start + faces]]
+    return abs(float(np.linalg.det(corners).sum())) / 6
+
+
+def _volume(shape: str, a: float, b: float, c: float) -> float:
+    """m³."""
+    return {
+        "box": 8 * a * b * c,
+        "sphere": 4 / 3 * math.pi * a**3,
+        "cylinder": 2 * math.pi * a**2 * b,
+        "capsule": math.pi * a**2 * (2 * b + 4 / 3 * a),
+        "ellipsoid": 4 / 3 * math.pi * a * b * c,
+    }[shape]
+
+
+def _as_primitive(element: Element, shape: str, other: Any, geom: int) -> tuple[ModelEdit, ...]:
+    def text(numbers: Any) -> str:
+        return " ".join(f"{float(number):.9g}" for number in numbers)
+
+    count = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(shape, 3)
+    values = {
+        "type": shape,
+        "size": text(other.geom_size[geom][:count]),
+        "pos": text(other.geom_pos[geom]),
+        "quat": text(other.geom_quat[geom]),
+    }
+    drops = [a.name for a in element.attributes if a.name in _PLACED and a.name not in values]
+    edits = set_attributes(element, values.items())
+    return (*edits, *(drop_attribute(element, name) for name in drops))
+
+
+def _unshared(look: PruningContext, element: Element) -> tuple[Element, ...]:
+    """The mesh, if nothing else shows it."""
+    name = element.get("mesh")
+    if any(one.get("mesh") == name for one in look.elements if one is not element):
+        return ()
+    return tuple(one for one in look.elements if _is_asset(one, "mesh") and asset_name(one) == name)

@@ -119,7 +119,7 @@ def chart(report: ScenarioReport, quantity: Quantity) -> Chart:
     timed = any(_positive(row.cost) for row in rows)
     usual = usual_setting(rows)
     kind = None if usual is None else _kind(usual)
-    names = sorted({row.setting.integrator for row in rows}, key=_rank)
+    names = sorted({row.setting.integrator for row in rows}, key=integrator_rank)
     stable = {one.integrator: one.largest for one in report.stable}
     others = [name for name in names if name not in KNOWN]
     lines = []
@@ -151,7 +151,8 @@ def is_cut_short(report: ScenarioReport) -> bool:
     return any(math.isclose(one.searched[1], longest, rel_tol=1e-9) for one in report.stable)
 
 
-def _rank(name: str) -> tuple[int, str]:
+def integrator_rank(name: str) -> tuple[int, str]:
+    """By which integrators are told: those of MuJoCo in their order, then others by name."""
     return (KNOWN.index(name) if name in KNOWN else len(KNOWN), name)
 
 

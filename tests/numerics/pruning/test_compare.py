@@ -9,46 +9,59 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.core.model.scenarios import Declarations
+from coursebuild.core.model.scenarios import Declarations, Visible
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.compare import TOLERANCE, Case, cases, compare, watch
-from coursebuild.numerics.pruning.mapping import Gone, Mapping, fits, mapping_without, transfer
+from coursebuild.numerics.pruning.compare import (
+    TOLERANCE,
+    compare,
+    pruning_scenes,
+    steps_of,
+    watch,
+)
+from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
+from coursebuild.numerics.scene import Scene
 
 DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
   </body></worldbody><keyframe><key qpos="-1.4 .5"/></keyframe></mujoco>"""
-CHAOS = Case("go", Scenario(30.0, 0.1, keyframe=0), 15_000)
-STILL = Scenario(1.0, 0.1)
+
+
+def lasting(duration: float, keyframe: int = -1) -> Scene:
+    scenario = Scenario(duration, 0.002, keyframe=keyframe)
+    return Scene("go", "go", scenario, (0.002,), 0.002, Visible(), None)
+
+
+CHAOS, SHORT = lasting(15.0, 0), lasting(1.0, 0)
 
 
 def double(mass: float = 1.0) -> Any:
     return mujoco.MjModel.from_xml_string(DOUBLE.format(mass=mass))
 
 
-def same(model: Any) -> Mapping:
-    return mapping_without(model, Gone())
+def same(model: Any) -> IndexMap:
+    return index_map(model, Gone())
 
 
 def test_chaos_is_no_difference() -> None:
-    """After 30 s the trajectories have nothing in common; within 50 ms they are one."""
+    """After 15 s the trajectories are far apart for that; within 50 ms they are one."""
     one, other = double(), double(1.0 + 1e-13)
     found = compare(one, other, same(one), [CHAOS])
     assert not found.identical and found.equal and 0 < found.difference < 1e-11
     ends = []
     for model in (one, other):
-        data = initial_data(CHAOS.setup, model)
-        mujoco.mj_step(model, data, CHAOS.steps)
+        data = initial_data(CHAOS.scenario, model)
+        mujoco.mj_step(model, data, 7500)
         ends.append(data.qpos.copy())
-    assert np.max(np.abs(ends[0] - ends[1])) > 1e-3
+    assert np.max(np.abs(ends[0] - ends[1])) > 1e5 * found.difference
 
 
 def test_the_same_and_another_model() -> None:
     one = double()
-    assert compare(one, double(), same(one), [CHAOS]) == compare(one, one, same(one), [])
-    other = compare(one, double(1.001), same(one), [CHAOS])
+    assert compare(one, double(), same(one), [SHORT]) == compare(one, one, same(one), [])
+    other = compare(one, double(1.001), same(one), [SHORT])
     assert not other.identical and not other.equal and TOLERANCE < other.difference < 1
 
 
@@ -67,9 +80,9 @@ def test_contacts_count_though_nothing_moves() -> None:
     one = mujoco.MjModel.from_xml_string(text.format("a", "b"))
     other = mujoco.MjModel.from_xml_string(text.format("a", "b"))
     other.geom_contype[0] = other.geom_conaffinity[0] = 0
-    case = Case("rest", STILL, 1)
-    assert compare(one, one, same(one), [case]).identical
-    found = compare(one, other, same(one), [case])
+    scene = lasting(0.002)
+    assert compare(one, one, same(one), [scene]).identical
+    found = compare(one, other, same(one), [scene])
     assert not found.identical
 
 
@@ -77,10 +90,10 @@ def test_what_a_run_shows() -> None:
     text = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .3"><freejoint/>
       <geom size=".1"/></body></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
-    seen = watch(model, Case("fall", STILL, 500))
+    seen = watch(model, lasting(1.0))
     assert seen.judgement.ok and seen.touching == {(0, 1)} and seen.constrained
     assert seen.high[1, 2] == pytest.approx(0.3) and seen.low[1, 2] < 0.11
-    seen = watch(model, Case("fall", STILL, 50))
+    seen = watch(model, lasting(0.1))
     assert not seen.touching and not seen.constrained
 
 
@@ -95,26 +108,13 @@ FULL = """<mujoco><worldbody>
   </sensor></mujoco>"""
 
 
-def test_what_is_left_of_a_model() -> None:
-    model = mujoco.MjModel.from_xml_string(FULL)
-    body = model.body("a").id
-    left = mapping_without(
-        model, Gone(frozenset({body}), frozenset(), frozenset({0}), frozenset({1}))
-    )
-    assert left.qpos.tolist() == [11] and left.dof.tolist() == [9]
-    assert left.act.tolist() == [1] and left.ctrl.tolist() == [0, 2]
-    assert left.sensor.tolist() == [3, 4, 5, 6, 7] and left.mocap.tolist() == [0, 1]
-    assert left.body.tolist() == [0, 1, 2, 5] and left.geom.tolist() == [2] and not left.equal
-    assert not fits(left, model, model) and fits(same(model), model, model)
-
-
 def test_a_state_is_brought_over() -> None:
     model = mujoco.MjModel.from_xml_string(FULL)
     spec = mujoco.MjSpec.from_string(FULL)
     spec.delete(spec.sensors[0])
     spec.delete(spec.body("a"))
     other = spec.compile()
-    left = mapping_without(model, Gone(frozenset({model.body("a").id}), sensors=frozenset({0})))
+    left = index_map(model, Gone(frozenset({model.body("a").id}), sensors=frozenset({0})))
     assert fits(left, model, other)
     data, into = mujoco.MjData(model), mujoco.MjData(other)
     data.qpos[:], data.qvel[:] = range(12), range(10)
@@ -137,17 +137,16 @@ def test_scenarios_as_the_author_wrote_them() -> None:
     model = mujoco.MjModel.from_xml_string(FULL)
     text = """[[scenario]]\nname = "push"\nduration = 1\nsample = 0.1\nhold = 0.2
 controls = [[1, 0, 0], [2, 0, 0]]\nqvel = [0, 0, 0, 0, 0, 0, 0, 0, 0, 5]\n"""
-    (case,) = cases(model, declared(text), quick=False)
-    assert (case.name, case.steps, case.hold, case.declared) == ("push", 500, 100, True)
-    given = {step: case.command(step) for step in range(case.steps)}
-    assert [(step, row[0]) for step, row in given.items() if row] == [(0, 1), (100, 2)]
-    assert case.scenario.qvel[-1] == 5
-    (short,) = cases(model, declared(text), quick=True)
-    assert short.steps == 250
+    (scene,) = pruning_scenes(model, declared(text))
+    assert (scene.name, scene.scenario.qvel[-1]) == ("push", 5)
+    given = [(step, command[0]) for step, command in steps_of(scene)]
+    assert given == [(step, 1 if step < 100 else 2) for step in range(500)]
+    (short,) = pruning_scenes(model, declared(text), quick=True)
+    assert len(list(steps_of(short))) == 250
 
 
 def test_scenarios_where_none_is_written() -> None:
-    names = [case.name for case in cases(double(), None, quick=True)]
+    names = [scene.name for scene in pruning_scenes(double(), None, quick=True)]
     assert names == ["keyframe-0"]
-    (still,) = cases(mujoco.MjModel.from_xml_string("<mujoco/>"), None, quick=True)
-    assert (still.scenario.keyframe, still.steps) == (-1, 10)
+    (still,) = pruning_scenes(mujoco.MjModel.from_xml_string("<mujoco/>"), None, quick=True)
+    assert (still.scenario.keyframe, len(list(steps_of(still)))) == (-1, 10)

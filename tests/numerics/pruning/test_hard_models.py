@@ -102,16 +102,6 @@ def test_what_is_new_is_written_into_the_models_own_file() -> None:
     whole(files)
 
 
-def test_an_include_that_is_not_to_be_changed() -> None:
-    files = {
-        PATH: '<mujoco><include file="b.xml"/><worldbody><geom size="1"/></worldbody></mujoco>',
-        "models/b.xml": "<x><sensor><clock/></sensor><option/></x>",
-    }
-    _, survey = tried(files, locked={"models/b.xml": "models/c.xml uses models/b.xml too"})
-    assert found(survey)["sensor-unread"].unfixed == "models/c.xml uses models/b.xml too"
-    assert survey.edits == ()
-
-
 @pytest.mark.parametrize(
     ("files", "words"),
     [
@@ -325,14 +315,13 @@ def random_model(random: np.random.Generator) -> str:
 """
 
 
-@pytest.mark.parametrize("seed", range(14))
-def test_random_models_move_as_before(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    text = random_model(random)
-    survey, left = whole(text, lesson='data.actuator("drive")' if seed % 2 else "")
-    if survey.seen[0].judgement.ok:
-        assert "c1" not in left and "m1" not in left
-    else:
-        assert left == text
-    for finding in survey.findings:
-        assert finding.label == IDENTICAL or not finding.fixable
+def test_random_models_move_as_before() -> None:
+    for seed in range(8):
+        text = random_model(np.random.default_rng(seed))
+        survey, left = whole(text, lesson='data.actuator("drive")' if seed % 2 else "")
+        if survey.seen[0].judgement.ok:
+            assert "c1" not in left and "m1" not in left, seed
+        else:
+            assert left == text, seed
+        for finding in survey.findings:
+            assert finding.label == IDENTICAL or not finding.fixable, seed

@@ -7,11 +7,8 @@ import pytest
 from coursebuild.numerics.pruning.edits import (
     ModelEdit,
     apply_edits,
-    drop_attribute,
     drop_numbers,
-    merge_edits,
     remove,
-    set_attributes,
     set_options,
 )
 from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup, place_of
@@ -116,6 +113,7 @@ def test_what_is_no_xml_is_refused(text: str, line: int, column: int, words: str
         ("<a>\n  <!-- why -->\n  <x> <!-- in --> <y/></x>  \n</a>", "<a>\n  <!-- why -->\n</a>"),
         ("<a>\n  <y/>  <x/>  \n</a>", "<a>\n  <y/>  \n</a>"),
         ("<a><x>é</x>ü</a>", "<a>ü</a>"),
+        ("<a><x><x/></x><y/></a>", "<a><y/></a>"),
     ],
 )
 def test_elements_go_with_their_lines_only(before: str, left: str) -> None:
@@ -141,11 +139,6 @@ def test_only_empty_sections_go_with_the_last_of_them(before: str, left: str | N
         assert found == left
 
 
-def test_a_nested_element_goes_with_the_outer_one() -> None:
-    text = "<a><x><x/></x><y/></a>"
-    assert without(text, "x") == "<a><y/></a>"
-
-
 @pytest.mark.parametrize(
     ("gone", "left"),
     [
@@ -164,16 +157,6 @@ def test_numbers_go_out_of_a_list(gone: list[int], left: str) -> None:
     text = '<k q="1 2\n 3  4"/>'
     assert after(text, *drop_numbers(document(text).root, "q", gone)) == f"<k{left}/>"
     assert drop_numbers(document(text).root, "other", gone) == ()
-
-
-def test_attributes_come_and_go() -> None:
-    text = "<g  a = '1'\n   b=\"2\" />"
-    root = document(text).root
-    assert after(text, *set_attributes(root, (("a", "7"), ("c", "8")))) == (
-        '<g  a = \'7\'\n   b="2" c="8" />'
-    )
-    assert after(text, drop_attribute(root, "b")) == "<g  a = '1' />"
-    assert after("<ü/>", *set_attributes(document("<ü/>").root, (("é", "ñ"),))) == '<ü é="ñ"/>'
 
 
 DROP = (("energy", None),)
@@ -236,20 +219,6 @@ def test_options_and_flags(
     left: str,
 ) -> None:
     assert after(before, *set_options(document(before), options, flags)) == left
-
-
-def test_removals_that_follow_each_other_are_one() -> None:
-    edits = [
-        ModelEdit("a", 4, 6, b""),
-        ModelEdit("a", 0, 4, b""),
-        ModelEdit("a", 6, 6, b"x"),
-        ModelEdit("b", 6, 7, b""),
-    ]
-    assert merge_edits(edits) == (
-        ModelEdit("a", 0, 6, b""),
-        ModelEdit("a", 6, 6, b"x"),
-        ModelEdit("b", 6, 7, b""),
-    )
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:

@@ -121,14 +121,6 @@ def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
     assert "collision-unreachable" not in found(tried(left)[1])
 
 
-def test_contacts_are_part_of_the_result() -> None:
-    """A block at rest on two geoms that share its weight: none can go, though it stays put."""
-    world = """<geom type="plane" size="1 1 1"/>
-    <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>"""
-    _, survey = tried(scene(world))
-    assert "contact-off" not in found(survey)
-
-
 # --------------------------------------------------------------------------------- far things
 
 
@@ -153,26 +145,26 @@ def rubble(count: int, *, extra: str = "") -> str:
 @pytest.mark.site
 def test_a_scene_with_far_bodies_and_unread_sensors_becomes_a_tenth() -> None:
     """What a step costs goes with degrees of freedom, contacts and sensors: each by ten or more."""
-    model, survey = tried(rubble(40), quick=False)
+    model, survey = tried(rubble(12), quick=False)
     seen = found(survey)
-    assert len(names(seen["far-body"])) == 40 and len(names(seen["sensor-unread"])) == 30
+    assert len(names(seen["far-body"])) == 12 and len(names(seen["sensor-unread"])) == 30
     assert seen["far-body"].label in (IDENTICAL, EQUAL)
     assert survey.slim_difference is not None and survey.slim_difference < 1e-12
     left = opened({PATH: fixed(model, survey)}).model
     before = model.model
-    assert before.nv >= 100 * left.nv and before.nsensor == 30 and left.nsensor == 0
+    assert before.nv >= 30 * left.nv and before.nsensor == 30 and left.nsensor == 0
     contacts = []
     for one in (before, left):
         data = mujoco.MjData(one)
         mujoco.mj_resetDataKeyframe(one, data, 0)
         mujoco.mj_forward(one, data)
         contacts.append(data.ncon)
-    assert contacts[0] == 160 and contacts[1] == 0
+    assert contacts[0] == 48 and contacts[1] == 0
     assert left.key_qpos.tolist() == [[0.1, 0.2]]
 
 
 def test_who_counts_coordinates_keeps_bodies_from_being_changed() -> None:
-    _, survey = tried(rubble(3), lesson="data.qpos[0]", quick=False)
+    _, survey = tried(rubble(2), lesson="data.qpos[0]", quick=False)
     finding = found(survey)["far-body"]
     assert not finding.counts and not finding.fixable
     assert finding.unfixed == ("content/lessons/1.1-a.md may count coordinates or bodies by number")
@@ -203,7 +195,7 @@ ARM = """<geom type="plane" size="9 9 1"/>
 
 def far(world: str, *, lesson: str = "") -> list[str]:
     """Where the bodies are that are called far."""
-    model, survey = tried(scene(world), lesson=lesson, quick=False)
+    model, survey = tried(scene(world), lesson=lesson)
     finding = found(survey).get("far-body")
     if finding is None:
         return []
