@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.numerics.engine import refsafe_from
-from coursebuild.numerics.front import FrontPoint, PlacedPoint, front, verdict, words
+from coursebuild.numerics.front import front, verdict, words
 from coursebuild.numerics.measure import Errors, Sizes, fitted_orders
 from coursebuild.numerics.observe import quantity_name
 from coursebuild.numerics.pilot import pilot
@@ -27,7 +27,6 @@ from coursebuild.numerics.problem import STANDARD
 from coursebuild.numerics.references import conserved, energy_beyond, references
 from coursebuild.numerics.reports.bench import (
     OrderRow,
-    RowVerdict,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
@@ -35,7 +34,7 @@ from coursebuild.numerics.reports.bench import (
 from coursebuild.numerics.rows import Basis, MeasuredRow, measured
 from coursebuild.numerics.scene import Scene, scenes
 from coursebuild.numerics.settings import own_setting, settings, stable
-from coursebuild.numerics.timing import Clock, Cost, costs, subnormal
+from coursebuild.numerics.timing import Clock, costs, subnormal
 from mjcourse.spatial import angular_distance
 
 _STRAIGHT = 0.75
@@ -89,15 +88,16 @@ def measure_scenario(
     for setting in settings(model, first, quick=quick):
         tell(f"{scene.name}: {words(setting)}")
         found.append(measured(basis, setting))
-    taken: list[Cost | None] = [None] * len(found)
+    rows = tuple(one.row for one in found)
     if clock is not None:
         tell(f"{scene.name}: times")
-        taken = _times(basis, found, clock, quick)
+        rows = _timed(basis, rows, clock, quick)
     tell(f"{scene.name}: stable timesteps")
     largest = stable(model, first, quick=quick)
-    points = [_point(one.row, cost) for one, cost in zip(found, taken, strict=True)]
-    placed = front(points)
-    comparable = any(one.ok for one in found if one.row.own)
+    rows = front(rows)
+    judged = verdict(rows, [_noticeable(basis, one) for one in found])
+    if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
+        rows = tuple(replace(row, cost=None, cost_uncertainty=None) for row in rows)
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -114,13 +114,10 @@ def measure_scenario(
         smooth=first.smooth,
         notes=_notes(basis, largest),
         figure=quantity_name(model, scene),
-        rows=tuple(
-            _placed_row(one.row, cost, place, scene.scenario.duration, comparable=comparable)
-            for one, cost, place in zip(found, taken, placed, strict=True)
-        ),
-        orders=_orders(basis, found) if first.smooth else (),
+        rows=rows,
+        orders=_orders(basis, rows) if first.smooth else (),
         stable=largest,
-        verdict=_verdict(basis, found, points, placed),
+        verdict=judged,
     )
 
 
@@ -141,81 +138,37 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
     return tuple(note for note in notes if note)
 
 
-def _verdict(
-    basis: Basis,
-    found: Sequence[MeasuredRow],
-    points: Sequence[FrontPoint | None],
-    placed: Sequence[PlacedPoint],
-) -> RowVerdict:
-    """On the scene's own setting."""
-    own = next(number for number, one in enumerate(found) if one.row.own)
-    mine, cone = found[own], basis.cones[basis.own.cone]
-    noticeable = True if cone.seen >= 1 and mine.ok else mine.noticeable
-    unseen = [
-        (point.cost, number)
-        for number, (point, one) in enumerate(zip(points, found, strict=True))
-        if point is not None and one.row.seen is not None and one.row.seen < 1
-    ]
-    return verdict(
-        [one.row.setting for one in found],
-        points,
-        placed,
-        own,
-        None if noticeable is None else mine.row.seen,
-        mine.row.reasons,
-        min(unseen)[1] if unseen else None,
-        hopeless=all(one.noticeable for one in found if one.ok),
-    )
+def _noticeable(basis: Basis, one: MeasuredRow) -> bool | None:
+    """Whether a learner sees the error of a row, for the scene's own with that of its cone."""
+    if one.row.own and one.ok and basis.cones[basis.own.cone].seen >= 1:
+        return True
+    return one.noticeable
 
 
-# ------------------------------------------------------------------------------------------- rows
-
-
-def _times(
-    basis: Basis, found: Sequence[MeasuredRow], clock: Clock, quick: bool
-) -> list[Cost | None]:
-    """What the usable settings cost; where the scene's own is not, relative to the first."""
-    usable = [index for index, one in enumerate(found) if one.ok]
-    taken: list[Cost | None] = [None] * len(found)
+def _timed(
+    basis: Basis, rows: Sequence[WorkPrecisionRow], clock: Clock, quick: bool
+) -> tuple[WorkPrecisionRow, ...]:
+    """Rows with what usable settings cost; where the own one is not, relative to the first."""
+    usable = [index for index, row in enumerate(rows) if row.status == "ok"]
     if not usable:
-        return taken
-    chosen = [found[index].row.setting for index in usable]
-    own = next((n for n, index in enumerate(usable) if found[index].row.own), 0)
-    spent = costs(basis.model, basis.first, chosen, own, clock, quick=quick)
+        return tuple(rows)
+    own = next((n for n, index in enumerate(usable) if rows[index].own), 0)
+    settings = [rows[index].setting for index in usable]
+    spent = costs(basis.model, basis.first, settings, own, clock, quick=quick)
+    found = list(rows)
     for index, cost in zip(usable, spent, strict=True):
-        taken[index] = cost
-    return taken
+        seconds = cost.step * 1e-9 * rows[index].steps
+        found[index] = replace(
+            rows[index],
+            cost=cost.ratio,
+            cost_uncertainty=cost.uncertainty,
+            realtime=basis.first.scene.scenario.duration / seconds if seconds else None,
+            spread=cost.spread,
+        )
+    return tuple(found)
 
 
-def _point(row: WorkPrecisionRow, cost: Cost | None) -> FrontPoint | None:
-    if cost is None or row.seen is None:
-        return None
-    return FrontPoint(cost.ratio, row.seen if row.figure is None else row.figure[0])
-
-
-def _placed_row(
-    row: WorkPrecisionRow,
-    cost: Cost | None,
-    place: PlacedPoint,
-    duration: float,
-    *,
-    comparable: bool,
-) -> WorkPrecisionRow:
-    """A row with its cost; `comparable`: whether the scene's own setting has one."""
-    row = replace(row, front=place.front, dominated_by=place.dominated_by)
-    if cost is None:
-        return row
-    seconds = cost.step * 1e-9 * row.steps
-    return replace(
-        row,
-        cost=cost.ratio if comparable else None,
-        cost_uncertainty=cost.uncertainty if comparable else None,
-        realtime=duration / seconds if seconds else None,
-        spread=cost.spread,
-    )
-
-
-def _orders(basis: Basis, found: Sequence[MeasuredRow]) -> tuple[OrderRow, ...]:
+def _orders(basis: Basis, found: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
     own, known = basis.own, basis.known
     motion = known.motion
     turned = angular_distance(motion.attitude[:1], motion.attitude)
@@ -224,15 +177,15 @@ def _orders(basis: Basis, found: Sequence[MeasuredRow]) -> tuple[OrderRow, ...]:
         float(turned.max(initial=0.0)),
         float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
     )
-    rows = []
+    orders = []
     for integrator in STANDARD:
         runs = [
             (row.setting.timestep, Errors(row.position, row.attitude, row.velocity))
-            for row in (one.row for one in found)
+            for row in found
             if replace(row.setting, timestep=own.timestep)
             == replace(own, integrator=integrator.value)
         ]
-        rows.append(
+        orders.append(
             fitted_orders(integrator.value, runs, known.floor, extent=extent, bent=_STRAIGHT)
         )
-    return tuple(rows)
+    return tuple(orders)

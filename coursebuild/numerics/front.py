@@ -1,6 +1,6 @@
 """Which settings are worth their cost, and what that says of the scene's own.
 
-Entry points: `front(points)`, `verdict(rows, points, own)`.
+Entry points: `front(rows)`, rows with their places; `verdict(rows, noticeable)`.
 
 A setting is dominated where another costs no more and errs no more, and is clearly better in one of
 the two. What differs by less than 3 % in cost or 5 % in error is no difference.
@@ -9,137 +9,112 @@ the two. What differs by less than 3 % in cost or 5 % in error is no difference.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
-from msgspec import Struct
+from msgspec.structs import replace
 
-from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict
+from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict, WorkPrecisionRow
 from coursebuild.numerics.reports.points import seconds_text
 
 COST_SLACK, ERROR_SLACK = 0.03, 0.05
 """Relative: costs repeat to a few per cent only."""
+Rows: TypeAlias = Sequence[WorkPrecisionRow]
+Point: TypeAlias = tuple[float, float]
+"""Cost and error."""
 
 
-class FrontPoint(Struct, frozen=True):
-    """A setting in the plane of cost and error."""
-
-    cost: float
-    """Relative to the scene's own setting."""
-    error: float
-    """In any unit; 0 is as good as can be told."""
-
-    def beats(self, other: FrontPoint) -> bool:
-        """Whether it is clearly better in one respect, and no worse in the other."""
-        cost, error = 1 + COST_SLACK, 1 + ERROR_SLACK
-        cheaper, exacter = self.cost * cost < other.cost, self.error * error < other.error
-        no_dearer, no_worse = self.cost <= other.cost * cost, self.error <= other.error * error
-        return (cheaper and no_worse) or (exacter and no_dearer)
+def _point(row: WorkPrecisionRow) -> Point | None:
+    """What a setting costs, and its error; `None` where it was lost, or not timed."""
+    if row.cost is None or row.seen is None:
+        return None
+    return row.cost, row.seen if row.figure is None else row.figure[0]
 
 
-class PlacedPoint(Struct, frozen=True):
-    """Where a point lies."""
-
-    front: bool
-    dominated_by: int | None
-    """The number of a better point; `None` on the front, or for what is no point."""
-
-
-def front(points: Sequence[FrontPoint | None]) -> tuple[PlacedPoint, ...]:
-    """Which points no other dominates; `None` is a setting that was lost."""
+def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
+    """Rows with what is known of their places: which no other dominates, and which one does."""
+    points = [_point(row) for row in rows]
     better = [
-        [] if mine is None else [j for j, one in enumerate(points) if one and one.beats(mine)]
+        [] if mine is None else [j for j, one in enumerate(points) if one and _beats(one, mine)]
         for mine in points
     ]
     on_it = [mine is not None and not found for mine, found in zip(points, better, strict=True)]
+
+    def worth(index: int) -> tuple[float, int]:
+        cost, error = points[index] or (0.0, 0.0)
+        return cost * error, index
+
     return tuple(
-        PlacedPoint(there, _best(points, found, on_it))
-        for there, found in zip(on_it, better, strict=True)
+        replace(
+            row,
+            front=there,
+            dominated_by=min([j for j in found if on_it[j]] or found, key=worth, default=None),
+        )
+        for row, there, found in zip(rows, on_it, better, strict=True)
     )
 
 
-def _best(
-    points: Sequence[FrontPoint | None], found: Sequence[int], on_it: Sequence[bool]
-) -> int | None:
-    """Of those that are better, the one whose cost and error together are least."""
-
-    def worth(index: int) -> tuple[float, int]:
-        one = points[index]
-        assert one is not None
-        return one.cost * one.error, index
-
-    return min([j for j in found if on_it[j]] or found, key=worth, default=None)
+def _beats(one: Point, other: Point) -> bool:
+    """Whether one is clearly better in one respect, and no worse in the other."""
+    cost, error = 1 + COST_SLACK, 1 + ERROR_SLACK
+    cheaper, exacter = one[0] * cost < other[0], one[1] * error < other[1]
+    no_dearer, no_worse = one[0] <= other[0] * cost, one[1] <= other[1] * error
+    return (cheaper and no_worse) or (exacter and no_dearer)
 
 
 # --------------------------------------------------------------------------------------- verdict
 
 
-def verdict(
-    settings: Sequence[MeasuredSetting],
-    points: Sequence[FrontPoint | None],
-    placed: Sequence[PlacedPoint],
-    own: int,
-    seen: float | None,
-    reasons: Sequence[str],
-    enough: int | None = None,
-    *,
-    hopeless: bool = False,
-) -> RowVerdict:
-    """What the measurement says of the scene's own setting, number `own`.
+def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
+    """What the measurement says of the scene's own setting.
 
-    `seen`: its error in a picture, where 1 is just visible; `None` where it is not known.
-    `reasons`: why it has none.
-    `enough`: the cheapest setting whose error is not seen; `None` where there is none.
-    `hopeless`: whether the errors of all are.
+    `noticeable`: whether a learner sees the error of a row; `None` where that is not known.
     """
-    noticeable = None if seen is None else seen >= 1
-    mine, better = points[own], placed[own].dominated_by
-    if reasons:
-        return _lost(settings, points, placed, own, reasons)
-    told = _noticed(seen) + _enough(settings, points, own, seen, enough, hopeless)
+    own = next(number for number, row in enumerate(rows) if row.own)
+    row, seen = rows[own], noticeable[own]
+    if row.reasons:
+        return _lost(rows, row)
+    error = None if seen is None else row.seen
+    mine, told = _point(row), _noticed(error)
     if mine is None:
         text = "nothing was timed, so that no setting can be called better"
-        return RowVerdict(False, None, None, None, noticeable, text + _noticed(seen))
-    if better is None:
+        return RowVerdict(False, None, None, None, seen, text + told)
+    if error is not None and error >= 1:
+        told += _enough(
+            rows,
+            mine[0],
+            hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
+        )
+    if row.dominated_by is None:
         text = "no other setting is cheaper without being less accurate"
-        return RowVerdict(True, None, None, None, noticeable, text + told)
-    other = points[better]
+        return RowVerdict(True, None, None, None, seen, text + told)
+    better = rows[row.dominated_by]
+    other = _point(better)
     assert other is not None
-    cost, error = other.cost / mine.cost, other.error / mine.error if mine.error > 0 else 1.0
-    text = f"{words(settings[better])} is {_compared(cost, error)}"
-    return RowVerdict(False, better, cost, error, noticeable, text + told)
+    ratios = other[0] / mine[0], other[1] / mine[1] if mine[1] > 0 else 1.0
+    text = f"{words(better.setting)} is {_compared(*ratios)}"
+    return RowVerdict(False, row.dominated_by, *ratios, seen, text + told)
 
 
-def _enough(
-    settings: Sequence[MeasuredSetting],
-    points: Sequence[FrontPoint | None],
-    own: int,
-    seen: float | None,
-    enough: int | None,
-    hopeless: bool,
-) -> str:
+def _enough(rows: Rows, own: float, *, hopeless: bool) -> str:
     """With what a learner would notice nothing, where something is noticed now."""
-    mine, other = points[own], None if enough is None else points[enough]
-    if seen is None or seen < 1 or mine is None:
-        return ""
-    if enough is None or other is None:
+    unseen = [row for row in rows if row.seen is not None and row.seen < 1 and row.cost is not None]
+    if not unseen:
         return ", and that of every other setting too" if hopeless else ""
-    cost = f"{other.cost / mine.cost:.2g} times its cost"
-    return f"; the cheapest without one that is seen is {words(settings[enough])}, at {cost}"
+    least = min(unseen, key=lambda row: row.cost or 0.0)
+    cost = f"{(least.cost or 0.0) / own:.2g} times its cost"
+    return f"; the cheapest without one that is seen is {words(least.setting)}, at {cost}"
 
 
-def _lost(
-    settings: Sequence[MeasuredSetting],
-    points: Sequence[FrontPoint | None],
-    placed: Sequence[PlacedPoint],
-    own: int,
-    reasons: Sequence[str],
-) -> RowVerdict:
+def _lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
     """Of an own setting under which the scene does not run; the best one that does is named."""
-    text = f"the scene does not run under its own setting, {words(settings[own])}: "
-    text += "; ".join(reasons)
-    there = [(p.error, p.cost, i) for i, p in enumerate(points) if p and placed[i].front]
-    better = min(there)[2] if there else None
+    text = f"the scene does not run under its own setting, {words(row.setting)}: "
+    text += "; ".join(row.reasons)
+    found = [
+        (point[1], point[0], n) for n, r in enumerate(rows) if r.front and (point := _point(r))
+    ]
+    better = min(found)[2] if found else None
     if better is not None:
-        text += f"; {words(settings[better])} is the most accurate that does"
+        text += f"; {words(rows[better].setting)} is the most accurate that does"
     return RowVerdict(False, better, None, None, None, text)
 
 

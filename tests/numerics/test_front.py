@@ -4,28 +4,37 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.numerics.front import FrontPoint, front, verdict
-from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict
+from coursebuild.numerics.front import front, verdict, words
+from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict, WorkPrecisionRow
+from support.bench_reports import lost, row
 
-EULER, RK4 = MeasuredSetting("Euler", 0.002, "", 0, ""), MeasuredSetting("RK4", 0.01, "", 0, "")
+Point = tuple[float, float] | None
+"""Cost and error; `None`: a run that was lost."""
 
 
-def on_it(*points: tuple[float, float] | None) -> list[bool]:
-    found = front([None if one is None else FrontPoint(*one) for one in points])
-    return [place.front for place in found]
+def placed(*points: Point) -> tuple[WorkPrecisionRow, ...]:
+    """Rows of which the first is the scene's own, Euler at 2 ms, and others are RK4 at 10 ms."""
+    found = []
+    for n, point in enumerate(points):
+        own = {"own": True} if n == 0 else {}
+        name, timestep = ("Euler", 0.002) if n == 0 else ("RK4", 0.01)
+        if point is None:
+            found.append(lost(name, timestep, **own))
+        else:
+            found.append(row(name, timestep, cost=point[0], seen=point[1], **own))
+    return front(found)
+
+
+def on_it(*points: Point) -> list[bool]:
+    return [one.front for one in placed(*points)]
 
 
 def test_cheaper_and_more_accurate_is_better() -> None:
-    points = [
-        FrontPoint(1, 1e-3),
-        FrontPoint(0.5, 1e-5),
-        FrontPoint(0.1, 0.3),
-        FrontPoint(4, 1e-3),
-        None,
-    ]
-    found = front(points)
-    assert [place.front for place in found] == [False, True, True, False, False]
-    assert [place.dominated_by for place in found] == [1, None, None, 1, None]
+    found = placed((1, 1e-3), (0.5, 1e-5), (0.1, 0.3), (4, 1e-3), None)
+    assert [one.front for one in found] == [False, True, True, False, False]
+    assert [one.dominated_by for one in found] == [1, None, None, 1, None]
+    found = placed((8, 8.0), (4, 4.0), (2, 2.0), (1, 1.0))
+    assert [one.dominated_by for one in found] == [3, 3, 3, None], "it is on the front"
 
 
 def test_small_differences_are_none() -> None:
@@ -43,19 +52,13 @@ def test_errors_of_zero_and_nothing_at_all() -> None:
     assert on_it(None, None) == [False, False]
 
 
-def test_what_dominates_is_on_the_front() -> None:
-    points = [FrontPoint(8, 8.0), FrontPoint(4, 4.0), FrontPoint(2, 2.0), FrontPoint(1, 1.0)]
-    assert [place.dominated_by for place in front(points)] == [3, 3, 3, None]
-
-
-def judged(
-    points: list[FrontPoint | None], seen: float | None, reasons: tuple[str, ...] = ()
-) -> RowVerdict:
-    return verdict([EULER, RK4], points, front(points), 0, seen, reasons)
+def judged(*points: Point, known: bool = True) -> RowVerdict:
+    rows = placed(*points)
+    return verdict(rows, [one.seen >= 1 if known and one.seen else None for one in rows])
 
 
 def test_a_verdict_on_a_good_choice() -> None:
-    found = judged([FrontPoint(1, 1e-3), FrontPoint(4, 1e-7)], 1e-3)
+    found = judged((1, 1e-3), (4, 1e-7))
     assert (found.on_front, found.better, found.noticeable) == (True, None, False)
     assert found.text == (
         "no other setting is cheaper without being less accurate; a learner would not notice its "
@@ -64,31 +67,29 @@ def test_a_verdict_on_a_good_choice() -> None:
 
 
 def test_a_verdict_on_a_bad_one() -> None:
-    found = judged([FrontPoint(1, 2.5), FrontPoint(0.94, 2.5e-6)], 2.5)
+    found = judged((1, 2.5), (0.94, 2.5e-6))
     assert (found.on_front, found.better, found.noticeable) == (False, 1, True)
     assert found.cost_ratio == pytest.approx(0.94)
     assert found.error_ratio == pytest.approx(1e-6)
     assert found.text == (
         "RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; a learner would "
-        "notice its error, which is 2.5 times what can be seen"
+        "notice its error, which is 2.5 times what can be seen; the cheapest without one that is "
+        "seen is RK4 at 10 ms, at 0.94 times its cost"
     )
 
 
 def test_a_verdict_names_what_would_be_enough() -> None:
-    points: list[FrontPoint | None] = [FrontPoint(0.5, 50), FrontPoint(2, 1e-6)]
-    found = verdict([EULER, RK4], points, front(points), 0, 50, (), 1)
-    assert found.text.endswith(
+    assert judged((0.5, 50), (2, 1e-6)).text.endswith(
         "a learner would notice its error, which is 50 times what can be seen; the cheapest "
         "without one that is seen is RK4 at 10 ms, at 4 times its cost"
     )
-    found = verdict([EULER, RK4], points, front(points), 0, 50, (), hopeless=True)
-    assert found.text.endswith("times what can be seen, and that of every other setting too")
-    found = verdict([EULER, RK4], points, front(points), 0, 0.5, (), 1)
-    assert found.text.endswith("which is 0.5 of what can be seen")
+    hopeless = judged((0.5, 50), (2, 5))
+    assert hopeless.text.endswith("times what can be seen, and that of every other setting too")
+    assert judged((0.5, 0.5), (2, 1e-6)).text.endswith("which is 0.5 of what can be seen")
 
 
 def test_a_verdict_where_too_little_is_known() -> None:
-    found = judged([FrontPoint(1, 2.0), FrontPoint(0.5, 2.0)], None)
+    found = judged((1, 2.0), (0.5, 2.0), known=False)
     assert found.noticeable is None
     assert found.text == (
         "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
@@ -97,16 +98,21 @@ def test_a_verdict_where_too_little_is_known() -> None:
 
 
 def test_a_verdict_where_the_scene_does_not_run() -> None:
-    found = judged([None, FrontPoint(1, 2.0)], None, ("the state is not finite",))
+    found = judged(None, (1, 2.0))
     assert (found.on_front, found.better, found.cost_ratio) == (False, 1, None)
     assert found.text == (
         "the scene does not run under its own setting, Euler at 2 ms: the state is not finite; "
         "RK4 at 10 ms is the most accurate that does"
     )
-    assert judged([None, None], None, ("it hangs",)).text.endswith("Euler at 2 ms: it hangs")
+    assert judged(None, None).text.endswith("Euler at 2 ms: the state is not finite")
 
 
 def test_a_verdict_where_nothing_was_timed() -> None:
-    found = judged([None, None], 0.5)
+    found = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
     assert (found.on_front, found.noticeable) == (False, False)
     assert found.text.startswith("nothing was timed, so that no setting can be called better; a ")
+
+
+def test_settings_in_words() -> None:
+    full = MeasuredSetting("implicitfast", 0.002, "Newton", 20, "elliptic")
+    assert words(full) == "implicitfast at 2 ms, Newton, at most 20 iterations, elliptic cone"
