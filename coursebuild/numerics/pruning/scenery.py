@@ -11,8 +11,6 @@ Entry point: `scenery(look)`.
    times the way that it goes itself. Another body that moves must also be away by five times the
    size of what they reach; where there is no bound on that, all must be, by what they sweep.
    This holds in these runs only.
-4. A geom that is fixed to the world is seen, so it is far only by five times that size. That it
-   cannot be reached is a bound, if there is one for all that moves.
 """
 
 from __future__ import annotations
@@ -31,8 +29,6 @@ from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext,
 from coursebuild.numerics.pruning.unused import unread_sensors
 
 Vector = NDArray[np.float64]
-Ball = tuple[Vector, float]
-"""Centre and radius, m."""
 
 REGIONS = 5.0
 """Sizes of the region that what matters sweeps, or can reach."""
@@ -46,19 +42,12 @@ _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", 
 
 
 def scenery(look: PruningContext) -> Iterator[Candidate]:
-    """Geoms fixed to the world, and bodies that move, far from everything else."""
+    """Bodies that move, far from everything else."""
     trees = Trees(look)
     focus = trees.focus()
     if not focus or not look.seen:
         return
     region = trees.region(focus)
-    yield from _bodies(look, trees, focus, region)
-    yield from _geoms(look, trees, focus, region)
-
-
-def _bodies(
-    look: PruningContext, trees: Trees, focus: frozenset[int], region: Bounds
-) -> Iterator[Candidate]:
     far = _out_of_reach(trees, focus, region)
     items: list[Item] = []
     roots: set[int] = set()
@@ -112,73 +101,6 @@ def _out_of_reach(trees: Trees, focus: frozenset[int], region: Bounds) -> frozen
     return frozenset(trees.roots - trees.touched_by(trees.roots - far))
 
 
-def _geoms(
-    look: PruningContext, trees: Trees, focus: frozenset[int], region: Bounds
-) -> Iterator[Candidate]:
-    model = look.model
-    moving = [g for g in range(model.ngeom) if trees.of_body[int(model.geom_bodyid[g])] in focus]
-    ball = moving_ball(model, moving) if focus == trees.roots else None
-    items: list[Item] = []
-    done: set[Element] = set()
-    for element in look.elements:
-        if element in done or not _is_scenery(look, trees, element, region, ball):
-            continue
-        loose, others = trees.references([element])
-        if not others:
-            done |= set(element.walk())
-            items.append(named_item(element, *loose))
-    if items and not look.readers.whole("shape"):
-        message = worded(items, "the geom {}", "the geoms {}")
-        message += " of the world can be reached by nothing, and "
-        message += worded(items, "lies far away", "lie far away")
-        proof = "" if ball is None else "whatever the joints do, all that moves stays away from it"
-        who = look.readers.whole("body-number")
-        doubt = f"{who} may count geoms by number" if who else ""
-        yield Candidate("far-geom", message, tuple(items), proof, doubt=doubt)
-
-
-def _is_scenery(
-    look: PruningContext,
-    trees: Trees,
-    element: Element,
-    region: Bounds,
-    ball: Ball | None,
-) -> bool:
-    """Whether it is a far geom of the world, or a body of the world with nothing but such geoms."""
-    if element.tag not in ("geom", "body"):
-        return False
-    geoms: set[int] = set()
-    for one in element.walk():
-        thing = look.text.ids(one)
-        if one.tag not in ("geom", "body", "inertial", "frame", "replicate") or (
-            one.tag in ("geom", "body") and thing is None
-        ):
-            return False
-        if look.readers.named(one.get("name") or ""):
-            return False
-        if thing is not None and thing.kind == "body":
-            if any(trees.of_body[number] >= 0 for number in thing.ids):
-                return False
-        elif thing is not None:
-            geoms |= set(thing.ids)
-    return bool(geoms) and all(_is_far(trees, geom, region, ball) for geom in geoms)
-
-
-def _is_far(trees: Trees, geom: int, region: Bounds, ball: Ball | None) -> bool:
-    model = trees.model
-    body = int(model.geom_bodyid[geom])
-    size = float(model.geom_rbound[geom])
-    if trees.of_body[body] >= 0 or size <= 0:  # it moves, or is a plane
-        return False
-    if geom in trees.touched:
-        return False
-    place = trees.place[geom]
-    near = Bounds(place - size, place + size)
-    if region.distance(near) < REGIONS * region.size:
-        return False
-    return ball is None or float(np.linalg.norm(place - ball[0])) > ball[1] + size
-
-
 # ------------------------------------------------------------------------ bodies that move together
 
 
@@ -225,11 +147,6 @@ class Trees:
         self.of_dof = np.array([self.of_body[int(b)] for b in model.dof_bodyid], dtype=np.int64)
         self.of_geom = [self.of_body[int(b)] for b in model.geom_bodyid]
         self.touching = frozenset(pair for seen in look.seen for pair in seen.touching)
-        self.touched = frozenset(geom for pair in self.touching for geom in pair)
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        self.place = np.asarray(data.geom_xpos, dtype=np.float64)
-        """(ngeom, 3) m: right for geoms that are fixed to the world."""
         self._elements: dict[int, list[Element]] = {root: [] for root in self.roots}
         for element in look.elements:
             thing = look.text.ids(element)

@@ -232,23 +232,3 @@ def test_a_body_that_comes_near_is_not_far() -> None:
     rest = '<keyframe><key qpos="0 30 0 2 1 0 0 0" qvel="0 -100 0 10 0 0 0"/></keyframe>'
     _, survey = tried(scene(world, rest=rest))
     assert "far-body" not in found(survey)
-
-
-def test_scenery_that_is_far_goes_with_its_empty_bodies() -> None:
-    world = (
-        PENDULUM
-        + """
-    <geom name="sun" size="2" pos="0 0 99"/>
-    <body name="house" pos="50 0 0">
-      <geom size="1"/> <body><geom name="roof" size="1" pos="0 0 2"/></body>
-    </body>
-    <body name="mast" pos="70 0 0"><geom size="1"/><camera name="c"/></body>
-    <geom name="table" size=".1" pos="0 0 .4"/>"""
-    )
-    model, survey = tried(scene(world), lesson="a sun, a pendulum")
-    finding = found(survey)["far-geom"]
-    assert names(finding) == ["house", 'mujoco/worldbody/body[@name="mast"]/geom']
-    assert finding.label == IDENTICAL
-    left = fixed(model, survey)
-    assert "roof" not in left and '<camera name="c"/>' in left and "table" in left
-    assert tried(left, lesson="a sun, a pendulum")[1].edits == ()
