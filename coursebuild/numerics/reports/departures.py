@@ -36,6 +36,7 @@ _ROUNDING = 1e-9
 _INVISIBLE = 1e-6
 """What errors in a picture may differ by, where 1 is just visible."""
 _SAME = 1e-9
+_PARTS = ("position", "attitude", "velocity")
 
 Value: TypeAlias = float | str | bool | None
 _T = TypeVar("_T")
@@ -75,9 +76,9 @@ def scene_departures(
     """Everything of a model that left its band, in the order of the recorded report."""
     found: list[Departure] = []
     for name, old, new in _pairs(recorded.scenarios, measured.scenarios, lambda one: one.name):
-        comparing = _Comparing(name, "", bands, found)
-        if both := comparing.both("scenario", old, new):
-            _scenario(comparing, *both)
+        comparison = _Comparison(name, "", bands, found)
+        for both in comparison.both("scenario", old, new):
+            _scenario(comparison, *both)
     return tuple(found)
 
 
@@ -87,13 +88,13 @@ def case_departures(
     """Everything of the hard cases that left its band, in the order of the recorded report."""
     found: list[Departure] = []
     for name, old, new in _pairs(recorded, measured, lambda one: one.name):
-        comparing = _Comparing(name, "", bands, found)
-        if both := comparing.both("case", old, new):
-            _case(comparing, *both)
+        comparison = _Comparison(name, "", bands, found)
+        for both in comparison.both("case", old, new):
+            _case(comparison, *both)
     return tuple(found)
 
 
-class _Comparing(Struct, frozen=True, eq=False):
+class _Comparison(Struct, frozen=True, eq=False):
     """Compares figures of one setting, and keeps what left its band."""
 
     where: str
@@ -101,18 +102,17 @@ class _Comparing(Struct, frozen=True, eq=False):
     bands: Bands
     found: list[Departure]
 
-    def of(self, setting: str) -> _Comparing:
+    def of(self, setting: str) -> _Comparison:
         """The same of another setting."""
         return replace(self, setting=setting)
 
-    def both(self, what: str, old: _T | None, new: _T | None) -> tuple[_T, _T] | None:
+    def both(self, what: str, old: _T | None, new: _T | None) -> Iterator[tuple[_T, _T]]:
         """Something that is in both; what is in one only is told."""
         if old is not None and new is not None:
-            return old, new
-        if old is not None or new is not None:
+            yield old, new
+        elif old is not None or new is not None:
             there = ["nothing" if one is None else "there" for one in (old, new)]
-            self._depart(what, there[0], there[1], "the same")
-        return None
+            self._depart(what, *there, "the same")
 
     def same(self, figure: str, old: Value, new: Value) -> None:
         """What must be as it was."""
@@ -120,10 +120,16 @@ class _Comparing(Struct, frozen=True, eq=False):
             self._depart(figure, _shown(old), _shown(new), "the same")
 
     def near(
-        self, figure: str, old: float | None, new: float | None, share: float, least: float = 0.0
+        self,
+        figure: str,
+        old: float | None,
+        new: float | None,
+        least: float = 0.0,
+        share: float | None = None,
     ) -> None:
         """A number that may differ by a share of what it was, and by `least` in any case."""
-        self._within(figure, old, new, share * abs(old or 0.0) + least, f"± {100 * share:g} %")
+        part = self.bands.error if share is None else share
+        self._within(figure, old, new, part * abs(old or 0.0) + least, f"± {100 * part:g} %")
 
     def error(
         self,
@@ -133,25 +139,27 @@ class _Comparing(Struct, frozen=True, eq=False):
         least: float,
     ) -> None:
         """An error, at its largest and at the end; none is known better than to `least`."""
-        share = self.bands.error
+        name = f"error of {name}"
         if old is None or new is None:
-            a, b = (None if pair is None else pair[0] for pair in (old, new))
-            self.near(f"error of {name}", a, b, share)
+            self.near(name, old and old[0], new and new[0])
             return
-        for where, a, b in zip(("", " at the end"), old, new, strict=True):
-            self.near(f"error of {name}{where}", a, b, share, least)
+        self.near(name, old[0], new[0], least)
+        self.near(f"{name} at the end", old[1], new[1], least)
 
-    def order(self, name: str, old: float | None, new: float | None) -> None:
-        """A fitted order."""
+    def orders(self, old: Sequence[OrderRow], new: Sequence[OrderRow]) -> None:
+        """Fitted orders."""
         band = self.bands.order
-        self._within(f"order of {name}", old, new, band, f"± {band:g}")
+        for name, first, last in _pairs(old, new, lambda row: row.integrator):
+            for part in _PARTS:
+                a, b = (None if row is None else getattr(row, part) for row in (first, last))
+                self.of(name)._within(f"order of {part}", a, b, band, f"± {band:g}")
 
     def _within(
         self, figure: str, old: float | None, new: float | None, room: float, band: str
     ) -> None:
-        if old is None and new is None:
-            return
-        if old is None or new is None or not abs(new - old) <= room:
+        if (old is None) != (new is None) or (
+            old is not None and new is not None and not abs(new - old) <= room
+        ):
             self._depart(figure, _shown(old), _shown(new), band)
 
     def _depart(self, figure: str, old: str, new: str, band: str) -> None:
@@ -159,15 +167,9 @@ class _Comparing(Struct, frozen=True, eq=False):
 
 
 def _shown(value: Value) -> str:
-    match value:
-        case None:
-            return "nothing"
-        case bool():
-            return "yes" if value else "no"
-        case str():
-            return value or "nothing"
-        case _:
-            return f"{value:.6g}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.6g}" if isinstance(value, float | int) else value or "nothing"
 
 
 def _pairs(
@@ -179,31 +181,64 @@ def _pairs(
         yield name, first.get(name), second.get(name)
 
 
+def _run(
+    comparison: _Comparison, old: _Run, new: _Run, place: float, speed: float, *, known: bool
+) -> bool:
+    """What is measured of every run; whether both went alike.
+
+    `place`, `speed`: what errors of places and velocities are not known better than. `known`:
+    whether the motion can be told to its end.
+    """
+    comparison.same("status", status_text(old.status), status_text(new.status))
+    if old.status != new.status:
+        return False  # what else differs does so for that reason
+    comparison.same("refsafe", old.refsafe, new.refsafe)
+    for part, least in zip(_PARTS, (place, place, speed), strict=True):
+        comparison.error(part, getattr(old, part), getattr(new, part), least)
+    if old.status == "ok" and known:  # how a lost run ended, or a chaotic one, says nothing
+        for name in ("energy_drift", "momentum_drift", "penetration"):
+            pair = getattr(old, name), getattr(new, name)
+            comparison.near(name.replace("_", " "), *pair, _ROUNDING)
+    return True
+
+
+def _largest(
+    comparison: _Comparison, old: StableRow | BoundaryLine, new: StableRow | BoundaryLine
+) -> None:
+    name = "largest stable timestep"
+    if old.largest is None or new.largest is None:
+        a, b = ("all" if x.largest is None else seconds_text(x.largest) for x in (old, new))
+        comparison.same(name, a, b)
+    else:
+        comparison.near(name, old.largest, new.largest, share=_STABLE)
+    comparison.same("monotone", old.monotone, new.monotone)
+
+
 # --- models
 
 
-def _scenario(comparing: _Comparing, old: ScenarioReport, new: ScenarioReport) -> None:
-    comparing.near("duration", old.duration, new.duration, _SAME)
-    comparing.near("hold", old.hold, new.hold, _SAME)
-    comparing.near("horizon", old.horizon, new.horizon, comparing.bands.error)
-    comparing.same("reference", old.reference, new.reference)
-    comparing.same("figure", old.figure, new.figure)
+def _scenario(comparison: _Comparison, old: ScenarioReport, new: ScenarioReport) -> None:
+    comparison.near("duration", old.duration, new.duration, share=_SAME)
+    comparison.near("hold", old.hold, new.hold, share=_SAME)
+    comparison.near("horizon", old.horizon, new.horizon)
+    comparison.same("reference", old.reference, new.reference)
+    comparison.same("figure", old.figure, new.figure)
     place = FLOORS * max(old.floor, new.floor)
     speed = FLOORS * max(old.velocity_floor, new.velocity_floor)
     known = all(one.horizon >= one.duration * (1 - _SAME) for one in (old, new))
     for setting, before, after in _pairs(old.rows, new.rows, lambda row: row.setting):
-        one = comparing.of(setting_text(setting))
-        if rows := one.both("setting", before, after):
+        one = comparison.of(setting_text(setting))
+        for rows in one.both("setting", before, after):
             _row(one, *rows, place, speed, known=known)
-    _orders(comparing, old.orders, new.orders)
+    comparison.orders(old.orders, new.orders)
     for name, limit, now in _pairs(old.stable, new.stable, lambda row: row.integrator):
-        one = comparing.of(name)
-        if limits := one.both("largest stable timestep", limit, now):
+        one = comparison.of(name)
+        for limits in one.both("largest stable timestep", limit, now):
             _largest(one, *limits)
 
 
 def _row(
-    comparing: _Comparing,
+    comparison: _Comparison,
     old: WorkPrecisionRow,
     new: WorkPrecisionRow,
     place: float,
@@ -211,91 +246,47 @@ def _row(
     *,
     known: bool,
 ) -> None:
-    """Compare a setting; `known`: whether the motion can be told to its end.
-
-    `place`, `speed`: what errors of places and velocities are not known better than.
-    """
-    comparing.same("own setting", old.own, new.own)
-    if not _run(comparing, old, new, place, speed, known=known):
+    comparison.same("own setting", old.own, new.own)
+    if not _run(comparison, old, new, place, speed, known=known):
         return
-    share = comparing.bands.error
-    comparing.error("figure", old.figure, new.figure, place)
-    comparing.near("visible error", old.seen, new.seen, share, _INVISIBLE)
-    comparing.near("model error", old.model_error, new.model_error, share, place + _ROUNDING)
+    comparison.error("figure", old.figure, new.figure, place)
+    comparison.near("visible error", old.seen, new.seen, _INVISIBLE)
+    comparison.near("model error", old.model_error, new.model_error, place + _ROUNDING)
     if old.status == "ok" and known:
-        comparing.near("slip", old.slip, new.slip, share, _ROUNDING)
-
-
-def _run(
-    comparing: _Comparing, old: _Run, new: _Run, place: float, speed: float, *, known: bool = True
-) -> bool:
-    """What is measured of every run; whether both went alike."""
-    comparing.same("status", status_text(old.status), status_text(new.status))
-    if old.status != new.status:
-        return False  # what else differs does so for that reason
-    comparing.same("refsafe", old.refsafe, new.refsafe)
-    comparing.error("position", old.position, new.position, place)
-    comparing.error("attitude", old.attitude, new.attitude, place)
-    comparing.error("velocity", old.velocity, new.velocity, speed)
-    if old.status == "ok" and known:  # how a lost run ended, or a chaotic one, says nothing
-        for name in ("energy_drift", "momentum_drift", "penetration"):
-            a, b = getattr(old, name), getattr(new, name)
-            comparing.near(name.replace("_", " "), a, b, comparing.bands.error, _ROUNDING)
-    return True
-
-
-def _orders(comparing: _Comparing, old: Sequence[OrderRow], new: Sequence[OrderRow]) -> None:
-    for name, first, last in _pairs(old, new, lambda row: row.integrator):
-        for part in ("position", "attitude", "velocity"):
-            a, b = (None if row is None else getattr(row, part) for row in (first, last))
-            comparing.of(name).order(part, a, b)
-
-
-def _largest(
-    comparing: _Comparing, old: StableRow | BoundaryLine, new: StableRow | BoundaryLine
-) -> None:
-    name = "largest stable timestep"
-    if old.largest is None or new.largest is None:
-        a, b = ("all" if x.largest is None else seconds_text(x.largest) for x in (old, new))
-        comparing.same(name, a, b)
-    else:
-        comparing.near(name, old.largest, new.largest, _STABLE)
-    comparing.same("monotone", old.monotone, new.monotone)
+        comparison.near("slip", old.slip, new.slip, _ROUNDING)
 
 
 # --- hard cases
 
 
-def _case(comparing: _Comparing, old: CaseReport, new: CaseReport) -> None:
+def _case(comparison: _Comparison, old: CaseReport, new: CaseReport) -> None:
     floors = [case.reference.floor for case in (old, new) if case.reference is not None]
     least = FLOORS * max(floors, default=0.0)
     for name, limit, now in _pairs(old.boundaries, new.boundaries, lambda line: line.integrator):
-        one = comparing.of(name)
-        if limits := one.both("largest stable timestep", limit, now):
-            before, after = limits
+        one = comparison.of(name)
+        for before, after in one.both("largest stable timestep", limit, now):
             _largest(one, before, after)
             one.same("beyond", status_text(before.beyond), status_text(after.beyond))
-            one.near("growth", before.growth, after.growth, comparing.bands.error)
+            one.near("growth", before.growth, after.growth)
     figures = _pairs(old.figures, new.figures, lambda line: (line.name, line.integrator))
     for (figure, name), first, last in figures:
-        one = comparing.of(name)
-        if lines := one.both(figure, first, last):
+        one = comparison.of(name)
+        for lines in one.both(figure, first, last):
             _figure(one, *lines, least)
-    _orders(comparing, old.orders, new.orders)
+    comparison.orders(old.orders, new.orders)
     runs = _pairs(old.errors, new.errors, lambda line: (line.integrator, line.timestep))
     for (name, timestep), run, again in runs:
-        one = comparing.of(f"{name} at {seconds_text(timestep)}")
-        if pair := one.both("run", run, again):
-            _run(one, *pair, least, least)
+        one = comparison.of(f"{name} at {seconds_text(timestep)}")
+        for pair in one.both("run", run, again):
+            _run(one, *pair, least, least, known=True)
 
 
-def _figure(comparing: _Comparing, old: FigureLine, new: FigureLine, least: float) -> None:
+def _figure(comparison: _Comparison, old: FigureLine, new: FigureLine, least: float) -> None:
     """What is known exactly is compared by how far it is off, and what is not by its size."""
-    share = comparing.bands.error
-    comparing.near(f"exact {old.name}", old.exact, new.exact, _SAME)
+    comparison.near(f"exact {old.name}", old.exact, new.exact, share=_SAME)
     if old.exact is None or new.exact is None or old.measured is None or new.measured is None:
-        comparing.near(old.name, old.measured, new.measured, share, _ROUNDING)
+        comparison.near(old.name, old.measured, new.measured, _ROUNDING)
         return
     size = max(abs(old.exact), abs(old.measured))
-    off = (old.measured - old.exact, new.measured - new.exact)
-    comparing.near(f"{old.name}, against theory", *off, share, _ROUNDING * size + least)
+    off = old.measured - old.exact, new.measured - new.exact
+    comparison.near(f"{old.name}, against theory", *off, _ROUNDING * size + least)
