@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from coursebuild.cli.commands import options_of
@@ -108,7 +108,7 @@ def _write(
     arguments: argparse.Namespace,
     found: Measurement[Any],
     text: Callable[[Style], str],
-    values: dict[str, object],
+    values: Mapping[str, object],
     *,
     empty: str = "",
 ) -> int:

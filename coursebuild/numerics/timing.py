@@ -135,8 +135,9 @@ def _once(job: Job, clock: Clock) -> int:
 
 
 def _ratio(times: ArrayLike, own: ArrayLike) -> float:
-    ours = float(np.quantile(own, 0.1))
-    return float(np.quantile(times, 0.1)) / ours if ours > 0 else math.nan
+    """Of the lowest tenths."""
+    mine, ours = (float(np.quantile(np.asarray(one), 0.1)) for one in (times, own))
+    return mine / ours if ours > 0 else math.nan
 
 
 def _uncertainty(times: Sequence[float], own: Sequence[float]) -> float:

@@ -88,7 +88,8 @@ def compare(base: Any, changed: Any, index: IndexMap, scenes: Sequence[Scene]) -
     Raises:
         ValueError: a state cannot be brought from one to the other.
     """
-    _without_reset(base), _without_reset(changed)
+    _without_reset(base)
+    _without_reset(changed)
     difference, identical = 0.0, True
     for scene in scenes:
         if not _same_bits(base, changed, index, scene):

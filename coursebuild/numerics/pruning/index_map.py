@@ -50,9 +50,9 @@ class IndexMap(Struct, frozen=True, eq=False):
 def index_map(model: Any, gone: Gone) -> IndexMap:
     """What is left of a model."""
     bodies = set(gone.bodies)
-    for body in range(1, model.nbody):  # parents come first
-        if int(model.body_parentid[body]) in bodies:
-            bodies.add(body)
+    for number in range(1, model.nbody):  # parents come first
+        if int(model.body_parentid[number]) in bodies:
+            bodies.add(number)
     body = np.array([b for b in range(model.nbody) if b not in bodies], dtype=np.int64)
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))

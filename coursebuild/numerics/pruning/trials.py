@@ -189,7 +189,7 @@ class Trials:
     def _states(self) -> list[Any]:
         """States of the original, from which steps are timed."""
         model = self.text.model
-        found = []
+        found: list[Any] = []
         for scene in self.scenes:
             found += moments(model, initial_data(scene.scenario, model), scene.scenario)
         return found

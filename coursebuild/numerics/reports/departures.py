@@ -111,8 +111,8 @@ class _Comparison(Struct, frozen=True, eq=False):
         if old is not None and new is not None:
             yield old, new
         elif old is not None or new is not None:
-            there = ["nothing" if one is None else "there" for one in (old, new)]
-            self._depart(what, *there, "the same")
+            first, second = ("nothing" if one is None else "there" for one in (old, new))
+            self._depart(what, first, second, "the same")
 
     def same(self, figure: str, old: Value, new: Value) -> None:
         """What must be as it was."""
