@@ -18,7 +18,7 @@ import functools
 import json
 from collections.abc import Iterable, Iterator
 
-from coursebuild.core.engine.steps import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
 from coursebuild.core.pages import urls
