@@ -1,4 +1,4 @@
-"""`quiz` fences, and what an author is told of them."""
+"""`quiz` fences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.features.quiz.parse import parse_quiz
-from support.positioned_nodes import shown
 
 
 @dataclass
@@ -46,10 +45,6 @@ def fence(body: str, prefix: str = "", newline: str = "\n") -> tuple[Span, Excer
 
 def parse(body: str, prefix: str = "", newline: str = "\n") -> Parsed[Quiz | None]:
     return parse_quiz(*fence(body, prefix, newline), Plain())
-
-
-def told(body: str) -> list[str]:
-    return shown(parse(body).diagnostics)
 
 
 MCQ = '{"kind": "mcq", "q": "Q", "options": ["a", "b"], %s}'

@@ -257,3 +257,21 @@ def test_any_question_becomes_one_or_is_told_why_not(kind: str, fields: dict[str
             assert question.answers
         if isinstance(question, NumericQuestion):
             assert question.tolerance >= 0
+
+
+def test_a_quiz_with_mistakes_is_there_with_its_right_questions() -> None:
+    body = (
+        '{"id": "x", "questions": [\n'
+        '{"kind": "output", "q": "Q", "of": "examples/a.py", "line": 1, "tol": 1},\n'
+        '{"kind": "open", "q": "Q"},\n'
+        '{"kind": "predict", "q": "Q", "options": ["a", "b"], "answer": 0,\n'
+        ' "sim": {"model": "m", "note": "BAD"}}]}'
+    )
+    parsed = parse(body)
+    assert [d.rule for d in parsed.diagnostics] == ["field-unknown", "field-missing", "math-syntax"]
+    assert parsed.value is not None
+    output, predict = parsed.value.questions
+    assert isinstance(output, OutputQuestion) and output.script == "examples/a.py"
+    assert isinstance(predict, ChoiceQuestion) and predict.sim is None
+    nameless = parse(body.replace('"id": "x"', '"id": "my quiz"')).value
+    assert nameless is not None and (nameless.id, len(nameless.questions)) == ("", 2)

@@ -1,4 +1,4 @@
-"""What an author is told of wrong JSON, TOML, course maps and files beside models.
+"""What an author is told of wrong JSON, TOML, course maps, files beside models, and quizzes.
 
 The cases are `tests/fixtures/texts/`; `pytest tests/core/syntax --rewrite-fixtures` writes what is
 expected anew.
@@ -13,6 +13,7 @@ from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
+from support import quiz_fences
 from support.json_texts import parse
 from support.text_cases import FOLDER, Reader, check_texts
 
@@ -38,6 +39,7 @@ READERS: dict[str, Reader] = {
     "toml": read_toml,
     "map": read_map,
     "model": read_model,
+    "quiz": lambda text: (None, quiz_fences.parse(text).diagnostics),
 }
 
 
