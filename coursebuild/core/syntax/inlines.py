@@ -36,7 +36,6 @@ from coursebuild.core.model import (
     Strikethrough,
     Strong,
     Term,
-    Text,
     plain_text,
 )
 from coursebuild.core.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
@@ -142,9 +141,6 @@ class _Pass:
         nodes = self.stack[-1].nodes
         if not self.links:
             nodes += with_mentions(run, self.content)
-        elif len(run) == 1 and run[0].text != "\n":
-            text, start, end, _ = run[0]
-            nodes.append(Text(self.content.span(start, end), text))
         else:
             nodes += plain(run, self.content)
 

@@ -145,9 +145,6 @@ def plain(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
 
 
 def _text(items: list[TextPiece], content: Excerpt) -> Text:
-    if len(items) == 1:
-        text, start, end, _ = items[0]
-        return Text(content.span(start, end), text)
     joined = "".join([item.text for item in items])
     return Text(content.span(items[0].start, items[-1].end), joined)
 

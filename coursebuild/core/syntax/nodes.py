@@ -57,9 +57,6 @@ class StringNode(_Placed, frozen=True, eq=False):
     def excerpt(self) -> Excerpt:
         """The value, each character with its place in the source: an escape's is its backslash."""
         inner, offset = self.body.pieces, self.body.offset
-        if len(inner) == 1:  # nearly always
-            places = tuple([(at, offset(place)) for at, place in self.runs])
-            return Excerpt(self.body.source, self.value, places)
         pieces: list[tuple[int, int]] = []
         stops = [*(at for at, _ in self.runs[1:]), len(self.value)]
         for (at, place), stop in zip(self.runs, stops, strict=True):

@@ -146,11 +146,6 @@ class InlineState(StateInline):
 
 def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
     """The rows joined, each character with its place in the source of `base`."""
-    single = len(base.pieces) == 1
-    if single and len(rows) == 1:
-        text, offset, padding = rows[0]
-        if not padding:
-            return Excerpt(base.source, text, ((0, base.pieces[0][1] + offset),))
     texts: list[str] = []
     pieces: list[tuple[int, int]] = []
     at, shift = 0, None
@@ -160,8 +155,7 @@ def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
             shift = None
         start = at + padding
         end = offset + len(text) - padding
-        for inner, source_at in base.pieces if single else _pieces(base, offset, end):
-            to = source_at + offset if single else source_at
+        for inner, to in _pieces(base, offset, end):
             if to - start - inner != shift:
                 shift = to - start - inner
                 pieces.append((start + inner, to))

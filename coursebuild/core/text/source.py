@@ -174,36 +174,20 @@ class Excerpt(Struct, frozen=True):
 
     def offset(self, at: int) -> int:
         """Source offset of the character at text offset `at`."""
-        pieces = self.pieces
-        if len(pieces) == 1:
-            text_at, source_at = pieces[0]
-        else:
-            i = bisect_right(pieces, at, key=_text_offset) - 1
-            text_at, source_at = pieces[max(i, 0)]
+        i = bisect_right(self.pieces, at, key=_text_offset) - 1
+        text_at, source_at = self.pieces[max(i, 0)]
         return min(source_at + (at - text_at), len(self.source.text))
 
     def span(self, start: int = 0, end: int | None = None) -> Span:
         """The source span that `text[start:end]` came from, with what lies between its pieces."""
         end = len(self.text) if end is None else end
-        source, pieces = self.source, self.pieces
-        size = len(source.text)
-        if len(pieces) == 1:  # nearly always, and asked for often
-            shift = pieces[0][1] - pieces[0][0]
-            first, last = start + shift, end + shift
-            if first > size or last > size:
-                first, last = min(first, size), min(last, size)
-            return Span(source, first, last if last > first else first)
         first = self.offset(start)
         last = self.offset(end - 1) + 1 if end > start else first
-        return Span(self.source, first, max(first, min(last, size)))
+        return Span(self.source, first, max(first, min(last, len(self.source.text))))
 
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""
-        source, text, pieces = self.source, self.text, self.pieces
-        if len(pieces) == 1:
-            at, size = pieces[0][1] + start - pieces[0][0], len(source.text)
-            return Excerpt(source, text[start:end], ((0, at if at < size else size),))
-        end = len(text) if end is None else end
+        end = len(self.text) if end is None else end
         first = bisect_right(self.pieces, start, key=_text_offset)
         last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
         inner = ((t - start, s) for t, s in self.pieces[first:last])
