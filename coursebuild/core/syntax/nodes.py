@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
@@ -21,7 +21,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
-class _Placed(Struct, frozen=True, eq=False):
+class _PositionedNode(Struct, frozen=True, eq=False):
     """What every node has: its stretch `[start, end)` of the text that was parsed."""
 
     body: Excerpt
@@ -44,7 +44,7 @@ class _Placed(Struct, frozen=True, eq=False):
         return self.body.text[self.start : self.end]
 
 
-class StringNode(_Placed, frozen=True, eq=False):
+class StringNode(_PositionedNode, frozen=True, eq=False):
     """A string, a key included."""
 
     value: str
@@ -56,43 +56,39 @@ class StringNode(_Placed, frozen=True, eq=False):
     @property
     def excerpt(self) -> Excerpt:
         """The value, each character with its place in the source: an escape's is its backslash."""
-        inner, offset = self.body.pieces, self.body.offset
         pieces: list[tuple[int, int]] = []
         stops = [*(at for at, _ in self.runs[1:]), len(self.value)]
         for (at, place), stop in zip(self.runs, stops, strict=True):
-            pieces.append((at, offset(place)))
-            i = bisect_right(inner, place, key=lambda piece: piece[0])
-            while i < len(inner) and inner[i][0] < place + (stop - at):
-                pieces.append((at + inner[i][0] - place, inner[i][1]))
-                i += 1
+            part = self.body.slice(place, place + stop - at)
+            pieces += [(at + start, source_at) for start, source_at in part.pieces]
         return Excerpt(self.body.source, self.value, tuple(pieces))
 
 
-class NumberNode(_Placed, frozen=True, eq=False):
+class NumberNode(_PositionedNode, frozen=True, eq=False):
     """A number; a float may be infinite or, in TOML, not a number."""
 
     value: int | float
 
 
-class BoolNode(_Placed, frozen=True, eq=False):
+class BoolNode(_PositionedNode, frozen=True, eq=False):
     """`true` or `false`."""
 
     value: bool
 
 
-class NullNode(_Placed, frozen=True, eq=False):
+class NullNode(_PositionedNode, frozen=True, eq=False):
     """JSON's `null`."""
 
 
-class DateNode(_Placed, frozen=True, eq=False):
+class DateNode(_PositionedNode, frozen=True, eq=False):
     """TOML's dates and times. No field takes one; `raw` says what was written."""
 
 
-class ErrorNode(_Placed, frozen=True, eq=False):
+class ErrorNode(_PositionedNode, frozen=True, eq=False):
     """What stands in the place of a value and was already reported."""
 
 
-class ArrayNode(_Placed, frozen=True, eq=False):
+class ArrayNode(_PositionedNode, frozen=True, eq=False):
     """A list of values."""
 
     mark_end: int
@@ -105,7 +101,7 @@ class ArrayNode(_Placed, frozen=True, eq=False):
         return self.body.span(self.start, self.mark_end)
 
 
-class ObjectNode(_Placed, frozen=True, eq=False):
+class ObjectNode(_PositionedNode, frozen=True, eq=False):
     """A JSON object or a TOML table."""
 
     mark_start: int
