@@ -36,6 +36,29 @@ Url: TypeAlias = Annotated[
 ]
 
 
+Language: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$",
+        extra={"expects": "a language tag, as in `en` or `pt-BR`"},
+    ),
+]
+Version: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^[0-9]+\.[0-9]+\.[0-9]+$",
+        extra={"expects": "a version of three numbers, as in `3.14.0`"},
+    ),
+]
+FeaturePath: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^features/[\w-]+(/[\w-]+)*\.py$",
+        extra={"expects": "a Python file in `features/`, as in `features/tabs.py`"},
+    ),
+]
+
+
 class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What the course is."""
 
@@ -46,40 +69,16 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
     summary: Annotated[str, Meta(description="one or two sentences, for the home page")] = ""
     language: Annotated[
-        Annotated[
-            str,
-            Meta(
-                pattern=r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$",
-                extra={"expects": "a language tag, as in `en` or `pt-BR`"},
-            ),
-        ],
-        Meta(description="the language of the lessons, as in `en` or `pt-BR`"),
+        Language, Meta(description="the language of the lessons, as in `en` or `pt-BR`")
     ] = "en"
     base_url: Annotated[Url | None, Meta(description="where the site will stand")] = None
     repository: Annotated[Url | None, Meta(description="where its sources are")] = None
     licence: Annotated[str, Meta(description="its name, as in `CC-BY-4.0`")] = ""
     engine: Annotated[
-        Annotated[
-            str,
-            Meta(
-                pattern=r"^[0-9]+\.[0-9]+\.[0-9]+$",
-                extra={"expects": "a version of three numbers, as in `3.14.0`"},
-            ),
-        ]
-        | None,
-        Meta(description="the version of MuJoCo that the course is written for"),
+        Version | None, Meta(description="the version of MuJoCo that the course is written for")
     ] = None
     features: Annotated[
-        tuple[
-            Annotated[
-                str,
-                Meta(
-                    pattern=r"^features/[\w-]+(/[\w-]+)*\.py$",
-                    extra={"expects": "a Python file in `features/`, as in `features/tabs.py`"},
-                ),
-            ],
-            ...,
-        ],
+        tuple[FeaturePath, ...],
         Meta(description="features of the course's own, as files in `features/`"),
     ] = ()
 

@@ -17,7 +17,7 @@ from urllib.parse import unquote
 
 from coursebuild.core.features import FenceKind, fence_kind
 from coursebuild.core.model import Bench, BenchPart, Block, CodeBlock, FeatureBlock, Mjcf, Script
-from coursebuild.core.syntax.fence import Fence, missing_feature, near_kind
+from coursebuild.core.syntax.fence import Fence, kind_doubts
 from coursebuild.core.syntax.info import Word, parse_info, read_keys
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import stray_keys
@@ -39,8 +39,7 @@ def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block
         case "python":
             return _python(fence, session)
         case "text":
-            for wrong in stray_keys(fence):
-                session.report(wrong)
+            session.diagnostics += stray_keys(fence)
             return fence.code()
         case "mjcf":
             mjcf = _parse_mjcf(fence)
@@ -53,12 +52,7 @@ def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block
         case name if (kind := fence_kind(name)) is not None:
             return _of_feature(kind, fence, session, texts)
         case _:
-            missing = missing_feature(fence)
-            if missing is not None:
-                session.report(missing)
-            near = near_kind(fence)
-            if near is not None:
-                session.report(near)
+            session.diagnostics += kind_doubts(fence)
             return fence.code()
 
 

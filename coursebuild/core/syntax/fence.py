@@ -1,12 +1,13 @@
 """Fences: a code block of the text, and what makes one of ours out of it.
 
-Entry points: `read_fence` (a token into a `Fence`), `near_kind` (a kind that looks misspelt),
-`missing_feature` (a kind that an installed feature would read).
+Entry points: `read_fence` (a token into a `Fence`), `kind_doubts` (of a kind that looks misspelt,
+or that a feature would read that is not installed).
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
@@ -50,8 +51,7 @@ class Fence(Struct, frozen=True):
 
     def code(self) -> CodeBlock:
         """It as a code block of no special kind."""
-        language = unescaped(self.kind)
-        return CodeBlock(self.span, language, unescaped(self.info.text), self.body)
+        return CodeBlock(self.span, unescapeAll(self.kind), unescapeAll(self.info.text), self.body)
 
 
 def is_ours(kind: str) -> bool:
@@ -104,39 +104,22 @@ def _line_start(source: Source, line: int) -> int:
     return starts[line - 1] if line <= len(starts) else len(source.text)
 
 
-def unescaped(info: str) -> str:
-    """An info string with CommonMark's backslash escapes and entities decoded."""
-    return unescapeAll(info)
-
-
-def near_kind(fence: Fence) -> Diagnostic | None:
-    """What is wrong with a code block that looks like one of ours and is none."""
+def kind_doubts(fence: Fence) -> Iterator[Diagnostic]:
+    """What looks wrong with a code block that is none of ours."""
+    package = missing_package(fence.kind)
+    if package:
+        message = f"nothing that is installed reads a block of kind `{fence.kind}`"
+        yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
     kind = kind_of(fence.info)
-    if not kind.text:
-        return None
-    name = kind.text.lower()
     words = parse_info(fence.info).value.words
+    name, known = kind.text.lower(), (*CORE_FENCES, *fence_names())
+    near = "lab simlab" if name == "simlab" else nearest(name, known, cutoff=0.75)
+    if not name:
+        return
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
         help = "a script is a block of kind `python`"
-        return diagnose("script-kind", kind.span(), message, help=help)
-    if name in _LANGUAGES:
-        return None
-    near = (
-        "lab simlab"
-        if name == "simlab"
-        else nearest(name, (*CORE_FENCES, *fence_names()), cutoff=0.75)
-    )
-    if near is None:
-        return None
-    message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
-    return diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")
-
-
-def missing_feature(fence: Fence) -> Diagnostic | None:
-    """That a block would be more than code if its feature were installed."""
-    package = missing_package(fence.kind)
-    if not package:
-        return None
-    message = f"nothing that is installed reads a block of kind `{fence.kind}`"
-    return diagnose("feature-missing", fence.head, message, help=f"install {package}")
+        yield diagnose("script-kind", kind.span(), message, help=help)
+    elif near is not None and name not in _LANGUAGES:
+        message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
+        yield diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")
