@@ -179,16 +179,6 @@ def _check_html(span: Span, document: Document) -> Iterator[Diagnostic]:
         yield from _anchor(place, link[1][1:], document, "this page")
 
 
-class _Named(Struct, frozen=True):
-    """What a link calls by its name."""
-
-    rule: str
-    name: str
-    among: Collection[str]
-    missing: str
-    """What to say where it is not among them."""
-
-
 def _check_link(
     link: Link, target: Target, document: Document, known: LinkTargets
 ) -> Iterator[Diagnostic]:
@@ -196,10 +186,9 @@ def _check_link(
     if isinstance(target, UrlTarget):
         yield from _check_url(span, target.url, document, known)
         return
-    named = _named(link, target, known)
-    if named.name not in named.among:
-        help = did_you_mean(named.name, named.among)
-        yield diagnose(named.rule, span, named.missing, help=help)
+    rule, name, names, missing = _named(link, target, known)
+    if name not in names:
+        yield diagnose(rule, span, missing, help=did_you_mean(name, names))
     elif isinstance(target, ModelTarget):
         declared = known.scenarios.get(target.name, ())
         yield from _model_place(span, target.anchor, known.models[target.name], declared)
@@ -211,24 +200,24 @@ def _check_link(
         yield from _anchor(span, target.anchor, to, where)
 
 
-def _named(link: Link, target: _Name, known: LinkTargets) -> _Named:
-    map_lacks = (
+def _named(link: Link, target: _Name, known: LinkTargets) -> tuple[str, str, Collection[str], str]:
+    """The rule of a link, the name by which it calls, all there are, and what to say without it."""
+    lacks = (
         f"is {'mentioned' if link.mention else 'linked to'}, and the course map does not have it"
     )
     match target:
         case LessonTarget(id=id):
-            return _Named("link-lesson", id, known.lessons, f"lesson {id} {map_lacks}")
+            return "link-lesson", id, known.lessons, f"lesson {id} {lacks}"
         case LevelTarget(id=id):
-            return _Named("link-level", id, known.levels, f"level {id} {map_lacks}")
+            return "link-level", id, known.levels, f"level {id} {lacks}"
         case PageTarget(id=id):
-            return _Named("link-page", id, known.pages, f"no page `{id}` in the course map")
+            return "link-page", id, known.pages, f"no page `{id}` in the course map"
         case ModelTarget(name=name):
-            return _Named("link-model", name, known.models, f"no model `{name}` in models/")
+            return "link-model", name, known.models, f"no model `{name}` in models/"
         case ExampleTarget(path=path):
-            missing = f"no lesson has a script `{path}`"
-            return _Named("link-example", path, known.scripts, missing)
+            return "link-example", path, known.scripts, f"no lesson has a script `{path}`"
         case TermTarget(id=id):
-            return _Named("link-term", id, known.terms, f"no lesson defines the term `{id}`")
+            return "link-term", id, known.terms, f"no lesson defines the term `{id}`"
         case _:
             assert_never(target)
 
