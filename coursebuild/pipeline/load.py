@@ -194,6 +194,8 @@ class _Loader:
     def _unlisted(self) -> None:
         for source in self.unnamed.values():
             help = f"add a [[level.lesson]] to {MAP}, or move the file away"
+            if source.path.count("/") > 2:
+                help = "lessons lie in content/lessons itself: move it there, or out of content/"
             message = f"the course map does not name {source.path}"
             self.found.append(diagnose("lesson-unlisted", source.span(0, 0), message, help=help))
             self._document(source, lesson=True)

@@ -161,22 +161,29 @@ def document_links(course: Course, document: Document, known: LinkTargets) -> It
     """
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
-            yield from _check_html(block.span, document)
+            yield from _check_html(block, document, known)
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, Link):
                 target = resolve(inline.target, course, document.source.path)
                 yield from _check_link(inline, target, document, known)
             elif isinstance(inline, Image):
-                yield from _check_image(inline, document, known)
+                yield from _check_media("the image ", inline.url, inline.url_span, document, known)
             elif isinstance(inline, RawInline):
-                yield from _check_html(inline.span, document)
+                yield from _check_html(inline, document, known)
 
 
-def _check_html(span: Span, document: Document) -> Iterator[Diagnostic]:
-    """Links of raw HTML to anchors of its own page."""
+def _check_html(
+    html: HtmlBlock | RawInline, document: Document, known: LinkTargets
+) -> Iterator[Diagnostic]:
+    """Links of raw HTML to anchors of its own page, and the files that it shows."""
+    span = html.span
     for link in _HTML_ANCHOR.finditer(span.text):
         place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
         yield from _anchor(place, link[1][1:], document, "this page")
+    for media in html.media:
+        parts = urlsplit_or_none(media.url)
+        if parts is None or (parts.scheme != "data" and (parts.netloc or parts.path)):
+            yield from _check_media("", media.url, media.span, document, known)
 
 
 def _check_link(
@@ -278,21 +285,19 @@ def _file_help(path: str, known: LinkTargets) -> str:
     )
 
 
-def _check_image(image: Image, document: Document, known: LinkTargets) -> Iterator[Diagnostic]:
-    parts = urlsplit_or_none(image.url)
+def _check_media(
+    what: str, url: str, span: Span, document: Document, known: LinkTargets
+) -> Iterator[Diagnostic]:
+    """Whether a file that a page shows is one of the course."""
+    parts = urlsplit_or_none(url)
     if parts is None or parts.scheme or parts.netloc:
-        yield diagnose(
-            "image-remote",
-            image.url_span,
-            f"the image `{image.url}` is not a file of the course",
-            help="put the file into content/ and name it relative to the lesson",
-        )
+        message = f"{what}`{url}` is not a file of the course"
+        help = "put the file into content/ and name it relative to the lesson"
+        yield diagnose("image-remote", span, message, help=help)
         return
-    path = local_file(image.url, document.source.path)
+    path = local_file(url, document.source.path)
     if path not in known.files:
-        yield diagnose(
-            "link-file", image.url_span, f"no file `{path}`", help=_file_help(path, known)
-        )
+        yield diagnose("link-file", span, f"no file `{path}`", help=_file_help(path, known))
 
 
 def urlsplit_or_none(url: str) -> SplitResult | None:

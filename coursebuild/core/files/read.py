@@ -81,11 +81,7 @@ def read_course(root: Path) -> Parsed[CourseFiles]:
     root = root.resolve()
     reader = _Reader(root)
     files = [*reader.walk("content"), *reader.walk("models")]
-    lessons = [
-        f
-        for f in files
-        if f.startswith("content/lessons/") and f.count("/") == 2 and f.endswith(".md")
-    ]
+    lessons = [f for f in files if f.startswith("content/lessons/") and f.endswith(".md")]
     pages = [f for f in files if f.startswith("content/pages/") and f.endswith(".md")]
     models = [f for f in files if f.startswith("models/") and f.endswith(".xml")]
     declarations = [f for f in files if f.startswith("models/") and f.endswith(".toml")]

@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model.inlines import Inline, Label
+from coursebuild.core.model.inlines import Inline, Label, MediaAddress
 from coursebuild.core.model.interactive import Lab
 from coursebuild.core.model.lexicon import Lexicon
 from coursebuild.core.text.source import Excerpt, Source, Span
@@ -89,6 +89,7 @@ class HtmlBlock(Struct, frozen=True):
 
     span: Span
     html: str
+    media: tuple[MediaAddress, ...] = ()
 
 
 class HtmlFlow(Struct, frozen=True):

@@ -177,11 +177,22 @@ class Image(Struct, frozen=True):
     """Where the address is written: in the image, or in the definition that it names."""
 
 
+class MediaAddress(Struct, frozen=True):
+    """Where raw HTML names a file that a page shows: a picture, a video, a frame."""
+
+    start: int
+    """In the HTML, as is `end`."""
+    end: int
+    url: str
+    span: Span
+
+
 class RawInline(Struct, frozen=True):
     """Inline HTML, kept."""
 
     span: Span
     html: str
+    media: tuple[MediaAddress, ...] = ()
 
 
 class SoftBreak(Struct, frozen=True):

@@ -174,7 +174,7 @@ class _Writer:
             case CodeBlock():
                 return self.context.code(block.language, block.code.text)
             case HtmlBlock():
-                return block.html
+                return self._raw(block)
             case HtmlFlow():
                 return f"{self.inlines(block.children)}\n"
             case ThematicBreak():
@@ -274,7 +274,7 @@ class _Writer:
             case Image():
                 return self._image(inline)
             case RawInline():
-                return inline.html
+                return self._raw(inline)
             case HardBreak():
                 return f"<br{self.look.void_end}\n"
             case NumberBinding():
@@ -283,6 +283,14 @@ class _Writer:
                 return self._reference(inline)
             case _:
                 assert_never(inline)
+
+    def _raw(self, node: HtmlBlock | RawInline) -> str:
+        """Raw HTML, with the addresses that files of the course have on the page."""
+        parts, at = list[str](), 0
+        for media in node.media:
+            parts += (node.html[at : media.start], _escaped(self.context.url(media.url)))
+            at = media.end
+        return "".join((*parts, node.html[at:]))
 
     def _link(self, link: Link) -> str:
         title = f' title="{_escaped(link.title)}"' if link.title else ""

@@ -6,6 +6,7 @@ or that a feature would read that is not installed).
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 
@@ -123,3 +124,33 @@ def kind_doubts(fence: Fence) -> Iterator[Diagnostic]:
     elif near is not None and name not in _LANGUAGES:
         message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
         yield diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")
+    elif not package and (unread := _unread_object(fence)) is not None:
+        yield unread
+
+
+def _unread_object(fence: Fence) -> Diagnostic | None:
+    """That a block holds a JSON object that was surely meant for a kind that nothing reads."""
+    body = fence.body.text.strip()
+    if not fence.kind or not body.startswith("{") or not body.endswith("}"):
+        return None
+    try:
+        if not isinstance(json.loads(body), dict):
+            return None
+    except (ValueError, RecursionError):
+        return None
+    if _is_language(fence.kind):
+        return None
+    message = f"nothing reads a block of kind `{fence.kind}`: its JSON is shown as code"
+    help = "a lab is of kind `lab`, a quiz of kind `quiz`; JSON to be shown is of kind `json`"
+    return diagnose("fence-unread", kind_of(fence.info).span(), message, help=help)
+
+
+def _is_language(name: str) -> bool:
+    """Whether code of a kind is highlighted."""
+    from pygments.lexers import find_lexer_class_by_name  # which this rare question alone needs
+    from pygments.util import ClassNotFound
+
+    try:
+        return find_lexer_class_by_name(name) is not None
+    except ClassNotFound:
+        return name.lower() in ("json5", "jsonc", "hjson")

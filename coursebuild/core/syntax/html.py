@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from html import unescape
 from typing import NamedTuple
 
-from coursebuild.core.model import HtmlFlow, Inline, Math, RawInline
+from coursebuild.core.model import HtmlFlow, Inline, Math, MediaAddress, RawInline
 from coursebuild.core.syntax.links import TextPiece, check_raw_scheme, plain, with_mentions
 from coursebuild.core.syntax.math import find_formula
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
@@ -35,6 +35,13 @@ _TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'
 _LINK = re.compile(
     r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE
 )
+_SHOWS = frozenset("audio embed iframe img input object source track video".split())
+"""Elements that show a file."""
+_SHOWN = re.compile(
+    r"""\s(src|srcset|poster|data)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE
+)
+_CANDIDATE = re.compile(r"[\s,]*([^\s,]+)[^,]*")
+"""An address of a `srcset`, with the size that follows it."""
 _PIECE = re.compile(r"\\\$|\$|<")
 _ENTITY = re.compile(r"&[^\s&;]{1,32};")
 
@@ -148,6 +155,27 @@ class Balance:
         self._report(diagnose("html-unbalanced", span, message))
 
 
+def media_of(html: str, place: Callable[[int, int], Span]) -> tuple[MediaAddress, ...]:
+    """The addresses of files that HTML shows; `place` says where a part of it stands."""
+    return tuple(
+        MediaAddress(start, end, unescape(html[start:end]), place(start, end))
+        for tag in tags(html)
+        if tag.name in _SHOWS
+        for attribute in _SHOWN.finditer(html, tag.start, tag.end)
+        for start, end in _addresses(attribute)
+    )
+
+
+def _addresses(attribute: re.Match[str]) -> Iterator[tuple[int, int]]:
+    """Where the addresses in the value of an attribute stand."""
+    start, end = attribute.span(attribute.lastindex or 0)
+    if attribute[1].lower() == "srcset":
+        for candidate in _CANDIDATE.finditer(attribute.string, start, end):
+            yield candidate.span(1)
+    elif start < end:
+        yield start, end
+
+
 def html_flow(excerpt: Excerpt, balance: Balance) -> HtmlFlow:
     """HTML of a quiz text: tags as they are, formulas and texts between them as inlines."""
     return HtmlFlow(excerpt.span(), tuple(_Flow(excerpt, balance).read()))
@@ -230,4 +258,9 @@ class _Flow:
             self.literal.append(tag.name)
         if tag.name == "a":
             self.links = max(0, self.links + (-1 if tag.closes else 1))
-        return RawInline(span, self.text[tag.start : tag.end])
+        html = self.text[tag.start : tag.end]
+
+        def place(start: int, end: int) -> Span:
+            return self.excerpt.span(tag.start + start, tag.start + end)
+
+        return RawInline(span, html, media_of(html, place))

@@ -40,7 +40,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
 from coursebuild.core.syntax.headings import term_id
-from coursebuild.core.syntax.html import Balance, tags
+from coursebuild.core.syntax.html import Balance, media_of, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
 from coursebuild.core.syntax.links import (
     TextPiece,
@@ -51,19 +51,15 @@ from coursebuild.core.syntax.links import (
     with_mentions,
 )
 from coursebuild.core.syntax.markdown import Definitions
-from coursebuild.core.syntax.math import unread_formula
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken, locate
+from coursebuild.core.syntax.unread_markup import unread_markup
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
 """Emphasis inside emphasis; what is deeper loses its marks."""
 
-_UNREAD = (
-    "in `$x$` no blank stands inside the dollar signs, no digit follows the last one, and no line "
-    "of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
-)
 _BRACES = re.compile(r"\{[^}\s]{0,60}\}?")
 _DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
@@ -127,8 +123,8 @@ class _Pass:
                 self._leaf(token)
         self._flush()
         self.reader.balance.leave()
-        if "$" in self.content.text:
-            self._unread_math()
+        for unread in unread_markup(self.content, self.texts):
+            self.reader.report(unread)
         return tuple(self.stack[0].nodes)
 
     # -- texts
@@ -143,13 +139,6 @@ class _Pass:
             nodes += with_mentions(run, self.content)
         else:
             nodes += plain(run, self.content)
-
-    def _unread_math(self) -> None:
-        dollar = unread_formula(self.texts)
-        if dollar is not None:
-            span = self.content.span(dollar, dollar + 1)
-            what = "a dollar sign and TeX stand in the text: no formula was read here"
-            self.reader.report(diagnose("math-unread", span, what, help=_UNREAD))
 
     def _unclosed_math(self, token: PositionedToken) -> None:
         span = self.content.span(token.start, token.end)
@@ -311,7 +300,7 @@ class _Pass:
             self.reader.balance.add(tag, token.content, place)
             if tag.name == "a" and not tag.complete:
                 self.links = max(0, self.links + (-1 if tag.closes else 1))
-        return RawInline(span, token.content)
+        return RawInline(span, token.content, media_of(token.content, place))
 
     def _image(self, token: PositionedToken, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])

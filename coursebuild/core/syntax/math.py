@@ -1,7 +1,7 @@
 """Formulas: the inline rule for `$…$` and `$$…$$`, and the block rule for `$$` on its own lines.
 
 Entry points: `math_inline`, `math_block` (rules of the parsers), `find_formula` (also for HTML in
-quiz texts), `unread_formula`.
+quiz texts).
 
 A `$` opens a formula when something other than white space follows; the next `$` that no backslash
 escapes must close it, with something other than white space before it and no digit after it. So
@@ -13,7 +13,6 @@ before that means that it was never closed.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from markdown_it.rules_block import StateBlock
@@ -153,29 +152,3 @@ def _closing(src: str, at: int, end: int) -> int | None:
         return None
     found = _BLOCK_TEX.match(src, at, end).end()  # type: ignore[union-attr]  # it matches nothing too
     return found if src.startswith("$$", found, end) else None
-
-
-_TEX_COMMAND = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
-"""A command, an index or an exponent."""
-_MEANT = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
-"""A dollar sign that no sum of money follows."""
-
-
-def unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
-    """Where a formula begins that was meant and not read: a dollar sign and TeX in a text.
-
-    `$5` is money. But a blank inside `$x = $`, or a list that begins in the middle of a formula
-    because a line of it starts with `+ `, leaves dollar signs and commands in the text. `texts` are
-    those of a block that are neither code nor formulas nor escaped, in order, each with its place
-    in the block's content.
-    """
-    dollars = [text for _, text in texts if "$" in text]
-    if not any(_MEANT.search(text) for text in dollars):
-        return None
-    parts, end = list[str](), 0
-    for at, text in texts:
-        parts += ["\0"] * (at > end) + [text]  # what stands between two texts parts them
-        end = at + len(text)
-    if _TEX_COMMAND.search("".join(parts)) is None:
-        return None
-    return next(at + text.index("$") for at, text in texts if "$" in text)

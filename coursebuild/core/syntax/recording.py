@@ -22,6 +22,11 @@ _NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,
 )
+_PRINTS = re.compile(
+    r"(?:.{0,80}[.;:!?]\s+)?[^.;:!?]{0,60}\b(?:print(?:s|ed)?|outputs?|writes)\b[^.;!?]{0,60}:\s*",
+    re.IGNORECASE | re.DOTALL,
+)
+"""A sentence that leads to what a script prints: "On this machine it prints (abridged):"."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
@@ -35,7 +40,8 @@ def is_caption(inlines: tuple[Inline, ...]) -> bool:
 
 def near_caption(inlines: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
     """A warning where a `text` block looks recorded, and is compared with nothing."""
-    if _NEAR_CAPTION.fullmatch(plain_text(inlines)) is None:
+    text = plain_text(inlines)
+    if _NEAR_CAPTION.fullmatch(text) is None and _PRINTS.fullmatch(text) is None:
         return []
     message = "this looks like the caption of a recorded output, and nothing is compared"
     help = "a caption begins with the word `Output` and ends with a colon: `Output:`"

@@ -40,7 +40,7 @@ from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
-from coursebuild.core.syntax.html import Balance, html_flow, tags
+from coursebuild.core.syntax.html import Balance, html_flow, media_of, tags
 from coursebuild.core.syntax.inlines import InlineReader
 from coursebuild.core.syntax.markdown import Definitions, block_tokens
 from coursebuild.core.syntax.parsing_state import ParsingState, Written
@@ -201,7 +201,7 @@ class TextReader:
             for tag in tags(html.text):
                 self.balance.add(tag, html.text, html.span)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
-        return HtmlBlock(self._span(token), text)
+        return HtmlBlock(self._span(token), text, media_of(html.text, html.span))
 
     def _rule(self, token: PositionedToken) -> ThematicBreak:
         return ThematicBreak(self._span(token))

@@ -48,7 +48,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "silence-rule",
         "error",
-        "An entry of [[silence]] names an unknown rule or an error, or gives no reason.",
+        "An entry of `[[silence]]` names an unknown rule or an error, or gives no reason.",
     ),
     ("no-lessons", "error", "The course has no lesson to publish."),
     ("no-scripts", "error", "A check ran no script, so that it verified nothing."),
@@ -84,11 +84,21 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("fence-key-repeated", "error", "A fence has the same key twice."),
     ("fence-key-value", "error", "A key of a fence has an impossible value."),
     ("fence-kind-near", "warning", "The kind of a code block looks like a misspelt kind of ours."),
+    (
+        "fence-unread",
+        "warning",
+        "A code block of a kind that nothing reads holds a JSON object, as blocks of ours do.",
+    ),
     ("feature-broken", "error", "A feature of the course's own cannot be loaded."),
     ("feature-missing", "error", "A fence needs a feature that is not installed."),
     ("math-syntax", "error", "A formula does not parse."),
     ("math-unclosed", "error", "Display math is never closed."),
     ("math-unread", "warning", "A dollar sign and TeX stand in a text, and no formula was read."),
+    (
+        "markup-foreign",
+        "warning",
+        "Markup of another tool stands in a text, which shows it as it is written.",
+    ),
     ("equation-label", "error", "The label of a formula cannot be read, or stands where none may."),
     # terms and symbols
     ("term-attribute", "error", "The attribute by which a text defines a term cannot be read."),
@@ -108,7 +118,8 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "image-remote",
         "error",
-        "An image comes from another host; a page shows only what the course holds.",
+        "A picture, a video or a frame comes from another host; a page shows only what the course "
+        "holds.",
     ),
     ("image-alt", "warning", "An image has no text alternative."),
     (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.syntax.math import unread_formula
+from coursebuild.core.syntax.unread_markup import unread_formula
 
 
 @pytest.mark.parametrize(
