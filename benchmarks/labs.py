@@ -180,7 +180,7 @@ def native(text: str, steps: int) -> Callable[[], float]:
 
 def headless(engine: Any, lab: Any, mjb: bytes, steps: int) -> Callable[[], float]:
     """The main run of a trial, in the V8 of this process, without what is recorded for parity."""
-    from coursebuild.labs.compile import compile_lab
+    from coursebuild.features.lab.compile import compile_lab
 
     module = compile_lab(lab, "lab")
     config = json.loads(module.config)
@@ -292,11 +292,11 @@ def browsing() -> Iterator[Any]:
 
 def race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
     """A line for each model."""
-    from coursebuild.core.model import Lab
     from coursebuild.core.run.lab_engine import LabEngine
     from coursebuild.core.run.native import NativeEngine
     from coursebuild.core.syntax.document import parse_document
     from coursebuild.core.text.source import Source
+    from coursebuild.features.lab.model import Lab
 
     with LabEngine() as engine, NativeEngine(folder) as saver:
         for i, (name, text) in enumerate(MODELS.items(), 1):

@@ -23,7 +23,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"numerics"}),
     frozenset({"core.features", "core.values"}),
     frozenset({"core.syntax", "core.checks", "core.scripts", "core.pages", "core.files"}),
-    frozenset({"labs", "report", "core.engine"}),
+    frozenset({"report", "core.engine"}),
     frozenset({"core.run"}),
     frozenset({"features"}),
     frozenset({"pipeline"}),
@@ -37,7 +37,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 PURE = (
     *("core.text", "core.drawing", "core.model", "core.syntax", "core.checks", "core.scripts"),
-    *("core.pages", "labs", "numerics", "report"),
+    *("core.pages", "numerics", "report"),
 )
 NUMERICS_NEEDS = ("numerics", "core.model", "core.text", "core.drawing")
 """Measuring can be read alone."""

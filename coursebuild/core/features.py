@@ -20,16 +20,23 @@ import hashlib
 import importlib
 import importlib.util
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
 from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline
-from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.model.results import (
+    CompileResult,
+    LabResult,
+    ModelFacts,
+    OutputFile,
+    Results,
+    ScriptRun,
+)
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.rules import RULES, Rule
@@ -37,14 +44,17 @@ from coursebuild.core.text.rules import RULES, Rule
 if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
     from coursebuild.core.model.results import FileList, SiteFile
     from coursebuild.core.pages.added_files import SiteContext
+    from coursebuild.core.pages.assets import Assets
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.exports.context import ExportContext
     from coursebuild.core.pages.exports.plain import Plain
     from coursebuild.core.pages.library import Library
     from coursebuild.core.pages.page_inputs import PageInputs
     from coursebuild.core.pages.tools import Tools
+    from coursebuild.core.scripts.dependencies import Inputs
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
+    from coursebuild.pipeline.remember import Memory
 
 B = TypeVar("B", bound=FeatureBlock)
 
@@ -57,6 +67,9 @@ class IndexReader(Protocol):
 
     def add(self, kind: Literal["text", "code", "formula", "output"], text: str) -> None:
         """Read a text, unless there is nothing in it."""
+
+    def also(self, name: str) -> None:
+        """Read a name by which the section is found as well."""
 
     def blocks(self, blocks: Iterable[Block]) -> None:
         """Read the blocks inside."""
@@ -81,7 +94,7 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     markdown: Callable[[Plain, B], str]
     """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
     wide: bool = True
-    """Whether it takes the whole width of the text, so that no docked lab can stand beside it."""
+    """Whether it takes the whole width of the text, so that no docked block can stand beside it."""
     index: Callable[[IndexReader, B], None] = lambda reader, block: None
     """Gives the search what can be found of the block."""
 
@@ -147,6 +160,66 @@ class Exporter(Struct, frozen=True, kw_only=True):
     """Whether it is a ZIP archive; if not, `make` gives one file."""
 
 
+class Trial(Struct, frozen=True):
+    """Something of a course that is tried when the course is verified."""
+
+    name: str
+    """Unique in the course, as `4.2-lab-1`."""
+    owner: str
+    """Id of its lesson or page."""
+    block: FeatureBlock
+
+
+class TrialContext(Struct, frozen=True):
+    """What trials are given."""
+
+    root: Path
+    """The course's folder."""
+    course: Course
+    models: Mapping[str, CompileResult]
+    """Of `models/`, by name."""
+    memory: Memory
+    """What is remembered of earlier trials, and where results are kept."""
+    wrong: Sequence[Diagnostic] = ()
+    """What is known to be wrong already: a block in which something is need not be tried."""
+    static: bool = False
+    """Whether pages are made of the results."""
+
+
+Tried: TypeAlias = tuple[tuple[LabResult, ...], tuple[Diagnostic, ...]]
+"""What trials gave, and what is wrong."""
+
+
+class TrialRun(Protocol):
+    """Trials that are under way in a thread."""
+
+    def run(self, trials: Sequence[Trial]) -> Tried:
+        """Try them in turn."""
+
+    def stop(self) -> None:
+        """From another thread: end what runs, and let nothing begin."""
+
+
+class PublishedTrials(Struct, frozen=True):
+    """What a site has of trials."""
+
+    shown: Mapping[str, Struct] = {}
+    """What the page of a block shows, by the trial's name."""
+    files: tuple[OutputFile, ...] = ()
+
+
+class Trials(Struct, frozen=True, kw_only=True):
+    """What a feature tries when a course is verified."""
+
+    find: Callable[[Course], Iterable[Trial]]
+    """All there are in a course, in order."""
+    start: Callable[[TrialContext], TrialRun]
+    inputs: Callable[[Trial], Inputs | None]
+    """What a result depends on besides files; `None` for what is not run."""
+    publish: Callable[[Results, Assets], PublishedTrials]
+    """What a site needs of the results."""
+
+
 class Feature(Struct, frozen=True, kw_only=True):
     """What a lesson can hold or a site can offer. Everything but the name is optional."""
 
@@ -161,8 +234,15 @@ class Feature(Struct, frozen=True, kw_only=True):
     """What is wrong in some documents of the course, beside what parsing found."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
     """What is wrong once the scripts have run."""
+    check_models: (
+        Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
+    ) = None
+    """What is wrong once models are compiled, given what is known of the model of a block."""
+    trials: Trials | None = None
     schemas: Mapping[str, tuple[type[Struct], str]] = {}
     """JSON Schemas for editors, by the name that `coursebuild schema` takes: type and title."""
+    refine_schema: Callable[[dict[str, Any]], None] | None = None
+    """Adds to the definitions of a schema, by the name of the struct, what types cannot say."""
     texts: Mapping[str, str] = {}
     """Interface texts by language, as TOML; those in English (`en`) stand for missing ones."""
     style: str = ""
@@ -181,11 +261,12 @@ CORE_PAGES = ("home", "level", "lesson", "stub", "model", "page", "notfound")
 """The kinds of pages that every site has."""
 _FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
 """Folders of every site."""
-CORE_FENCES = ("bench", "lab", "mjcf", "python", "text")
+CORE_FENCES = ("bench", "mjcf", "python", "text")
 """The kinds of fences that the core reads."""
 
 _INSTALLED_BY = {
     "io": "coursebuild with its io cards",
+    "lab": "coursebuild with its labs",
     "mermaid": "`plugins/mermaid` of coursebuild",
     "quiz": "coursebuild with its quizzes",
     "tabs": "`plugins/tabs` of coursebuild",
@@ -295,6 +376,20 @@ def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, .
     runs = tuple(runs)
     checks = (feature.check_runs for feature in features() if feature.check_runs is not None)
     return tuple(found for check in checks for found in check(course, runs))
+
+
+def feature_trials(course: Course) -> dict[str, tuple[Trials, Trial]]:
+    """What features try of a course, by name, in order; each with how it is tried."""
+    kinds = (feature.trials for feature in features() if feature.trials is not None)
+    return {trial.name: (kind, trial) for kind in kinds for trial in kind.find(course)}
+
+
+def publish_trials(results: Results, assets: Assets) -> PublishedTrials:
+    """What a site needs of what features tried."""
+    kinds = (feature.trials for feature in features() if feature.trials is not None)
+    published = [kind.publish(results, assets) for kind in kinds]
+    shown = {name: value for one in published for name, value in one.shown.items()}
+    return PublishedTrials(shown, tuple(file for one in published for file in one.files))
 
 
 @functools.cache

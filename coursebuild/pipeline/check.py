@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
+from coursebuild.core.features import feature_trials
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course, Status
 from coursebuild.core.scripts.extract import extract
@@ -118,9 +119,7 @@ def _seconds(verified: Verified) -> dict[str, float]:
 
 
 def _names(course: Course) -> list[str]:
-    from coursebuild.pipeline.lab_inputs import labs_of
-
-    return [*(e.path for e in extract(course).value), *(name for _, name, _ in labs_of(course))]
+    return [*(e.path for e in extract(course).value), *feature_trials(course)]
 
 
 def no_lessons(course: Course) -> list[Diagnostic]:

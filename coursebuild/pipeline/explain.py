@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
+from coursebuild.core.features import feature_trials
 from coursebuild.core.model import (
     Bench,
     Course,
     Document,
     ExampleTarget,
+    FeatureBlock,
     Image,
-    Lab,
     Lesson,
     Link,
     ModelTarget,
@@ -39,7 +40,6 @@ from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.remembered import RunRecord
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.records import bench_path
-from coursebuild.pipeline.lab_inputs import SIMULATED, lab_inputs, labs_of
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
 from coursebuild.pipeline.remember import Memory
@@ -73,9 +73,9 @@ class _Explainer:
             extraction.path: (extraction, job)
             for extraction, job in zip(extractions, jobs(extractions), strict=True)
         }
-        self.labs = {
-            name: (owner, lab) for owner, name, lab in labs_of(course) if lab.kind == SIMULATED
-        }
+        tried = feature_trials(course).items()
+        inputs = ((name, kind.inputs(trial), trial) for name, (kind, trial) in tried)
+        self.labs = {name: (known, trial) for name, known, trial in inputs if known is not None}
 
     def of(self, name: str) -> Explanation:
         path = path_from_root(name, self.root)
@@ -103,7 +103,11 @@ class _Explainer:
             scripts = [
                 self._script(p) for p, (e, _) in self.scripts.items() if e.document == part.path
             ]
-            labs = [self._lab(n) for n, (_, lab) in self.labs.items() if lab.span.path == part.path]
+            labs = [
+                self._lab(name)
+                for name, (_, trial) in self.labs.items()
+                if trial.block.span.path == part.path
+            ]
             kind: Literal["lesson", "page"] = "lesson" if isinstance(part, Lesson) else "page"
             return Explanation(part.path, kind, (*scripts, *labs))
         for model in self.course.models:
@@ -137,12 +141,11 @@ class _Explainer:
         return _explained("script", path, extraction.owner, last, tuple(reasons))
 
     def _lab(self, name: str) -> Explained:
-        owner, lab = self.labs[name]
-        inputs = lab_inputs(lab, name)
+        inputs, trial = self.labs[name]
         last = self.memory.last(inputs.path)
         holds = last is not None and self._lab_holds(last, inputs)
         reasons = [] if holds else self._reasons(last, inputs)
-        return _explained("lab", name, owner, last, tuple(reasons))
+        return _explained("lab", name, trial.owner, last, tuple(reasons))
 
     def _lab_holds(self, last: RunRecord, inputs: Inputs) -> bool:
         same = not last.forgotten and last.inputs == inputs
@@ -163,10 +166,9 @@ class _Explainer:
         for script in self.scripts:
             if script != path and self._depends(self.memory.last(script), path):
                 found.append(self._script(script))
-        for name, (_, lab) in self.labs.items():
-            inputs = lab_inputs(lab, name)
-            model = f"models/{lab.model}.xml" if lab.model else ""
-            if model == path or self._depends(self.memory.last(inputs.path), path):
+        for name, (inputs, trial) in self.labs.items():
+            models = [f"models/{model}.xml" for model in trial.block.models()]
+            if path in models or self._depends(self.memory.last(inputs.path), path):
                 found.append(self._lab(name))
         return tuple(found)
 
@@ -192,7 +194,8 @@ class _Explainer:
 def _uses(document: Document, path: str) -> Iterator[object]:
     """What in a document shows a file, links to it, or quotes its output."""
     for block in document_blocks(document):
-        if isinstance(block, Lab) and block.model and f"models/{block.model}.xml" == path:
+        models = block.models() if isinstance(block, FeatureBlock) else ()
+        if path in [f"models/{model}.xml" for model in models]:
             yield block
         if isinstance(block, Bench) and path in _shown_of(block.model):
             yield block

@@ -84,7 +84,6 @@ _HEAVY = (
     "coursebuild.core.pages.lesson",
     "coursebuild.core.pages.pages",
     "coursebuild.core.syntax.document",
-    "coursebuild.core.syntax.lab",
     "coursebuild.features.search.page",
 )
 

@@ -20,8 +20,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import assert_never
 
-from msgspec import Struct
-
 from coursebuild.core.engine.digests import Clock, Digests, changed_since
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
@@ -50,17 +48,6 @@ _MOST_SHARED = 32
 _FETCHERS = 16
 """Requests to the shared cache at a time."""
 _REASON = "{} changed while it ran"
-
-
-class LabTrial(Struct, frozen=True):
-    """The trial of a lab."""
-
-    ok: bool
-    kept: bool
-    """Whether its result can be used again."""
-    seconds: float
-    made: int
-    """When, in seconds since 1970."""
 
 
 class States:
@@ -176,17 +163,29 @@ class Memory:
         record = None if data is None else from_bytes(data.partition(b"\n")[2])
         return record if record is not None and record.inputs.path == path else None
 
-    def note_lab(self, inputs: Inputs, files: Iterable[str], trial: LabTrial) -> None:
-        """Note what a lab's trial depends on; `files` are those of its model."""
+    def note_trial(
+        self,
+        inputs: Inputs,
+        files: Iterable[str],
+        *,
+        ok: bool,
+        lasting: bool,
+        seconds: float,
+        made: int,
+    ) -> None:
+        """Note what a trial depends on besides its inputs: files of the course.
+
+        `lasting`: whether its result can be used again. `made`: when, in seconds since 1970.
+        """
         needed = [Need(Kind.FILE, path) for path in sorted(files)]
         record = RunRecord(
             inputs,
             tuple(Dependency(n.kind, n.name, self.states(n)) for n in needed),
-            Outcome.OK if trial.ok else Outcome.FAILED,
+            Outcome.OK if ok else Outcome.FAILED,
             0,
-            trial.seconds,
-            trial.made,
-            "" if trial.kept else "it may end in another way the next time",
+            seconds,
+            made,
+            "" if lasting else "it may end in another way the next time",
         )
         self._note(record)
 

@@ -15,7 +15,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import msgspec
 
@@ -25,7 +25,7 @@ from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf, mjcf_worker, mujoco_files
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.dependencies import Kind, Need
+from coursebuild.core.scripts.dependencies import Need, need_of
 from coursebuild.pipeline.remember import States
 
 _KIND = "models"
@@ -126,12 +126,6 @@ class _Models:
 
     def _full(self, need: Need) -> str:
         return str(self.root / need.name)
-
-
-def need_of(name: str) -> Need:
-    """What the state of a model's file is asked by: a path of the project, or an absolute one."""
-    outside = PurePosixPath(name).is_absolute()
-    return Need(Kind.OUTSIDE if outside else Kind.FILE, name)
 
 
 def _group(path: str, text: str) -> str:

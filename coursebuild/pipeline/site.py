@@ -128,7 +128,7 @@ class SiteMaker:
         pages = Pages(self.library, self.documents, self.store, entries, last_good)
         self.documents.rest()
         names, shared = self._shared(None if whole_fonts else pages.facts)
-        files = [*self._labs(), *self._downloads()]
+        files = [*self._feature_files(), *self._downloads()]
         added, listed = added_files(functools.partial(self._context, pages, names))
         files += [*added, *shared]
         files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
@@ -187,8 +187,8 @@ class SiteMaker:
     def _kept_copy(self, key: str, make: Callable[[], bytes], *, local: bool = False) -> bytes:
         return prepared_copy(key) or self.store.get_or_create("compressed", key, make, local=local)
 
-    def _labs(self) -> list[SiteFile]:
-        files = self.library.labs.files
+    def _feature_files(self) -> list[SiteFile]:
+        files = self.library.feature_files
         return [*files, *self._copies(files)]
 
     def _context(self, pages: Pages, names: Names, feature: str) -> SiteContext:

@@ -22,8 +22,8 @@ from msgspec import Struct
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
-from coursebuild.core.features import check_runs
-from coursebuild.core.model import Course, FeatureBlock, Lab, document_blocks, document_has
+from coursebuild.core.features import TrialContext, Trial, Trials, check_runs, feature_trials
+from coursebuild.core.model import Course, FeatureBlock, document_blocks
 from coursebuild.core.model.results import CompileResult, LabResult, Results, ScriptRun
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
@@ -36,6 +36,7 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
+from coursebuild.pipeline.trials import run_with_trials
 from coursebuild.report import LabLine, ScriptLine
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def verify(
     """
     options.store.listen(progress.say)
     extracted = extract_scripts(course, options)
-    chosen, only = _chosen(course, extracted.runnable, documents, shard)
+    chosen, trials = _chosen(course, extracted.runnable, documents, shard)
     models, compiled = compile_models(course, options, progress)
     memory = Memory(options.root, options.store)
     scripts = functools.partial(
@@ -81,22 +82,10 @@ def verify(
     )
     labs: tuple[LabResult, ...] = ()
     found = [*extracted.diagnostics, *compiled]
-    if any(document_has(document, Lab) for document in course.documents):
-        from coursebuild.pipeline.labs import Engines, Tried, run_scripts_and_labs, try_labs
-
-        def trials(engines: Engines) -> Tried:
-            return try_labs(
-                course,
-                dict(models),
-                options,
-                engines,
-                documents,
-                compiled,
-                static=static,
-                only=only,
-            )
-
-        runs, (labs, wrong) = run_scripts_and_labs(scripts, trials, options.root, progress)
+    if trials:
+        beside = Memory(options.root, options.store)  # for another thread
+        context = TrialContext(options.root, course, dict(models), beside, compiled, static)
+        runs, (labs, wrong) = run_with_trials(scripts, trials, context, progress)
         found += wrong
     else:
         runs = scripts()
@@ -119,21 +108,19 @@ def _chosen(
     runnable: Sequence[Extraction],
     documents: Collection[str] | None,
     shard: Shard | None,
-) -> tuple[Sequence[Extraction], frozenset[str] | None]:
-    """The scripts to run, and the names of the scripts and labs of this part, if it is one."""
-    chosen = runnable
+) -> tuple[Sequence[Extraction], tuple[tuple[Trials, Trial], ...]]:
+    """The scripts to run, and the trials."""
+    chosen, trials = runnable, feature_trials(course)
     if documents is not None:
         quoted = _quoted_scripts(course, documents)
         chosen = [e for e in chosen if e.document in documents or e.path in quoted]
-    if shard is None:
-        return chosen, None
-    from coursebuild.pipeline.lab_inputs import labs_of
-
-    labs = (
-        name for _, name, lab in labs_of(course) if documents is None or lab.span.path in documents
-    )
-    only = shard.takes([*(e.path for e in chosen), *labs])
-    return [e for e in chosen if e.path in only], only
+        paths = {name: trial.block.span.path for name, (_, trial) in trials.items()}
+        trials = {name: known for name, known in trials.items() if paths[name] in documents}
+    if shard is not None:
+        only = shard.takes([*(e.path for e in chosen), *trials])
+        chosen = [e for e in chosen if e.path in only]
+        trials = {name: known for name, known in trials.items() if name in only}
+    return chosen, tuple(trials.values())
 
 
 def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:

@@ -21,13 +21,13 @@ from msgspec.structs import replace
 from coursebuild.core.checks.course import check_document
 from coursebuild.core.checks.links import LinkTargets, link_targets
 from coursebuild.core.engine.prepared import prepared_folder
+from coursebuild.core.features import PublishedTrials, publish_trials
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Page
 from coursebuild.core.model.results import Outcome, Results, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.lab_files import LabFiles, PublishedLabs, lab_files
 from coursebuild.core.pages.library import Library, Owner, named_models, owners
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
@@ -35,7 +35,6 @@ from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.lab_inputs import labs_of
 from coursebuild.pipeline.load import Loaded, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
@@ -104,7 +103,7 @@ class Session:
         """The scripts that were run, as they were then."""
         self._again: dict[str, tuple[Extraction, str, str]] = {}
         """Of scripts that ran twice: what was run, and what each run printed."""
-        self._labs = PublishedLabs({}, ())
+        self._trials = PublishedTrials()
         self.files = Files(options, self._assets, self._documents, self._is_sound)
 
     def start(self, options: Options, progress: Progress) -> None:
@@ -247,7 +246,7 @@ class Session:
             results,
             self._assets,
             self._reports,
-            labs=self._placed_labs(course),
+            trials=self._trials,
             models_of=self._models_of,
         )
         self._targets = link_targets(course)
@@ -257,27 +256,18 @@ class Session:
         }
         self.files.show(library)
 
-    def _placed_labs(self, course: Course) -> PublishedLabs:
-        """The files of the labs where these stand now: one that moved stays the same."""
-        known = {files.result.name: files for files in self._labs.labs.values()}
-        found: dict[tuple[str, int], LabFiles] = {}
-        for _, name, lab in labs_of(course) if known else ():
-            if name in known:
-                found[lab.span.path, lab.span.start] = known[name]
-        return PublishedLabs(found, self._labs.files)
-
     # --- what background work found
 
     def take_results(
         self, course: Course, verified: Verified, others: Iterable[Diagnostic] = ()
     ) -> None:
         """Take what verifying a course found, and what else is wrong with it."""
-        results, labs = verified.results, self._labs
+        results, trials = verified.results, self._trials
         if results.labs != self._results.labs:
-            labs = lab_files(results.labs, self._assets)
+            trials = publish_trials(results, self._assets)
         with self.changed:
             self.found_by_running = (*verified.diagnostics, *others)
-            self._results, self._labs = results, labs
+            self._results, self._trials = results, trials
             self._ran = {extraction.path: extraction for extraction in extract(course).value}
             if self.course is not None:
                 self._show(self.course)

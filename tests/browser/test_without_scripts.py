@@ -21,7 +21,6 @@ from coursebuild.core.model import (
     Heading,
     Image,
     Inline,
-    Lab,
     Math,
     MathBlock,
     Mjcf,
@@ -42,6 +41,7 @@ from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.io.model import Io
+from coursebuild.features.lab.model import Lab
 from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, OrderQuestion, Quiz
 from support.built_sites import Site
 

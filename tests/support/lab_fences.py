@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from coursebuild.core.model import Block, Inline, Lab, Paragraph, Text
-from coursebuild.core.syntax.lab import parse_lab
+from coursebuild.core.model import Block, Inline, Paragraph, Text
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.parse import parse_lab
 from support.positioned_nodes import shown
 
 

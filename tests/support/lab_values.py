@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from coursebuild.core.model import Lab
+from coursebuild.core.features import TrialContext, Tried
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.core.run.native import NativeEngine
 from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
-from coursebuild.labs.compile import compile_lab
-from coursebuild.pipeline.labs import Engines
+from coursebuild.features.lab.compile import compile_lab
+from coursebuild.features.lab.inputs import SECONDS, lab_trials
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.trial import Engines, LabTrials
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.remember import Memory
 
 BALL = (
     "<mujoco><worldbody><body name='ball'><freejoint/><geom name='g' size='.1'/>"
@@ -33,7 +41,7 @@ def make_lab(text: str | None = None, /, **fields: Any) -> Lab:
 def request(lab: Lab, **more: Any) -> dict[str, Any]:
     """What the trial is asked."""
     module = compile_lab(lab, "4.2-lab-1")
-    seconds = lab.verify_seconds
+    seconds = lab.verify.seconds
     config = json.loads(module.config)
     return {"config": config, "code": module.literal, "seconds": seconds, **more}
 
@@ -41,6 +49,22 @@ def request(lab: Lab, **more: Any) -> dict[str, Any]:
 def xml_of(lab: Lab) -> str:
     assert lab.xml is not None
     return lab.xml.text
+
+
+def try_labs(
+    course: Course,
+    options: Options,
+    engines: Engines,
+    models: Mapping[str, CompileResult] | None = None,
+    wrong: Sequence[Diagnostic] = (),
+    documents: frozenset[str] | None = None,
+    seconds: float = SECONDS,
+) -> Tried:
+    """What comes of the labs of a course, or of some of its documents, without static forms."""
+    memory = Memory(options.root, options.store)
+    context = TrialContext(options.root, course, models or {}, memory, wrong)
+    trials = [t for t in lab_trials(course) if documents is None or t.block.span.path in documents]
+    return LabTrials(context, engines, seconds).run(trials)
 
 
 class Bench:

@@ -32,13 +32,12 @@ from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.judge import judge
-from coursebuild.pipeline.labs import try_labs
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import compile_models
 from support.fixture_cases import text_lines
-from support.lab_values import OpenEngines
+from support.lab_values import OpenEngines, try_labs
 
 FIRST = "content/lessons/1.1-first.md"
 SECOND = "content/lessons/1.2-second.md"
@@ -201,6 +200,6 @@ class Workshop:
         engines = self._engines.but(browser=browser)
         # What labs did is not shared: it would not be tried by another engine.
         own = replace(options, cache=Memo(root))
-        _, found = try_labs(loaded.course, dict(models), own, engines, wrong=wrong)
+        _, found = try_labs(loaded.course, own, engines, dict(models), wrong)
         diagnostics = [*loaded.diagnostics, *wrong, *found]
         return judge(loaded.course, diagnostics).diagnostics

@@ -6,11 +6,11 @@ import functools
 
 from msgspec.structs import replace
 
+from coursebuild.core.features import PublishedTrials
 from coursebuild.core.model import Course, Document
 from coursebuild.core.model.results import Results
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.lab_files import PublishedLabs
 from coursebuild.core.pages.library import Library
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
@@ -97,4 +97,4 @@ def assets() -> Assets:
 
 def library_of(course: Course, results: Results) -> Library:
     """What pages of a course of skeletons are made from."""
-    return Library.of(course, results, assets(), labs=PublishedLabs({}, ()))
+    return Library.of(course, results, assets(), trials=PublishedTrials())

@@ -2,10 +2,10 @@
 
 Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, models, texts)`.
 
-1. `mjcf_texts` gives each `mjcf` block and each lab's inline `xml` as a whole model, with the
-   number of lines put before it.
-2. `check_compiled` holds what compiling gave against what the lesson says, and a lab's names
-   against its model. A file that only other models include need not compile by itself.
+1. `mjcf_texts` gives each `mjcf` block, and each model that a block of a feature holds, as a whole
+   model, with the number of lines put before it.
+2. `check_compiled` holds what compiling gave against what the lesson says, and lets features check
+   what they name. A file that only other models include need not compile by itself.
 3. Scenarios that are declared for a model are held against it: what they name is there, states and
    commands have as many numbers as the model takes, and its timestep ends where the state is looked
    at and commands change. Of a model that declares none, the scenarios that texts name.
@@ -19,15 +19,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from msgspec import Struct
 
 from coursebuild.core.checks.benches import check_keyframes, declared_scenarios
+from coursebuild.core.features import features, kind_of_block
 from coursebuild.core.model import (
     Bench,
     Course,
     Declarations,
     DeclaredScenario,
-    Lab,
+    FeatureBlock,
     Mjcf,
     document_blocks,
-    document_has,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
@@ -39,7 +39,7 @@ _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTA
 class MjcfText(Struct, frozen=True):
     """A text to compile, and where it comes from."""
 
-    block: Mjcf | Lab
+    block: Mjcf | FeatureBlock
     code: Excerpt
     text: str
     lines_before: int
@@ -50,13 +50,11 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
     """Every MJCF text in the lessons, in document order."""
     texts: list[MjcfText] = []
     for document in course.documents:
-        if not document_has(document, Mjcf, Lab):
-            continue
         for block in document_blocks(document):
             if isinstance(block, Mjcf):
                 texts.append(_whole(block))
-            elif isinstance(block, Lab) and block.xml is not None:
-                texts.append(MjcfText(block, block.xml, block.xml.text, 0))
+            elif isinstance(block, FeatureBlock) and (code := block.mjcf()) is not None:
+                texts.append(MjcfText(block, code, code.text, 0))
     return tuple(texts)
 
 
@@ -81,15 +79,15 @@ def check_compiled(
     texts: Sequence[tuple[MjcfText, CompileResult]],
     readable: Callable[[str], str],
 ) -> tuple[Diagnostic, ...]:
-    """Diagnostics of the models, of the MJCF texts, and of the names that labs use.
+    """Diagnostics of the models, of the MJCF texts, and of what features name in them.
 
     `readable` makes one line of a message of MuJoCo's.
     """
     blocks = (block for document in course.documents for block in document_blocks(document))
-    using = [block for block in blocks if isinstance(block, Lab | Bench)]
-    labs = [block for block in using if isinstance(block, Lab)]
+    using = [block for block in blocks if isinstance(block, FeatureBlock | Bench)]
+    shown = {n for block in using if isinstance(block, FeatureBlock) for n in block.models()}
     found: list[Diagnostic] = []
-    parts = _parts(course, models) - {lab.model for lab in labs}
+    parts = _parts(course, models) - shown
     for model in course.models:
         result = models[model.name]
         if result.error and model.name not in parts:
@@ -101,11 +99,14 @@ def check_compiled(
         found += _check_text(text, result, readable)
         if result.facts is not None:
             facts[_place(text.block)] = result.facts
-    for lab in labs:
-        compiled = models.get(lab.model) if lab.model is not None else None
-        known = compiled.facts if compiled is not None else facts.get(_place(lab))
-        if known is not None:
-            found += _check_names(lab, known)
+
+    def known(block: FeatureBlock) -> ModelFacts | None:
+        named = (models[name].facts for name in block.models() if name in models)
+        return next(named, None) or facts.get(_place(block))
+
+    for feature in features():
+        if feature.check_models is not None:
+            found += feature.check_models(course, known)
     for bench in (block for block in using if isinstance(block, Bench)):
         compiled = models.get(bench.model)
         undeclared = not declared_scenarios(course, bench.model)
@@ -118,12 +119,12 @@ def check_compiled(
     return tuple(found)
 
 
-def _place(block: Mjcf | Lab) -> tuple[str, int]:
+def _place(block: Mjcf | FeatureBlock) -> tuple[str, int]:
     """What a block is found by: it may be another object the next time."""
     return block.span.path, block.span.start
 
 
-def _parts(course: Course, models: Mapping[str, CompileResult]) -> set[str | None]:
+def _parts(course: Course, models: Mapping[str, CompileResult]) -> set[str]:
     """Names of the files in models/ that are there to be included by others."""
     included = {
         path for result in models.values() if result.facts for path in result.facts.includes
@@ -166,39 +167,17 @@ def _check_text(
         return
     if result.error:
         span = _line(text.code, result.line, text.lines_before, block.span.first_line())
-        what = "the lab's `xml`" if isinstance(block, Lab) else "this block"
-        whole = isinstance(block, Lab) or block.fragment is not None or "<mujoco" in text.text
-        help = "" if whole else 'if it is a part of a model say so: `fragment="worldbody"`'
+        what, help = "this block", ""
+        if isinstance(block, FeatureBlock):
+            what = f"the model in this {kind_of_block(block).name}"
+        elif block.fragment is None and "<mujoco" not in text.text:
+            help = 'if it is a part of a model say so: `fragment="worldbody"`'
         message = f"{what} does not compile: {readable(result.error)}"
         yield diagnose("mjcf-error", span, message, help=help)
 
 
 def _folded(text: str) -> str:
     return " ".join(text.split())
-
-
-def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
-    span = lab.key_span or lab.span.first_line()
-    if isinstance(lab.key, int) and not 0 <= lab.key < len(facts.keyframes):
-        have = f"it has {len(facts.keyframes)}" if facts.keyframes else "it has none"
-        yield diagnose(
-            "lab-name", span, f"the model has no keyframe {lab.key}: {have}, counted from 0"
-        )
-    names = [name for name in facts.keyframes if name]
-    if isinstance(lab.key, str) and lab.key not in names:
-        yield diagnose(
-            "lab-name",
-            span,
-            f"the model has no keyframe `{lab.key}`",
-            help=did_you_mean(lab.key, names),
-        )
-    if lab.trail is not None and lab.trail not in facts.sites:
-        yield diagnose(
-            "lab-name",
-            lab.trail_span or lab.span.first_line(),
-            f"the model has no site `{lab.trail}`",
-            help=did_you_mean(lab.trail, facts.sites),
-        )
 
 
 _RULE = "scenario-model"

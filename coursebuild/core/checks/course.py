@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.core.checks.benches import bench_findings
-from coursebuild.core.checks.labs import lab_findings
 from coursebuild.core.checks.links import LinkTargets, document_links, link_targets
 from coursebuild.core.features import features
 from coursebuild.core.model import (
@@ -27,7 +26,7 @@ from coursebuild.core.text.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
-    """Lessons, links, mentions, labs, terms and features, checked against each other."""
+    """Lessons, links, mentions, terms and features, checked against each other."""
     targets, documents = link_targets(course), course.documents
     found = [wrong for one in documents for wrong in _document_findings(course, one, targets)]
     return (*found, *feature_findings(course, documents))
@@ -47,7 +46,6 @@ def _document_findings(
     blocks = tuple(document_blocks(document))
     yield from _lesson_findings(course, document, blocks)
     yield from document_links(course, document, targets)
-    yield from lab_findings(blocks, course)
     yield from bench_findings(blocks, course)
     yield from _term_findings(blocks, targets.terms)
 

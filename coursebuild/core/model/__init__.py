@@ -13,7 +13,6 @@ from coursebuild.core.model.addresses import *
 from coursebuild.core.model.blocks import *
 from coursebuild.core.model.course import *
 from coursebuild.core.model.inlines import *
-from coursebuild.core.model.interactive import *
 from coursebuild.core.model.lexicon import *
 from coursebuild.core.model.scenarios import *
 from coursebuild.core.model.walk import *

@@ -12,7 +12,6 @@ from typing import Literal, TypeAlias
 from msgspec import Struct
 
 from coursebuild.core.model.inlines import Inline, Label, MediaAddress
-from coursebuild.core.model.interactive import Lab
 from coursebuild.core.model.lexicon import Lexicon
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -274,6 +273,18 @@ class FeatureBlock(Struct, frozen=True):
         """Lines of verified outputs that it shows: the script's path, and the line from 1."""
         return ()
 
+    def models(self) -> tuple[str, ...]:
+        """The names of the models in `models/` that it shows."""
+        return ()
+
+    def mjcf(self) -> Excerpt | None:
+        """The text of a whole model that it holds, which is compiled with the course's."""
+        return None
+
+    def is_docked(self) -> bool:
+        """Whether it stands beside the text around it, where the screen is wide."""
+        return False
+
     def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
         """What a reader's progress is kept for: an id, unique in the course, and keys under it."""
         return None
@@ -296,7 +307,6 @@ Block: TypeAlias = (
     | Recording
     | Mjcf
     | Bench
-    | Lab
     | FeatureBlock
 )
 

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 from coursebuild.core.model.blocks import Block, Document, FeatureBlock, Heading, MathBlock
 from coursebuild.core.model.inlines import Label, Math
-from coursebuild.core.model.interactive import Lab
 from coursebuild.core.model.walk import (
     block_inlines,
     child_blocks,
@@ -35,15 +34,12 @@ class DisplayFormula(NamedTuple):
     """Empty where it has none."""
 
 
-_ELSEWHERE = (FeatureBlock, Lab)
-
-
 def blocks_elsewhere(document: Document) -> frozenset[int]:
-    """The Python ids of labs, blocks of features and the blocks inside them."""
+    """The Python ids of blocks of features and the blocks inside them."""
     return frozenset(
         id(block)
         for holder in document_blocks(document)
-        if isinstance(holder, _ELSEWHERE)
+        if isinstance(holder, FeatureBlock)
         for block in (holder, *walk_blocks(child_blocks(holder)))
     )
 

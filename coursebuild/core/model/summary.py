@@ -42,7 +42,6 @@ from coursebuild.core.model.blocks import (
     ThematicBreak,
 )
 from coursebuild.core.model.inlines import Image, Inline, Link, NumberBinding, RawInline, Term
-from coursebuild.core.model.interactive import Lab
 from coursebuild.core.model.walk import block_inlines, document_blocks, is_blank, walk_inlines
 from coursebuild.core.text.source import Span
 
@@ -74,8 +73,6 @@ def _kept_of(block: Block) -> Iterator[Block]:
             yield block
         case Recording():
             yield replace(block, caption=_inlines(block))
-        case Lab():
-            yield replace(block, note=())
         case FeatureBlock():
             bare = block.summary()
             if bare is not None:

@@ -26,9 +26,8 @@ from coursebuild.core.model.blocks import (
     Table,
 )
 from coursebuild.core.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong, Term
-from coursebuild.core.model.interactive import Lab
 
-_HOLDERS = (BlockQuote, Callout, ListBlock, Lab, FeatureBlock, Recording)
+_HOLDERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may have others in them."""
 _AROUND = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
 """Inlines that may have others in them."""
@@ -41,8 +40,6 @@ def child_blocks(block: Block) -> tuple[Block, ...]:
         return block.blocks
     if isinstance(block, ListBlock):
         return tuple(b for item in block.items for b in item.blocks)
-    if isinstance(block, Lab):
-        return block.note
     if isinstance(block, FeatureBlock):
         return block.child_blocks()
     if isinstance(block, Recording) and isinstance(block.body, Table):

@@ -16,7 +16,6 @@ from coursebuild.core.model import (
     FeatureBlock,
     Heading,
     HtmlBlock,
-    Lab,
     Mjcf,
     Recording,
     Script,
@@ -35,50 +34,51 @@ class ContentsEntry(Struct, frozen=True):
 
 
 def article(page: PageContext, document: Document) -> Markup:
-    """The text of a document. A docked lab stands beside the paragraphs around it."""
+    """The text of a document. A docked block stands beside the paragraphs around it."""
     parts: list[Markup] = []
     for group in _groups(document.blocks):
-        if group.lab is None:
+        if group.docked is None:
             parts.append(page.blocks(group.before))
         else:
             before, after = page.blocks(group.before), page.blocks(group.after)
-            instrument = page.block(group.lab)
+            instrument = page.block(group.docked)
             parts.append(
-                page.template("partials/dock.html", before=before, lab=instrument, after=after)
+                page.template("partials/dock.html", before=before, docked=instrument, after=after)
             )
     return Markup("\n").join((*parts, page.footnotes()))
 
 
 class _Group(Struct, frozen=True):
-    """Blocks that follow each other; with a docked lab, those before and after it."""
+    """Blocks that follow each other; with a docked one, those before and after it."""
 
     before: tuple[Block, ...]
-    lab: Lab | None = None
+    docked: FeatureBlock | None = None
     after: tuple[Block, ...] = ()
 
 
-_WIDE = (Script, Recording, Mjcf, Bench, Lab, Table, HtmlBlock)
+_WIDE = (Script, Recording, Mjcf, Bench, Table, HtmlBlock)
 
 
 def _is_wide(block: Block) -> bool:
-    """Whether a block takes the whole width, so that no lab can stand beside it."""
+    """Whether a block takes the whole width, so that nothing can stand beside it."""
     if isinstance(block, FeatureBlock):
         return kind_of_block(block).wide
     return isinstance(block, _WIDE)
 
 
+def _docked(block: Block) -> FeatureBlock | None:
+    return block if isinstance(block, FeatureBlock) and block.is_docked() else None
+
+
 def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
-    """Cut the text around its docked labs.
+    """Cut the text around its docked blocks.
 
     Each takes what lies between it and the next heading or wide block, on both sides.
     """
     groups: list[_Group] = []
     rest = blocks
-    while (
-        at := next((i for i, b in enumerate(rest) if isinstance(b, Lab) and b.dock), None)
-    ) is not None:
-        lab = rest[at]
-        assert isinstance(lab, Lab)
+    while (at := next((i for i, b in enumerate(rest) if _docked(b)), None)) is not None:
+        docked = _docked(rest[at])
         start = next((i + 1 for i in range(at - 1, -1, -1) if _is_wide(rest[i])), 0)
         start = next(
             (i for i in range(at - 1, start - 1, -1) if isinstance(rest[i], Heading)), start
@@ -93,7 +93,7 @@ def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
         )
         if start:
             groups.append(_Group(rest[:start]))
-        groups.append(_Group(rest[start:at], lab, rest[at + 1 : end]))
+        groups.append(_Group(rest[start:at], docked, rest[at + 1 : end]))
         rest = rest[end:]
     return (*groups, _Group(rest)) if rest else tuple(groups)
 

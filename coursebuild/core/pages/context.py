@@ -23,7 +23,6 @@ from coursebuild.core.model import (
     Document,
     FeatureBlock,
     Inline,
-    Lab,
     ListBlock,
     Mjcf,
     NumberBinding,
@@ -35,7 +34,7 @@ from coursebuild.core.model import (
     child_blocks,
     document_blocks,
 )
-from coursebuild.core.pages import blocks, formulas, labs, markup, urls
+from coursebuild.core.pages import blocks, formulas, markup, urls
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.equations import NumberedFormula, numbered
 from coursebuild.core.pages.library import Library
@@ -144,8 +143,6 @@ class PageContext(Struct, frozen=True):
                 return _bench(self, block)
             case PlainCode():
                 return blocks.plain_code(self, block)
-            case Lab():
-                return labs.lab(self, block)
             case FeatureBlock():
                 return kind_of_block(block).draw(self, block)
             case _:

@@ -42,10 +42,6 @@ PAGE_WORDS = (
 )
 """Interface texts that the page's script shows."""
 
-_LAB_KEYS = ("lab.plot", "lab.value", "lab.time", "lab.overlays", "lab.untitled")
-_LABS = PagePart(mark="data-script=", texts=("lab.live.", "overlay.", *_LAB_KEYS))
-"""Which the core has itself; features have more parts."""
-
 
 class Names(Struct, frozen=True):
     """Site paths of the files that every page refers to."""
@@ -113,8 +109,7 @@ _HERE = Markup("<!--here-->")
 
 def known_parts() -> dict[str, PagePart]:
     """What scripts bring to life, by its mark."""
-    parts = (_LABS, *(part for feature in features() for part in feature.parts))
-    return {part.mark: part for part in parts}
+    return {part.mark: part for feature in features() for part in feature.parts}
 
 
 def parts_of(body: str, kind: str) -> tuple[str, ...]:

@@ -13,12 +13,13 @@ from jinja2 import Environment
 from markupsafe import Markup
 from msgspec import Struct
 
+from coursebuild.core.features import PublishedTrials, feature_trials, publish_trials
 from coursebuild.core.model import (
     Bench,
     CalloutKind,
     Course,
     Document,
-    Lab,
+    FeatureBlock,
     Lesson,
     Level,
     Lexicon,
@@ -35,13 +36,13 @@ from coursebuild.core.model.results import (
     CompileResult,
     Formula,
     MathError,
+    OutputFile,
     Results,
     ScriptRun,
     Verdict,
 )
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.assets import Assets, strings_for
-from coursebuild.core.pages.lab_files import PublishedLabs, lab_files
 from coursebuild.core.pages.lookup.references import CrossReferences, Mentions, mentions
 from coursebuild.core.pages.quiz_index import QuizIndex, quiz_index
 from coursebuild.core.pages.strings import Strings
@@ -91,7 +92,10 @@ class Library(Struct, frozen=True):
     references: CrossReferences
     asked: QuizIndex
     """The questions of each document, as lists of lessons name them."""
-    labs: PublishedLabs
+    tried: Mapping[tuple[str, int], Struct]
+    """What features show of what was tried, by path and offset of the block."""
+    feature_files: tuple[OutputFile, ...]
+    """What of that is files of the site."""
     _formulas: Mapping[Formula, str | MathError]
     verdicts: Mapping[tuple[str, int], Verdict]
     """By `place`."""
@@ -106,13 +110,13 @@ class Library(Struct, frozen=True):
         assets: Assets,
         reports: Reports | None = None,
         *,
-        labs: PublishedLabs | None = None,
+        trials: PublishedTrials | None = None,
         models_of: Callable[[Document], NamedModels] | None = None,
     ) -> Library:
         """Look everything over once.
 
-        `labs` are the files of labs, where these are known. `models_of` is `named_models`, or what
-        remembers its results.
+        `trials` is what a site needs of what was tried, where it is known. `models_of` is
+        `named_models`, or what remembers its results.
         """
         formulas = dict(results.formulas)
         questions: dict[str, str] = {}
@@ -124,6 +128,8 @@ class Library(Struct, frozen=True):
             return mentions(document, course, lexicon_of(document, formulas))
 
         references = references_of(course, said)
+        if trials is None:
+            trials = publish_trials(results, assets)
         return cls(
             course=course,
             results=results,
@@ -142,7 +148,8 @@ class Library(Struct, frozen=True):
             uses=uses_of(course, models_of or named_models),
             references=references,
             asked=questions,
-            labs=lab_files(results.labs, assets) if labs is None else labs,
+            tried=_placed(course, trials),
+            feature_files=trials.files,
             _formulas=formulas,
             verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
             reports=reports or Reports(),
@@ -180,6 +187,13 @@ class Library(Struct, frozen=True):
         if self.words.has(f"promise.{kind}"):
             return self.words(f"promise.{kind}")
         return ours.promise if ours is not None else ""
+
+
+def _placed(course: Course, trials: PublishedTrials) -> dict[tuple[str, int], Struct]:
+    """What is shown of trials, by the places of their blocks: one that moved stays the same."""
+    found = feature_trials(course) if trials.shown else {}
+    spans = {name: trial.block.span for name, (_, trial) in found.items() if name in trials.shown}
+    return {(span.path, span.start): trials.shown[name] for name, span in spans.items()}
 
 
 def owners(course: Course) -> tuple[Owner, ...]:
@@ -237,7 +251,7 @@ class NamedModels(Struct, frozen=True):
 def named_models(document: Document) -> NamedModels:
     """The models that a document may use."""
     blocks = tuple(document_blocks(document))
-    labs = {block.model for block in blocks if isinstance(block, Lab) and block.model is not None}
+    labs = {name for b in blocks if isinstance(b, FeatureBlock) for name in b.models()}
     scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
     targets = (i.target for i in document_inlines(document) if isinstance(i, Link))
     links = {target.name for target in targets if isinstance(target, ModelTarget)}

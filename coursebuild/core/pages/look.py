@@ -15,7 +15,6 @@ from coursebuild.core.model import (
     Bench,
     Callout,
     FeatureBlock,
-    Lab,
     Mjcf,
     NumberBinding,
     PlainCode,
@@ -24,7 +23,7 @@ from coursebuild.core.model import (
     Target,
 )
 
-OwnBlock: TypeAlias = Bench | Callout | Lab | Mjcf | PlainCode | FeatureBlock | Recording | Script
+OwnBlock: TypeAlias = Bench | Callout | Mjcf | PlainCode | FeatureBlock | Recording | Script
 """The blocks that are more than Markdown."""
 
 

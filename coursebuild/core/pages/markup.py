@@ -34,7 +34,6 @@ from coursebuild.core.model import (
     HtmlFlow,
     Image,
     Inline,
-    Lab,
     Link,
     ListBlock,
     ListItem,
@@ -183,7 +182,7 @@ class _Writer:
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case Table():
                 return self.table(block)
-            case Bench() | Callout() | Lab() | Mjcf() | PlainCode():
+            case Bench() | Callout() | Mjcf() | PlainCode():
                 return self.context.block(block)
             case Recording() | Script() | FeatureBlock():
                 return self.context.block(block)

@@ -41,34 +41,6 @@ class ShownVerdict(Struct, frozen=True):
     comparison: Comparison
 
 
-class ShownRecord(Struct, frozen=True):
-    """What a page shows of the trial of a lab."""
-
-    picture: str
-    """Site path."""
-    size: tuple[int, int]
-    """Pixels."""
-    time: float
-    """Simulated time of the picture, s."""
-    readouts: tuple[tuple[str, str], ...]
-    end: float
-    """Simulated time of the readouts and of the end of the plots, s."""
-    plots: tuple[str, ...]
-    """SVG."""
-    tried: int
-    parity: str
-
-
-class ShownLab(Struct, frozen=True):
-    """A lab that runs."""
-
-    name: str
-    config: str
-    """Site path, as of `script`."""
-    script: str
-    record: ShownRecord | None
-
-
 class ShownBench(Struct, frozen=True):
     """What a page shows of a report."""
 
@@ -104,7 +76,8 @@ class ShownDocument(Struct, frozen=True):
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
     """By path of the script."""
     verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
-    labs: Mapping[int, ShownLab] = field(default_factory=dict)
+    trials: Mapping[int, Struct] = field(default_factory=dict)
+    """What features show of what was tried."""
     benches: Mapping[int, ShownBench] = field(default_factory=dict)
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""

@@ -14,11 +14,11 @@ from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
-from coursebuild.core.pages.labs import number
 from coursebuild.core.pages.lesson import LessonHead, LessonLink, edit_address, lesson_link
 from coursebuild.core.pages.library import Library, ModelUse
 from coursebuild.core.pages.measured import measured_view
 from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, Plotted
+from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.shown import shown
 
 

@@ -17,7 +17,6 @@ from coursebuild.core.model import (
     Document,
     ExampleTarget,
     FeatureBlock,
-    Lab,
     LessonTarget,
     LevelTarget,
     Mjcf,
@@ -119,8 +118,6 @@ class PlainContext:
                 return caption + self.code("text", block.body.text)
             case Bench():
                 return Markup(f"<p>{escape(block.model)}</p>\n")
-            case Lab():
-                return Markup(f"<p>{escape(block.title)}</p>\n")
             case FeatureBlock():
                 return Markup(render_blocks(block.child_blocks(), self, PLAIN))
             case _:

@@ -1,7 +1,7 @@
 """Numbers and their units in running text: in one line, and in order in text from the right.
 
 Entry points: `text_html(text, direction)`; its steps `joined` and `quantities`; `unit_length`;
-`in_order(html)`.
+`in_order(html)`; `number(value)`.
 
 1. No line ends between a number and its unit, nor inside a unit (`kg m²`): the space becomes one
    that does not break.
@@ -106,3 +106,9 @@ def quantities(text: str) -> Iterator[tuple[str, bool]]:
         at = found.end()
     if at < len(text):
         yield text[at:], False
+
+
+def number(value: float, digits: int | None = None) -> str:
+    """A number as a reader writes it: no trailing zeros, a real minus sign."""
+    text = f"{value:.{digits}f}" if digits is not None else f"{value:.12g}"
+    return text.replace("-", "\u2212")

@@ -8,6 +8,8 @@ from __future__ import annotations
 from typing import assert_never
 from urllib.parse import urlsplit
 
+from msgspec import Struct
+
 from coursebuild.core.model import (
     Bench,
     Block,
@@ -15,7 +17,6 @@ from coursebuild.core.model import (
     Document,
     ExampleTarget,
     FeatureBlock,
-    Lab,
     LessonTarget,
     LevelTarget,
     Link,
@@ -36,15 +37,12 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.lab_files import LabFiles
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.lookup.references import owner_path
 from coursebuild.core.pages.page_inputs import (
     ShownBench,
     ShownCallout,
     ShownDocument,
-    ShownLab,
-    ShownRecord,
     ShownRun,
     ShownVerdict,
 )
@@ -66,7 +64,7 @@ def shown(library: Library, place: urls.Place, document: Document) -> ShownDocum
         callouts=page.callouts,
         runs=page.runs(),
         verdicts=page.verdicts,
-        labs=page.labs,
+        trials=page.trials,
         benches=page.benches,
         keyframes=page.keyframes,
         address=urls.absolute(library.course, place.path),
@@ -84,7 +82,7 @@ class _Page:
         self.equations: dict[Target, str] = {}
         self.callouts: dict[str, ShownCallout] = {}
         self.verdicts: dict[int, ShownVerdict] = {}
-        self.labs: dict[int, ShownLab] = {}
+        self.trials: dict[int, Struct] = {}
         self.benches: dict[int, ShownBench] = {}
         self.keyframes: dict[str, tuple[str, ...]] = {}
         self.scripts: dict[str, set[int]] = {}
@@ -97,13 +95,10 @@ class _Page:
                 self.scripts.setdefault(block.path, set())
             case Recording():
                 self._recording(block)
-            case Lab():
-                self._lab(block)
             case Bench():
                 self.benches[block.span.start] = _shown_bench(self.library, self.place, block)
             case FeatureBlock():
-                for script, line in block.quoted_lines():
-                    self.scripts.setdefault(script, set()).add(line)
+                self._feature(block)
             case Callout():
                 library, kind = self.library, block.kind
                 words = ShownCallout(library.callout_label(kind), library.callout_promise(kind))
@@ -121,15 +116,17 @@ class _Page:
         if verdict is not None:
             self.verdicts[block.span.start] = ShownVerdict(verdict.status, verdict.comparison)
 
-    def _lab(self, block: Lab) -> None:
-        files = self.library.labs.labs.get((block.span.path, block.span.start))
-        if files is not None:
-            self.labs[block.span.start] = _shown_lab(files)
-        if block.model is not None:
-            self._link(ModelTarget(block.model))
-            compiled = self.library.models.get(block.model)
-            if isinstance(block.key, int) and compiled is not None and compiled.facts is not None:
-                self.keyframes[block.model] = compiled.facts.keyframes
+    def _feature(self, block: FeatureBlock) -> None:
+        for script, line in block.quoted_lines():
+            self.scripts.setdefault(script, set()).add(line)
+        tried = self.library.tried.get((block.span.path, block.span.start))
+        if tried is not None:
+            self.trials[block.span.start] = tried
+        for name in block.models():
+            self._link(ModelTarget(name))
+            compiled = self.library.models.get(name)
+            if compiled is not None and compiled.facts is not None:
+                self.keyframes[name] = compiled.facts.keyframes
 
     def _link(self, target: Target) -> None:
         if target not in self.hrefs:
@@ -157,22 +154,6 @@ def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
         for n in sorted(numbers)
     )
     return ShownRun(run.outcome, run.missing, tuple(asked))
-
-
-def _shown_lab(files: LabFiles) -> ShownLab:
-    result, static, record = files.result, files.result.static, None
-    if static is not None and files.picture is not None:
-        record = ShownRecord(
-            picture=files.picture,
-            size=static.size,
-            time=static.time,
-            readouts=static.readouts,
-            end=static.end,
-            plots=static.plots,
-            tried=len(result.tried),
-            parity=result.parity,
-        )
-    return ShownLab(result.name, files.config, files.script, record)
 
 
 def _shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench:

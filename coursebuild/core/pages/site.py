@@ -68,7 +68,7 @@ def render_site(
     shared, names = shared_files(assets, options.subset, all_facts(library, facts))
     files = [OutputFile(draft.path, frame(library, draft, names).encode()) for draft in drafts]
     files += shared
-    files += library.labs.files
+    files += library.feature_files
     files += _downloads(library, options)
     files += _machine_files(course, drafts)
     added, listed = added_files(functools.partial(_context, library, assets, names, entries, drawn))

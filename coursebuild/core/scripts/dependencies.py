@@ -16,6 +16,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import PurePosixPath
 from typing import assert_never
 
 from msgspec import Struct
@@ -64,6 +65,12 @@ class Need(Struct, frozen=True, order=True):
 
     kind: Kind
     name: str
+
+
+def need_of(name: str) -> Need:
+    """What the state of a file is asked by: a path of the project, or an absolute one."""
+    outside = PurePosixPath(name).is_absolute()
+    return Need(Kind.OUTSIDE if outside else Kind.FILE, name)
 
 
 class Dependency(Struct, frozen=True):

@@ -1,7 +1,7 @@
 """What a fence becomes, by its kind.
 
-Entry point: `fence_block`. Scripts are read in `script`, labs in `lab`, and other fences by their
-features. Here are two kinds of the core:
+Entry point: `fence_block`. Scripts are read in `script`, and other fences by their features. Here
+are two kinds of the core:
 
 - `mjcf`: a model or a fragment of one. Keys: `fragment="worldbody"` (where the fragment goes;
   `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
@@ -47,8 +47,6 @@ def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block
             return mjcf.value
         case "bench":
             return _bench(fence, session)
-        case "lab":
-            return _lab(fence, session, texts)
         case name if (kind := fence_kind(name)) is not None:
             return _of_feature(kind, fence, session, texts)
         case _:
@@ -85,23 +83,6 @@ def _bench(fence: Fence, session: ParsingState) -> Block:
     parsed = _parse_bench(fence)
     session.diagnostics += parsed.diagnostics
     return _nested(fence, session) if fence.nested else parsed.value
-
-
-def _lab(fence: Fence, session: ParsingState, texts: TextParser) -> Block:
-    info = parse_info(fence.info)
-    session.diagnostics += info.diagnostics
-    words = list(info.value.words)
-    kind, kind_span = "simlab", info.value.kind_span
-    if words and words[0].value is None:
-        kind, kind_span = words[0].key, words.pop(0).key_span
-    session.diagnostics += read_keys(fence.kind, words).diagnostics
-    if fence.nested:
-        return _nested(fence, session)
-    from coursebuild.core.syntax.lab import parse_lab
-
-    lab = parse_lab(fence.span, kind, kind_span, fence.body, texts)
-    session.diagnostics += lab.diagnostics
-    return lab.value or fence.code()
 
 
 def _of_feature(

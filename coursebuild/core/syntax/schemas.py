@@ -16,13 +16,11 @@ from msgspec import Struct
 
 from coursebuild.core.features import features
 from coursebuild.core.syntax.course_schema import CourseFile
-from coursebuild.core.syntax.lab_schema import SimLab, Slider
 from coursebuild.core.syntax.scenarios import ModelFile
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 _ROOTS: dict[str, tuple[type[Struct], str]] = {
-    "lab": (SimLab, "A lab fence of the kind simlab"),
     "course": (CourseFile, "The course map, content/course.toml"),
     "model": (ModelFile, "The file beside a model, models/NAME.toml"),
 }
@@ -38,12 +36,11 @@ def json_schema(name: str) -> bytes:
     root, title = schema_roots()[name]
     made = copy.deepcopy(msgspec.json.schema(root))
     definitions: dict[str, Any] = made["$defs"]
-    if Slider.__name__ in definitions:  # the tag that an author may leave out
-        definitions[Slider.__name__]["required"].remove("type")
     if name == "course":
         definitions["SilenceTable"]["required"].append("reason")
-    if SimLab.__name__ in definitions:
-        definitions[SimLab.__name__]["oneOf"] = [{"required": ["model"]}, {"required": ["xml"]}]
+    for refine in (feature.refine_schema for feature in features()):
+        if refine is not None:
+            refine(definitions)
     schema = {
         "$schema": DIALECT,
         "title": title,

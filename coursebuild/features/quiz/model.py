@@ -11,8 +11,9 @@ from typing import TypeAlias
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import Block, FeatureBlock, Inline, Lab
+from coursebuild.core.model import Block, FeatureBlock, Inline
 from coursebuild.core.text.source import Span
+from coursebuild.features.lab.model import Lab
 
 
 class Choice(Struct, frozen=True):

@@ -150,7 +150,7 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
         case _:
             pass
     if isinstance(sim, ObjectNode) and sim in decoding.structs:
-        from coursebuild.core.syntax.lab_checks import check_lab
+        from coursebuild.features.lab.relations import check_lab
 
         yield from check_lab(sim, decoding.structs)
 
@@ -202,7 +202,7 @@ def _question(
             sim = node.get("sim")
             lab = None
             if isinstance(sim, ObjectNode):
-                from coursebuild.core.syntax.lab import sim_lab
+                from coursebuild.features.lab.parse import sim_lab
 
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
             options = _choices(node, fields.options, prose)

@@ -12,7 +12,7 @@ from typing import Annotated, TypeAlias
 from msgspec import Meta, Struct
 
 from coursebuild.core.syntax.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
-from coursebuild.core.syntax.lab_schema import SimLab
+from coursebuild.features.lab.schema import SimLab
 
 Index: TypeAlias = Annotated[int, Meta(extra_json_schema={"minimum": 0})]
 """Of an option; that it is one is checked in `quiz`."""

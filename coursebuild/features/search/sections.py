@@ -33,7 +33,6 @@ from coursebuild.core.model import (
     HtmlFlow,
     Image,
     Inline,
-    Lab,
     Link,
     ListBlock,
     Math,
@@ -131,6 +130,10 @@ class SectionReader:
         if text:
             self._pieces.append(SectionPiece(kind, text))
 
+    def also(self, name: str) -> None:
+        """A name by which the section is found as well."""
+        self._also[name] = None
+
     def blocks(self, blocks: Iterable[Block]) -> None:
         """Blocks in order."""
         for block in blocks:
@@ -173,25 +176,12 @@ class SectionReader:
                 else:
                     self.add("output", block.body.text)
             case Bench():
-                self._also[block.model] = None
+                self.also(block.model)
                 self.add("text", self._measured.get(block.span.start, ""))
-            case Lab():
-                self._lab(block)
             case FeatureBlock():
                 kind_of_block(block).index(self, block)
             case _:
                 assert_never(block)
-
-    def _lab(self, lab: Lab) -> None:
-        self.add("text", lab.title)
-        self.blocks(lab.note)
-        labels = [control.label for control in lab.controls]
-        labels += [readout.label for readout in lab.readouts]
-        self.add("text", ", ".join(filter(None, labels)))
-        if lab.model is not None:
-            self._also[lab.model] = None
-        if lab.xml is not None:
-            self.add("code", lab.xml.text)
 
     def _formula(self, tex: str) -> str:
         text, names = plain_formula(tex)

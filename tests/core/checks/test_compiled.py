@@ -81,7 +81,7 @@ def test_an_error_is_told_at_its_line_without_indent(
         (block("", "<mujoco/>"), "this block does not compile: xml error: no good"),
         (block(" fragment=worldbody", "<x/>"), "this block does not compile: xml error: no good"),
         (make_course('```lab\n{"xml": "<x/>"}\n```\n'),
-         "the lab's `xml` does not compile: xml error: no good"),
+         "the model in this lab does not compile: xml error: no good"),
     ],
 )  # fmt: skip
 def test_what_does_not_compile_is_said_with_what_may_help(course: Course, message: str) -> None:

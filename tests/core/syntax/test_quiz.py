@@ -90,8 +90,8 @@ def test_a_complete_quiz(prefix: str, newline: str) -> None:
     assert isinstance(predict, ChoiceQuestion) and predict.predict
     lab = predict.sim
     assert lab is not None
-    assert (lab.kind, lab.model, lab.key) == ("simlab", "tumbling_box", "major")
-    assert lab.model_span is not None and lab.model_span.text == '"tumbling_box"'
+    assert (lab.kind, lab.fields.model, lab.fields.key) == ("simlab", "tumbling_box", "major")
+    assert lab.place(("model",)).text == '"tumbling_box"'
     assert (
         lab.span.text
         == lab.config

@@ -34,7 +34,6 @@ from coursebuild.core.model import (
     HtmlFlow,
     Image,
     Inline,
-    Lab,
     Link,
     ListBlock,
     ListItem,
@@ -124,7 +123,7 @@ def write_footnotes(footnotes: Iterable[Footnote], context: MarkdownContext) -> 
 
 
 _APART = (
-    *(HtmlBlock, Callout, PlainCode, Script, Recording, Mjcf, Bench, Lab, FeatureBlock),
+    *(HtmlBlock, Callout, PlainCode, Script, Recording, Mjcf, Bench, FeatureBlock),
     *(Table, MathBlock),
 )
 """Blocks that an empty line parts from others, even in a tight list."""
@@ -183,7 +182,7 @@ class _Writer:
                 return self._table(block)
             case Callout() | PlainCode() | Script() | Recording() | Mjcf():
                 return self.context.own(block)
-            case Bench() | Lab() | FeatureBlock():
+            case Bench() | FeatureBlock():
                 return self.context.own(block)
             case _:
                 assert_never(block)

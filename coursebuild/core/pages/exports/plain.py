@@ -21,9 +21,7 @@ from coursebuild.core.model import (
     Callout,
     FeatureBlock,
     Inline,
-    Lab,
     Mjcf,
-    ModelTarget,
     PlainCode,
     Recording,
     Script,
@@ -39,17 +37,7 @@ from coursebuild.core.pages.exports.marks import (
     fence,
     guarded,
     link,
-    picture,
     quoted,
-    table,
-)
-from coursebuild.core.pages.labs import (
-    control_view,
-    number,
-    overlay_name,
-    plot_view,
-    seconds,
-    start_name,
 )
 from coursebuild.core.pages.look import OwnBlock
 
@@ -104,8 +92,6 @@ class Plain(Struct, frozen=True):
                 return self._mjcf(block)
             case Bench():
                 return self._bench(block)
-            case Lab():
-                return self._lab(block)
             case FeatureBlock():
                 return kind_of_block(block).markdown(self, block)
             case _:
@@ -184,68 +170,11 @@ class Plain(Struct, frozen=True):
         """What can be said for an output."""
         return f"*{escaped(output_receipt(self.page, block).text)}*"
 
-    # --- labs
-
-    def _lab(self, block: Lab) -> str:
-        page, words = self.page, self.words
-        title = block.title or page.tools.words("lab.untitled")
-        parts = [f"**{words('lab.label')}: {escaped(title)}**"]
-        live = page.shown.labs.get(block.span.start)
-        record = live.record if live is not None else None
-        if record is not None:
-            alt = page.tools.words("lab.picture", title=title, t=number(record.time, 4))
-            parts.append(picture(alt, self.locate(page.place.href(record.picture))))
-            if record.readouts:
-                rows = [(_cell(label), _cell(value)) for label, value in record.readouts]
-                parts.append(f"{words('lab.at', t=seconds(record.end))}:")
-                parts.append(table((words("lab.readouts"), ""), rows))
-        parts.append(self._about(block))
-        if block.controls:
-            views = [control_view(page.tools.words, control) for control in block.controls]
-            rows = [(_cell(view.label), _cell(view.values)) for view in views]
-            parts.append(table((words("lab.control"), words("lab.range")), rows))
-        shows = self._shows(block, recorded=record is not None)
-        parts += ["\n".join(shows)] if shows else []
-        parts += [self.blocks(block.note)] if block.note else []
-        return "\n\n".join((*parts, link(words("exports.run_lab"), self.live)))
-
-    def _about(self, block: Lab) -> str:
-        """What is simulated, and from where to where."""
-        if block.model is not None:
-            name = link(escaped(block.model), self.href(ModelTarget(block.model)))
-            about = f"{self.words('lab.static')} {name}."
-        else:
-            about = f"{self.words('lab.static_xml')}."
-        start = start_name(self.page, block)
-        if start:
-            about += f" {self.words('lab.start')} {code_span(start)}."
-        if block.stop_at is not None:
-            about += f" {self.words('lab.stops', t=number(block.stop_at))}"
-        return about
-
-    def _shows(self, block: Lab, *, recorded: bool) -> list[str]:
-        words = self.page.tools.words
-        rows: list[tuple[str, tuple[str, ...]]] = []
-        if block.readouts and not recorded:
-            labels = tuple(readout.label for readout in block.readouts)
-            rows.append((words("lab.readouts"), labels))
-        for index in range(len(block.plots)):
-            view = plot_view(words, block, index)
-            rows.append((view.title, view.traces + view.marks))
-        if block.toggles:
-            names = tuple(overlay_name(words, name) for name in block.toggles)
-            rows.append((words("lab.overlays"), names))
-        return [f"- {escaped(label)}: {escaped(', '.join(names))}" for label, names in rows]
-
     def folded(self, label: str, text: str) -> str:
         """A text behind its label, which a notebook shows on demand."""
         if self.notebook:
             return f"<details>\n<summary>{label}</summary>\n\n{text}\n\n</details>"
         return f"**{label}:** {text}" if _begins_as_text(text) else f"**{label}:**\n\n{text}"
-
-
-def _cell(text: str) -> str:
-    return escaped(" ".join(text.split()))
 
 
 def _begins_as_text(text: str) -> bool:

@@ -24,7 +24,7 @@ export class Lab {
   /**
    * @param {import('./engine.js').Engine} engine
    * @param {Uint8Array} bytes the model, an MJB file
-   * @param {object} config the lab's data (coursebuild/labs/compile.py)
+   * @param {object} config the lab's data (coursebuild/features/lab/compile.py)
    * @param {object} code the lab's functions (ditto)
    * @param {{play?: () => void, pause?: () => void}} [host] what `sim.play()` and `sim.pause()` do besides
    */

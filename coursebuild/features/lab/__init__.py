@@ -1,0 +1,55 @@
+"""Labs: simulations that a learner plays with, tried when the course is verified.
+
+A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `checks` compares it
+with the course and its models, `page` and `markdown` show it. `trial` runs it in the engine that
+browsers use and natively; `picture` draws what was recorded, and `export` writes the lab as a
+Python script.
+"""
+
+from __future__ import annotations
+
+from coursebuild.core.features import Feature, FenceKind, PagePart, TrialContext, TrialRun, Trials
+from coursebuild.features.lab.checks import check_labs, check_model_names
+from coursebuild.features.lab.files import publish_labs
+from coursebuild.features.lab.inputs import lab_trials, trial_inputs
+from coursebuild.features.lab.markdown import lab_markdown
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.page import draw_lab, index_lab
+from coursebuild.features.lab.parse import parse_fence
+from coursebuild.features.lab.schema import SimLab, refine_schema
+
+
+def start(context: TrialContext) -> TrialRun:
+    """Trials of labs; what they need is loaded where there are some."""
+    from coursebuild.features.lab.trial import LabTrials
+
+    return LabTrials(context)
+
+
+_LIVE = PagePart(
+    mark="data-config=",
+    texts=(
+        *("lab.live.", "overlay.", "lab.plot", "lab.value", "lab.time", "lab.overlays"),
+        "lab.untitled",
+    ),
+)
+"""The script of live labs is loaded by the element itself."""
+FEATURE = Feature(
+    name="lab",
+    fences=(
+        FenceKind(
+            name="lab",
+            block=Lab,
+            parse=parse_fence,
+            draw=draw_lab,
+            markdown=lab_markdown,
+            index=index_lab,
+        ),
+    ),
+    check=check_labs,
+    check_models=check_model_names,
+    parts=(_LIVE,),
+    trials=Trials(find=lab_trials, start=start, inputs=trial_inputs, publish=publish_labs),
+    schemas={"lab": (SimLab, "A lab fence of the kind simlab")},
+    refine_schema=refine_schema,
+)

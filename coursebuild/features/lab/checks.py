@@ -1,0 +1,74 @@
+"""Labs against the course: the kind exists, the model exists, and what the lab names in it.
+
+Entry points: `check_labs`; `check_model_names`, once models are compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+from coursebuild.core.model import Course, Document, FeatureBlock, document_blocks
+from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.features.lab.model import SIMLAB, Lab
+
+_FOLDER = "content/labs/"
+
+
+def lab_kinds(course: Course) -> frozenset[str]:
+    """`simlab`, and each `content/labs/NAME.js` that the course brings."""
+    names = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
+    own = (name.removesuffix(".js") for name in names if name.endswith(".js"))
+    return frozenset((SIMLAB, *(name for name in own if "/" not in name)))
+
+
+def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+    """Unknown kinds and models of the labs in some documents."""
+    kinds = lab_kinds(course)
+    models = {model.name for model in course.models}
+    for lab in labs_in(documents):
+        if lab.kind not in kinds:
+            message, help = f"no kind of lab is called `{lab.kind}`", did_you_mean(lab.kind, kinds)
+            yield diagnose("lab-kind", lab.kind_span, message, help=help)
+        for name in lab.models():
+            if name not in models:
+                message, help = f"no model `{name}` in models/", did_you_mean(name, models)
+                yield diagnose("lab-model", lab.place(("model",)), message, help=help)
+
+
+def labs_in(documents: Iterable[Document]) -> Iterator[Lab]:
+    """The labs of some documents, those of quizzes included."""
+    for document in documents:
+        yield from (block for block in document_blocks(document) if isinstance(block, Lab))
+
+
+def check_model_names(
+    course: Course, facts_of: Callable[[FeatureBlock], ModelFacts | None]
+) -> Iterator[Diagnostic]:
+    """Keyframes and sites that the models of labs do not have."""
+    for lab in labs_in(course.documents):
+        facts = facts_of(lab)
+        if facts is not None:
+            yield from _check_names(lab, facts)
+
+
+def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
+    span, key = lab.place(("key",)), lab.fields.key
+    if isinstance(key, int) and not 0 <= key < len(facts.keyframes):
+        have = f"it has {len(facts.keyframes)}" if facts.keyframes else "it has none"
+        yield diagnose("lab-name", span, f"the model has no keyframe {key}: {have}, counted from 0")
+    names = [name for name in facts.keyframes if name]
+    if isinstance(key, str) and key not in names:
+        yield diagnose(
+            "lab-name",
+            span,
+            f"the model has no keyframe `{key}`",
+            help=did_you_mean(key, names),
+        )
+    if lab.fields.trail is not None and lab.fields.trail not in facts.sites:
+        yield diagnose(
+            "lab-name",
+            lab.place(("trail",)),
+            f"the model has no site `{lab.fields.trail}`",
+            help=did_you_mean(lab.fields.trail, facts.sites),
+        )

@@ -1,0 +1,192 @@
+"""A lab's code as an ES module, and its data as JSON.
+
+Entry points: `compile_lab(lab, name)`, `pieces(lab)`.
+
+1. Every piece of code that an author writes becomes a function of its own, whose first parameter
+   holds what lab code sees (`model`, `data`, `mj`, `sim`, `ctx`, `lib`); a setter's second is
+   `value`. A module is strict, so a misspelt assignment is an error and no new global.
+2. The same functions serve the browser's worker (`code`, a module) and the trial (`literal`, an
+   expression). A page needs no `eval`, so its policy can forbid it.
+3. A piece is put into the module only when it parses by itself and as the function that it becomes
+   (`pieces` gives what to try), so that no piece can end its function and begin another, and none
+   keeps the others from loading.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+from msgspec import Struct, to_builtins
+
+from coursebuild.features.lab.model import Entry, Lab
+from coursebuild.features.lab.schema import Button, Control, Overlays, Plot, Select, SimLab
+
+_NAMES = "{model, data, mj, sim, ctx, lib}"
+
+
+class LabCode(Struct, frozen=True):
+    """A piece of lab code."""
+
+    entry: Entry
+    form: Literal["statements", "expression", "target"]
+    """Statements are run, an expression gives a value, a target is assigned to."""
+    code: str
+    takes_value: bool = False
+    """Whether it reads `value`."""
+
+    @property
+    def function(self) -> str:
+        """It as it stands in the module, a function."""
+        # A line end closes a comment with which a piece may end.
+        match self.form:
+            case "target":
+                return f"({_NAMES}, value) => {{ ({self.code}\n) = value;\n}}"
+            case "expression":
+                return f"({_NAMES}) => ({self.code}\n)"
+            case "statements":
+                value = ", value" if self.takes_value else ""
+                return f"({_NAMES}{value}) => {{ {self.code}\n}}"
+
+
+class LabModule(Struct, frozen=True):
+    """A lab, ready to be run."""
+
+    name: str
+    """Unique in the course and stable: `4.2-lab-1`."""
+    code: str
+    """An ES module."""
+    literal: str
+    """The same as a JavaScript expression, for an engine without modules."""
+    config: str
+    """What is data, as JSON."""
+
+
+def pieces(lab: Lab) -> tuple[LabCode, ...]:
+    """Every piece of code of a lab, in the order of its fields."""
+    return tuple(_pieces(lab))
+
+
+def _pieces(lab: Lab) -> Iterator[LabCode]:
+    for name in ("setup", "controller"):
+        if code := getattr(lab.fields, name):
+            yield LabCode((name,), "statements", code)
+    for i, control in enumerate(lab.fields.controls):
+        if isinstance(control, Button):
+            yield LabCode(("controls", i, "run"), "statements", control.run)
+            continue
+        if control.set is not None:
+            yield LabCode(("controls", i, "set"), "target", control.set, True)
+        if control.apply is not None:
+            yield LabCode(("controls", i, "apply"), "statements", control.apply, True)
+    for i, readout in enumerate(lab.fields.readouts):
+        yield LabCode(("readouts", i, "expr"), "expression", readout.expr)
+    for i, plot in enumerate(lab.fields.plots):
+        for j, trace in enumerate(plot.traces):
+            yield LabCode(("plots", i, "traces", j, "expr"), "expression", trace.expr)
+    for i, claim in enumerate(lab.fields.expect):
+        yield LabCode(("expect", i, "expr"), "expression", claim.expr)
+
+
+def compile_lab(lab: Lab, name: str) -> LabModule:
+    """The module of a lab whose pieces all parse by themselves."""
+    members = tuple(_members(lab))
+    code = "".join(f"export const {member} = {text};\n" for member, text in members)
+    literal = "{" + ", ".join(f"{member}: {text}" for member, text in members) + "}"
+    return LabModule(name, code, f"({literal})", config_json(lab, name))
+
+
+def _members(lab: Lab) -> Iterator[tuple[str, str]]:
+    functions, fields = {piece.entry: piece.function for piece in pieces(lab)}, lab.fields
+    for name in ("setup", "controller"):
+        if (name,) in functions:
+            yield name, functions[(name,)]
+    controls = (_control(functions, i, control) for i, control in enumerate(fields.controls))
+    yield "controls", _list(controls)
+    yield "readouts", _list(functions["readouts", i, "expr"] for i in range(len(fields.readouts)))
+    plots = (
+        _list(functions["plots", i, "traces", j, "expr"] for j in range(len(plot.traces)))
+        for i, plot in enumerate(fields.plots)
+    )
+    yield "plots", _list(plots)
+    yield "expect", _list(functions["expect", i, "expr"] for i in range(len(fields.expect)))
+
+
+def _list(items: Iterator[str]) -> str:
+    return "[" + ", ".join(items) + "]"
+
+
+def _control(functions: Mapping[Entry, str], i: int, control: Control) -> str:
+    for field, member in (("run", "run"), ("set", "set"), ("apply", "set")):
+        if ("controls", i, field) in functions:
+            return f"{{{member}: {functions['controls', i, field]}}}"
+    name = json.dumps(getattr(control, "param", None) or control.label)
+    return f"{{set: ({{ctx}}, value) => {{ ctx[{name}] = value; }}}}"
+
+
+# --- data
+
+
+def config_json(lab: Lab, name: str) -> str:
+    """What the page, the worker and the trial need to know besides code, as JSON."""
+    fields = lab.fields
+    config: dict[str, Any] = {
+        "id": name,
+        "title": fields.title,
+        "model": fields.model,
+        "key": fields.key,
+        "height": fields.height,
+        "camera": fields.camera,
+        "toggles": fields.toggles,
+        "overlays": _overlays(fields),
+        "forceScale": fields.forceScale,
+        "autoplay": fields.autoplay,
+        "stopAt": fields.stopAt,
+        "trail": fields.trail,
+        "seed": fields.seed,
+        "controls": [_control_data(control) for control in fields.controls],
+        "readouts": [{"label": r.label, "digits": r.digits} for r in fields.readouts],
+        "plots": [_plot_data(plot) for plot in fields.plots],
+        "expect": [
+            {"after": claim.steps, "t": claim.t, "min": claim.min, "max": claim.max}
+            for claim in fields.expect
+        ],
+    }
+    data = to_builtins(config)
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
+def _overlays(fields: SimLab) -> list[str]:
+    """The overlays that start on."""
+    overlays = fields.overlays
+    if isinstance(overlays, Overlays):
+        return [name for name in Overlays.__struct_fields__ if getattr(overlays, name)]
+    return list(overlays)
+
+
+_CONTROL = {
+    "type": None, "label": None, "unit": "", "min": None, "max": None, "step": None,
+    "value": None, "digits": None, "options": (), "param": None, "init": False, "reset": False,
+}  # fmt: skip
+"""What is said of a control of each kind."""
+
+
+def _control_data(control: Control) -> dict[str, Any]:
+    given = to_builtins(control)
+    if isinstance(control, Select):
+        given["value"] = control.start
+    return {name: given.get(name, default) for name, default in _CONTROL.items()}
+
+
+def _plot_data(plot: Plot) -> dict[str, Any]:
+    return {
+        "ylabel": plot.ylabel,
+        "xlabel": plot.xlabel,
+        "window": plot.window,
+        "ymin": plot.ymin,
+        "ymax": plot.ymax,
+        "height": plot.height,
+        "refLines": plot.refLines,
+        "traces": [{"label": t.label, "dash": t.dash} for t in plot.traces],
+    }

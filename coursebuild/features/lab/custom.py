@@ -1,0 +1,50 @@
+"""Labs of the kinds that a course brings: what their own code needs, published as it is.
+
+Entry point: `custom_lab`. The code is `content/labs/KIND.js`; docs/labs.md is its manual. What such
+a lab does only its code knows, so it is not tried; that its model exists and compiles is checked.
+"""
+
+from __future__ import annotations
+
+import json
+
+from coursebuild.core.features import Trial, TrialContext
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.model.results import LabResult
+from coursebuild.core.run.native import NativeEngine
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.models import model_of_course, saved_model
+
+
+def custom_lab(
+    context: TrialContext, native: NativeEngine, trial: Trial, lab: Lab
+) -> tuple[LabResult | None, list[Diagnostic]]:
+    """A lab with its code, its data and, where its JSON has a `model`, that as an MJB file."""
+    code = f"content/labs/{lab.kind}.js"
+    if code not in context.course.files:
+        return None, []  # which is told at the kind
+    data = json.loads(lab.config)
+    name = data.get("model")
+    mjb = b""
+    if isinstance(name, str):
+        model = model_of_course(context, name)
+        if model is None:
+            message = f"no model `{name}` in models/"
+            help = did_you_mean(name, [m.name for m in context.course.models])
+            return None, [diagnose("lab-model", lab.span.first_line(), message, help=help)]
+        if context.models[name].error:
+            return None, []  # which is told at the model
+        mjb = saved_model(context, native, model)
+    config = {"id": trial.name, "kind": lab.kind, "title": lab.fields.title, "data": data}
+    result = LabResult(
+        span=lab.span,
+        name=trial.name,
+        lesson=trial.owner,
+        title=lab.fields.title,
+        status="ok",
+        module=read_bytes(context.root, code).decode("utf-8", "replace"),
+        config=json.dumps(config, ensure_ascii=False, separators=(",", ":")),
+        mjb=mjb,
+    )
+    return result, []

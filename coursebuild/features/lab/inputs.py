@@ -1,0 +1,65 @@
+"""What the trial of a lab depends on besides its model's files; this needs neither engine.
+
+Entry points: `lab_trials(course)`, `trial_inputs(trial)`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from coursebuild.core.features import Trial
+from coursebuild.core.model import Course
+from coursebuild.core.run.lab_files import engine_digest
+from coursebuild.core.run.native import native_digest
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.scripts.dependencies import Inputs
+from coursebuild.core.scripts.extract import owners
+from coursebuild.features.lab.checks import labs_in
+from coursebuild.features.lab.compile import LabModule, compile_lab
+from coursebuild.features.lab.model import SIMLAB, Lab
+
+SECONDS = 60.0
+"""Processor time that a trial may take."""
+_UNTRIED = ("id", "title", "model", "height", "toggles")
+"""Data that no trial depends on."""
+
+
+def lab_trials(course: Course) -> Iterator[Trial]:
+    """Every lab of a course, in order."""
+    for owner, document in owners(course):
+        for number, lab in enumerate(labs_in((document,)), 1):
+            yield Trial(f"{owner}-lab-{number}", owner, lab)
+
+
+def trial_inputs(trial: Trial) -> Inputs | None:
+    """Those of a lab; `None` for one of the course's own kinds, which is not run."""
+    lab = trial.block
+    if not isinstance(lab, Lab) or lab.kind != SIMLAB:
+        return None
+    return inputs_of(lab, compile_lab(lab, trial.name))
+
+
+def inputs_of(lab: Lab, module: LabModule) -> Inputs:
+    """What the trial of a lab depends on besides the files of its model."""
+    own = [
+        json.dumps(tried_data(module)),
+        module.literal,
+        f"{lab.verify.seconds}/{lab.verify.rtol is None}",
+    ]
+    own.append(lab.xml.text if lab.xml is not None else f"models/{lab.fields.model}.xml")
+    text = hashlib.sha256("\0".join(own).encode()).hexdigest()
+    around = (
+        ("MuJoCo", engine_version()),
+        ("how a lab is repeated natively", native_digest()[:12]),
+        ("the browser's engine and its trial", engine_digest()[:12]),
+    )
+    return Inputs(f"lab {module.name}", text, (), SECONDS, (), around)
+
+
+def tried_data(module: LabModule) -> dict[str, Any]:
+    """What of a lab's data its trial is given."""
+    config: dict[str, Any] = json.loads(module.config)
+    return {name: value for name, value in config.items() if name not in _UNTRIED}

@@ -1,0 +1,71 @@
+"""Labs: what a reader plays with.
+
+Entry point: `Lab`.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from msgspec.structs import replace
+
+from coursebuild.core.model import Block, FeatureBlock
+from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.features.lab.schema import SimLab, Verify
+
+SIMLAB = "simlab"
+"""The kind of a lab that names none."""
+Entry: TypeAlias = tuple[str | int, ...]
+"""The way to a value inside the lab's JSON: `("controls", 2, "set")`."""
+_NAMED_BY = {"controls": ("set", "apply", "run", "label"), "expect": ("expr",)}
+"""By which of its values an object in a list is pointed at."""
+
+
+class Lab(FeatureBlock, frozen=True):
+    """A live simulation."""
+
+    kind: str
+    """`simlab`, or the name of a kind that the course adds."""
+    kind_span: Span
+    config: str
+    """The JSON as written, for the browser and for kinds that only their own code understands."""
+    fields: SimLab
+    """What the author says; of a kind of the course's own, what labs of every kind have."""
+    note: tuple[Block, ...] = ()
+    xml: Excerpt | None = None
+    places: tuple[tuple[Entry, Span], ...] = ()
+    """Where each value of the JSON stands."""
+
+    @property
+    def verify(self) -> Verify:
+        """How much of it is run."""
+        return self.fields.verify or Verify()
+
+    def place(self, entry: Entry) -> Span:
+        """Where an entry stands: the value itself, or the nearest around it that is known."""
+        places = dict(self.places)
+        inner = _NAMED_BY.get(str(entry[0]), ()) if len(entry) == 2 else ()
+        ways = [(*entry, name) for name in inner]
+        ways += [entry[:end] for end in range(len(entry), 0, -1)]
+        known = (places[way] for way in ways if way in places)
+        return next(known, self.span).first_line()
+
+    def child_blocks(self) -> tuple[Block, ...]:
+        """Its note."""
+        return self.note
+
+    def summary(self) -> Lab:
+        """The lab without its note."""
+        return replace(self, note=())
+
+    def models(self) -> tuple[str, ...]:
+        """The model that it names."""
+        return () if self.fields.model is None else (self.fields.model,)
+
+    def mjcf(self) -> Excerpt | None:
+        """The model that it holds itself."""
+        return self.xml
+
+    def is_docked(self) -> bool:
+        """Whether its author wants it beside the text."""
+        return self.fields.dock

@@ -1,0 +1,62 @@
+"""The models of labs, compiled natively and saved as browsers load them.
+
+Entry points: `model_of_lab`, `model_of_course`, `saved_model`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+from msgspec import Struct
+
+from coursebuild.core.features import TrialContext
+from coursebuild.core.run.mjcf import model_files
+from coursebuild.core.run.native import NativeEngine
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.scripts.dependencies import need_of
+from coursebuild.features.lab.model import Lab
+
+
+class LabModel(Struct, frozen=True):
+    """A lab's model as text."""
+
+    path: str
+    """Where it stands, or would."""
+    text: str
+    files: tuple[str, ...]
+    """Other files that it may consist of."""
+
+
+def model_of_lab(context: TrialContext, lab: Lab) -> LabModel | None:
+    """A lab's model; `None` for one that does not compile, as is told already."""
+    if lab.xml is not None:
+        path = "models/.lab.xml"
+        return LabModel(path, lab.xml.text, model_files(context.root, path, lab.xml.text))
+    compiled = context.models.get(lab.fields.model or "")
+    if compiled is None or compiled.facts is None:
+        return None
+    return model_of_course(context, lab.fields.model or "")
+
+
+def model_of_course(context: TrialContext, name: str) -> LabModel | None:
+    """A model of the course; `None` where there is none of this name."""
+    source = next((m.source for m in context.course.models if m.name == name), None)
+    if source is None:
+        return None
+    return LabModel(source.path, source.text, model_files(context.root, source.path, source.text))
+
+
+def saved_model(context: TrialContext, native: NativeEngine, model: LabModel) -> bytes:
+    """A model as an MJB file, from the store where nothing that it is made of has changed."""
+    memory = context.memory
+    needed = [need_of(file) for file in model.files]
+    states = [memory.states(need) for need in needed]
+    parts = json.dumps([engine_version(), model.path, model.text, model.files, states])
+    key = hashlib.sha256(parts.encode()).hexdigest()
+    saved = memory.store.get("mjb", key)
+    if saved is None:
+        saved = native.save(model.path, model.text)
+        if states == [memory.states.now(need) for need in needed]:  # none was edited meanwhile
+            memory.store.put("mjb", key, saved)
+    return saved

@@ -1,0 +1,200 @@
+"""Labs as a page shows them before they run: what they are, what can be changed, what is shown.
+
+Entry points: `draw_lab(page, block)`, `index_lab`. No control is drawn that does nothing: the
+page's script puts the live instrument into `data-lab` when it starts, and reads its configuration
+there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.model import ModelTarget
+from coursebuild.core.pages.qr import qr_svg
+from coursebuild.core.pages.quantities import number
+from coursebuild.core.pages.strings import Strings
+from coursebuild.features.lab.files import ShownLab, ShownRecord
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.schema import Control, Select, Slider
+
+if TYPE_CHECKING:
+    from coursebuild.core.pages.context import PageContext
+    from coursebuild.core.pages.search.sections import SectionReader
+
+
+class ControlView(Struct, frozen=True):
+    """A row of the table of controls."""
+
+    label: str
+    values: str
+    """Range or options, and what it is at first, in words."""
+
+
+class RecordedView(Struct, frozen=True):
+    """What the trial recorded, ready for the template."""
+
+    picture: str
+    width: int
+    height: int
+    alt: str
+    readouts: tuple[tuple[str, str], ...]
+    plots: tuple[Markup, ...]
+    at: str
+    proven: str
+
+
+class PaperView(Struct, frozen=True):
+    """What leads from paper to the lab."""
+
+    code: Markup
+    """A QR code of the address."""
+    address: str
+    text: str
+    """The address as one types it."""
+
+
+class PlotView(Struct, frozen=True):
+    """A plot: its axes and the lines in it."""
+
+    title: str
+    traces: tuple[str, ...]
+    marks: tuple[str, ...]
+    """Reference lines."""
+
+
+def draw_lab(page: PageContext, block: Lab) -> Markup:
+    """A lab in its static form."""
+    words = page.tools.words
+    live, fields = shown_lab(page, block), block.fields
+    return page.template(
+        "lab/lab.html",
+        lab=block,
+        key=live.name if live is not None else None,
+        config=page.place.href(live.config) if live is not None else None,
+        script=page.place.href(live.script) if live is not None else None,
+        recorded=_recorded(page, block, live.record) if live is not None else None,
+        paper=_paper(page, live.name) if live is not None else None,
+        title=title_of(page, block),
+        note=page.blocks(block.note),
+        model_href=page.href(ModelTarget(fields.model)) if fields.model is not None else None,
+        start=start_name(page, block),
+        stop=number(fields.stopAt) if fields.stopAt is not None else None,
+        controls=tuple(control_view(words, control) for control in fields.controls),
+        plots=tuple(plot_view(words, block, index) for index in range(len(fields.plots))),
+        overlays=tuple(overlay_name(words, name) for name in fields.toggles),
+    )
+
+
+def shown_lab(page: PageContext, block: Lab) -> ShownLab | None:
+    """What the page has of the lab's trial; `None` where it was not tried."""
+    found = page.shown.trials.get(block.span.start)
+    return found if isinstance(found, ShownLab) else None
+
+
+def index_lab(reader: SectionReader, lab: Lab) -> None:
+    """Give the search a lab's title, note, labels and model."""
+    reader.add("text", lab.fields.title)
+    reader.blocks(lab.note)
+    labels = [control.label for control in lab.fields.controls]
+    labels += [readout.label for readout in lab.fields.readouts]
+    reader.add("text", ", ".join(filter(None, labels)))
+    if lab.fields.model is not None:
+        reader.also(lab.fields.model)
+    if lab.xml is not None:
+        reader.add("code", lab.xml.text)
+
+
+def _paper(page: PageContext, name: str) -> PaperView | None:
+    """The way from paper to a lab; `None` where nobody knows where the site will stand."""
+    if not page.shown.address:
+        return None
+    address = f"{page.shown.address}#{quote(name)}"
+    code = qr_svg(address, page.tools.words("lab.code"))
+    return PaperView(code, address, address.partition("://")[2])
+
+
+def _recorded(page: PageContext, block: Lab, record: ShownRecord | None) -> RecordedView | None:
+    """What the trial recorded; `None` where it did not come to its end."""
+    if record is None:
+        return None
+    words = page.tools.words
+    return RecordedView(
+        page.place.href(record.picture),
+        record.size[0],
+        record.size[1],
+        words(
+            "lab.picture",
+            title=block.fields.title or words("lab.untitled"),
+            t=number(record.time, 4),
+        ),
+        record.readouts,
+        tuple(Markup(svg) for svg in record.plots),
+        words("lab.at", t=seconds(record.end)),
+        words(
+            "lab.proven",
+            engine=page.shown.engine,
+            tried=str(record.tried),
+            parity=record.parity,
+        ),
+    )
+
+
+def seconds(value: float) -> str:
+    """A time, to the millisecond."""
+    return number(round(value, 3))
+
+
+def title_of(page: PageContext, block: Lab) -> str:
+    """The title, or what a lab without one is called."""
+    return block.fields.title or page.tools.words("lab.untitled")
+
+
+def start_name(page: PageContext, block: Lab) -> str | None:
+    """The name of the keyframe that the lab starts from."""
+    key = block.fields.key
+    if key is None or isinstance(key, str):
+        return key
+    names = page.shown.keyframes.get(block.fields.model or "", ())
+    return (names[key] if 0 <= key < len(names) else "") or str(key)
+
+
+def control_view(words: Strings, control: Control) -> ControlView:
+    """A control as a row of words."""
+    match control:
+        case Slider():
+            values = _range(words, control)
+            initial = f"{number(control.value, control.digits)} {control.unit}".rstrip()
+        case Select():
+            values = ", ".join(label for label, _ in control.options)
+            initial = next(label for label, value in control.options if value == control.start)
+        case _:
+            return ControlView(control.label, words("lab.button"))
+    return ControlView(control.label, words("lab.initial", values=values, initial=initial))
+
+
+def _range(words: Strings, slider: Slider) -> str:
+    ends = words("lab.between", min=number(slider.min), max=number(slider.max))
+    ends = f"{ends} {slider.unit}".rstrip()
+    return words("lab.step", range=ends, step=number(slider.step)) if slider.step else ends
+
+
+def plot_view(words: Strings, block: Lab, index: int) -> PlotView:
+    """A plot in words."""
+    plot = block.fields.plots[index]
+    title = words(
+        "lab.plot",
+        ylabel=plot.ylabel or words("lab.value"),
+        xlabel=plot.xlabel or words("lab.time"),
+    )
+    lines = ((line.label, number(line.y)) for line in plot.refLines)
+    marks = tuple(f"{label} ({y})" if label else y for label, y in lines)
+    return PlotView(title, tuple(trace.label for trace in plot.traces), marks)
+
+
+def overlay_name(words: Strings, name: str) -> str:
+    """What an overlay is called."""
+    return words(f"overlay.{name}") if words.has(f"overlay.{name}") else name

@@ -1,0 +1,239 @@
+"""A recorded plot as SVG: for paper, for readers without JavaScript, and before a lab starts.
+
+Entry point: `plot_svg(plot, times, traces)`.
+
+Lines carry their names at their ends, and differ by dashes besides colour. Colours are classes that
+the style sheet defines for light and dark; the text takes the page's colour.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from msgspec import Struct
+
+from coursebuild.core.drawing.marks import apart
+from coursebuild.core.drawing.marks import markup_text as _text
+from coursebuild.core.drawing.scales import tick_texts as tick_texts
+from coursebuild.core.drawing.scales import ticks as ticks
+from coursebuild.features.lab.schema import Plot, TraceFields
+
+_WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
+_TOP, _BOTTOM = 12.0, 38.0
+_LETTER = 6.2
+"""Width of a letter or a digit."""
+_DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
+_LABEL_GAP = 13.0
+_LARGEST = 4e307
+"""What is beyond is drawn there, so that the range of an axis is finite."""
+
+
+def plot_svg(
+    plot: Plot,
+    times: Sequence[float],
+    traces: Sequence[Sequence[float | None]],
+    *,
+    narrow: bool = False,
+) -> str:
+    """The plot as an `svg` element; values that are no finite numbers interrupt their line.
+
+    A narrow one is for the margin: its text has the same size there. Empty where nothing was
+    recorded.
+    """
+    start = -math.inf if plot.window is None or not times else times[-1] - plot.window * (1 + 1e-9)
+    shown = [(t, i) for i, t in enumerate(times) if t >= start]
+    if not shown:
+        return ""
+    low_t, high_t = shown[0][0], shown[-1][0]
+    values = [
+        v for line in traces for _, i in shown if (v := line[i]) is not None and math.isfinite(v)
+    ]
+    values += [line.y for line in plot.refLines]
+    low, high = _range(values, plot.ymin, plot.ymax)
+    labels = [trace.label for trace in plot.traces]
+    frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
+    lines: list[str] = []
+    ends: list[tuple[float, str, int]] = []
+    for n, (trace, line) in enumerate(zip(plot.traces, traces, strict=True)):
+        points = [(t, line[i]) for t, i in shown]
+        lines.append(_line(frame, points, n, _dash(trace, n)))
+        last = next((v for _, v in reversed(points) if v is not None and math.isfinite(v)), None)
+        if last is not None:
+            ends.append((frame.y(min(max(last, low), high)), trace.label, n))
+    references = [
+        _reference(frame, line.y, line.label) for line in plot.refLines if low <= line.y <= high
+    ]
+    parts = [*_axes(frame, plot), *references, *lines, *_labels(frame, ends)]
+    title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
+    return (
+        f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
+        f'aria-label="{_text(": ".join((title, ", ".join(labels))))}">' + "".join(parts) + "</svg>"
+    )
+
+
+def _dash(trace: TraceFields, n: int) -> str:
+    if trace.dash is True:
+        return _DASHES[1]
+    return _DASHES[n % len(_DASHES)] if not trace.dash else " ".join(f"{x:g}" for x in trace.dash)
+
+
+def _frame(
+    low_t: float, high_t: float, low: float, high: float, labels: Sequence[str], narrow: bool
+) -> _Frame:
+    """The frame, with room for the ticks at its left and the names of the lines at its right."""
+    width = _NARROW if narrow else _WIDE
+    longest = max((len(text) for text in tick_texts(ticks(low, high))), default=0)
+    left = min(26.0 + _LETTER * longest, 0.35 * width)
+    room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
+    return _Frame(low_t, high_t, low, high, left, width - room, width)
+
+
+class _Frame(Struct, frozen=True):
+    """From values to places."""
+
+    low_t: float
+    high_t: float
+    low: float
+    high: float
+    left: float
+    right: float
+    width: float
+
+    def x(self, t: float) -> float:
+        part = (t - self.low_t) / (self.high_t - self.low_t)
+        return self.left + part * (self.right - self.left)
+
+    def y(self, v: float) -> float:
+        part = (v - self.low) / (self.high - self.low)
+        return _HEIGHT - _BOTTOM - part * (_HEIGHT - _TOP - _BOTTOM)
+
+
+def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple[float, float]:
+    low = min(values, default=0.0) if ymin is None else ymin
+    high = max(values, default=1.0) if ymax is None else ymax
+    low, high = max(low, -_LARGEST), min(high, _LARGEST)
+    size = max(abs(low), abs(high))
+    if not high - low > 1e-12 * size:
+        pad = size * 0.1 or 1.0
+        middle = high if ymin is None and ymax is not None else low
+        return middle - pad, middle + pad
+    pad = 0.04 * (high - low)
+    return (low if ymin is not None else low - pad), (high if ymax is not None else high + pad)
+
+
+def _axes(frame: _Frame, plot: Plot) -> list[str]:
+    left, right, bottom = frame.left, frame.right, _HEIGHT - _BOTTOM
+    parts = []
+    values = ticks(frame.low, frame.high)
+    for value, text in zip(values, tick_texts(values), strict=True):
+        y = frame.y(value)
+        parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
+        parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{text}</text>')
+    values = _fitting(frame)
+    for value, text in zip(values, tick_texts(values), strict=True):
+        x = frame.x(value)
+        parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
+        parts.append(f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{text}</text>')
+    parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
+    middle = (_TOP + bottom) / 2
+    parts.append(
+        f'<text transform="translate(13 {middle:g}) rotate(-90)" text-anchor="middle">'
+        f"{_text(plot.ylabel)}</text>"
+    )
+    centre = (left + right) / 2
+    parts.append(
+        f'<text x="{centre:.1f}" y="{_HEIGHT - 5:g}" text-anchor="middle">'
+        f"{_text(plot.xlabel)}</text>"
+    )
+    return parts
+
+
+def _fitting(frame: _Frame) -> list[float]:
+    """Ticks of the time, so many that their texts do not touch."""
+    for about in (6, 4, 3, 2):
+        values = ticks(frame.low_t, frame.high_t, about)
+        longest = max(len(text) for text in tick_texts(values))
+        if len(values) * (longest + 1.5) * _LETTER <= frame.right - frame.left:
+            return values
+    return values[:1]
+
+
+def _reference(frame: _Frame, y: float, label: str) -> str:
+    at = frame.y(y)
+    return (
+        f'<path class="lab-reference" d="M{frame.left:.1f} {at:.1f}H{frame.right:.1f}"/>'
+        f'<text x="{frame.left + 4:.1f}" y="{at - 4 if at > _TOP + 12 else at + 11:.1f}">'
+        f"{_text(label)}</text>"
+    )
+
+
+def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, dash: str) -> str:
+    path: list[str] = []
+    for run in _runs(points):
+        path += _drawn(frame, run)
+    style = f' stroke-dasharray="{dash}"' if dash else ""
+    style += ' stroke-linecap="round"' if "h0" in path else ""
+    return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
+
+
+def _runs(points: Sequence[tuple[float, float | None]]) -> Iterator[list[tuple[float, float]]]:
+    """The stretches between values that are no finite numbers."""
+    run: list[tuple[float, float]] = []
+    for t, v in points:
+        if v is not None and math.isfinite(v):
+            run.append((t, min(max(v, -_LARGEST), _LARGEST)))
+        elif run:
+            yield run
+            run = []
+    if run:
+        yield run
+
+
+def _drawn(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
+    """A stretch as path commands, cut at the frame's lower and upper edges."""
+    if len(run) == 1:
+        t, v = run[0]
+        if frame.low <= v <= frame.high:
+            yield from (f"M{frame.x(t):.1f} {frame.y(v):.1f}", "h0")  # round ends make a point seen
+        return
+    pen = False
+    for (t0, v0), (t1, v1) in pairwise(run):
+        begin, end = _within(frame, v0, v1)
+        if begin > end:
+            pen = False
+            continue
+        if not pen:
+            yield f"M{_between(frame, (t0, v0), (t1, v1), begin)}"
+        yield f"L{_between(frame, (t0, v0), (t1, v1), end)}"
+        pen = end == 1
+
+
+def _between(
+    frame: _Frame, first: tuple[float, float], second: tuple[float, float], part: float
+) -> str:
+    """A point of a segment, which is inside the frame but for rounding."""
+    t, v = (a + part * (b - a) if part < 1 else b for a, b in zip(first, second, strict=True))
+    return f"{frame.x(t):.1f} {frame.y(min(max(v, frame.low), frame.high)):.1f}"
+
+
+def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
+    """From where to where (0 to 1) a segment is inside the frame; the end first where nowhere."""
+    if v0 == v1:
+        return (0.0, 1.0) if frame.low <= v0 <= frame.high else (1.0, 0.0)
+    # Halved, so that the difference of two large numbers is finite.
+    change = v1 / 2 - v0 / 2
+    cuts = sorted((edge / 2 - v0 / 2) / change for edge in (frame.low, frame.high))
+    return max(cuts[0], 0.0), min(cuts[1], 1.0)
+
+
+def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
+    """Names at the ends of the lines, moved apart where they would overlap."""
+    wanted = [y for y, _, _ in sorted(ends)]
+    places = apart(wanted, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
+    return [
+        f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.right + 6:.1f}" '
+        f'y="{place + 3.5:.1f}">{_text(label)}</text>'
+        for (_, label, n), place in zip(sorted(ends), places, strict=True)
+    ]

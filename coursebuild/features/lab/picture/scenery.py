@@ -1,0 +1,233 @@
+"""What a static picture of a lab shows, from what its trial recorded.
+
+Entry point: `scene_solids(scene, frame)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from coursebuild.features.lab.picture.draw import Solid
+from coursebuild.features.lab.picture.light import Material, material_of
+from coursebuild.features.lab.picture.shapes import (
+    Array,
+    Kind,
+    Surface,
+    flat_surface,
+    grid_faces,
+    join_surfaces,
+    ropes,
+    sharpen,
+    smooth_surface,
+    surface,
+)
+from coursebuild.features.lab.picture.textures import SKY, Texture, TextureMapping, texture_of
+
+RGBA = tuple[float, float, float, float]
+
+_KINDS: tuple[Kind, ...] = (
+    *("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"),
+)
+"""By their numbers in mjtGeom."""
+_ARROWS = (100, 101, 102)
+_VISIBLE = (0, 1, 2)
+"""Groups that MuJoCo shows by itself."""
+_GEOM, _DECORATION = 19, 24
+"""Floats of a geom and of a decoration in a frame."""
+_ENDLESS = 40.0
+"""Extents of the model to which a plane without a size reaches, as in the live view."""
+_UNSET = (0.5, 0.5, 0.5, 1.0)
+"""A flex or skin of this colour has its material's."""
+
+
+class _Looks(Struct, frozen=True):
+    material: Material
+    texture: Texture | None = None
+    repeat: tuple[float, float] = (1.0, 1.0)
+    uniform: bool = False
+
+
+def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
+    """What a picture of a frame shows: geoms, sites, and what MuJoCo's visualizer adds."""
+    return _Scene(scene, np.asarray(frame, dtype=float)).solids()
+
+
+class _Scene:
+    """A scene with what its geoms share."""
+
+    def __init__(self, scene: dict[str, Any], frame: Array) -> None:
+        self.scene, self.frame, self.layout = scene, frame, scene["layout"]
+        self.meshes = [_mesh(mesh) for mesh in scene["meshes"]]
+        self.fields = [_height_field(field) for field in scene["hfields"]]
+        self.textures = [texture_of(texture) for texture in scene["textures"]]
+
+    def solids(self) -> Iterator[Solid]:
+        """Everything that is to be seen."""
+        found: list[Solid | None] = []
+        for part in ("geoms", "sites"):
+            for i, item in enumerate(self.scene[part]):
+                if item["group"] in _VISIBLE:
+                    row = self._row(self.layout[part] + _GEOM * i, _GEOM)
+                    looks = self._looks(item["material"])
+                    found.append(self._solid(item["type"], item.get("data", -1), row, looks))
+        found += self._soft()
+        start = self.layout["trail"] + 3 * int(self.frame[2])
+        for i in range(int(self.frame[1])):
+            found.append(self._decoration(self._row(start + _DECORATION * i, _DECORATION)))
+        return (solid for solid in found if solid is not None)
+
+    def _row(self, start: int, floats: int) -> Array:
+        return self.frame[start : start + floats]
+
+    def _looks(self, index: int) -> _Looks:
+        """A material with its texture; -1 is none."""
+        material = material_of(self.scene, index)
+        given: dict[str, Any] = {"texture": -1}
+        if index >= 0:
+            given = self.scene["materials"][index]
+        texture = self.textures[given["texture"]] if given["texture"] >= 0 else None
+        if texture is None or texture.role == SKY:
+            return _Looks(material)
+        u, v = given["texrepeat"]
+        return _Looks(material, texture, (u, v), given["texuniform"])
+
+    def _decoration(self, row: Array) -> Solid | None:
+        kind, data, size = int(row[0]), int(row[1]), row[4:7]
+        name = _KINDS[kind] if kind < len(_KINDS) else ""
+        if name in ("capsule", "cylinder"):  # the visualizer's have their half-length last
+            size = size[[0, 2, 2]]
+        if name in (
+            "mesh",
+            "sdf",
+        ):  # it counts a mesh and its hull: both have the mesh's shape here
+            data //= 2
+        row = np.concatenate((row[7:19], size, row[19:24]))
+        return self._solid(kind, data, row, _Looks(Material(emission=float(row[-1]))))
+
+    def _solid(self, kind: int, data: int, row: Array, looks: _Looks) -> Solid | None:
+        if not np.isfinite(row[:15]).all():
+            return None  # the simulation blew up
+        position, rotation = row[:3], row[3:12].reshape(3, 3)
+        size = (float(row[12]), float(row[13]), float(row[14]))
+        rgba = _rgba(row[15:19])
+        if kind in _ARROWS:
+            shape = surface("cylinder", (size[0], size[2] / 2))
+            assert shape is not None
+            position = position + rotation[:, 2] * size[2] / 2
+            return Solid(shape, position, rotation, rgba, looks.material)
+        if kind >= len(_KINDS):
+            return None
+        name = _KINDS[kind]
+        endless = name == "plane" and min(size[:2]) <= 0
+        shapes = self.fields if name == "hfield" else self.meshes
+        given = shapes[data] if 0 <= data < len(shapes) else None
+        shape = self._endless_plane(row) if endless else surface(name, size, given)
+        if shape is None:
+            return None
+        texture = _mapping(name, size, looks, endless=endless, given=shape.uv is not None)
+        mirror = {"plane": 0.0, "box": size[2]}.get(name)
+        plane = name == "plane"
+        return Solid(shape, position, rotation, rgba, looks.material, texture, plane, mirror)
+
+    def _endless_plane(self, row: Array) -> Surface:
+        """A plane without a size, around what the camera looks at."""
+        far = _ENDLESS * self.scene["extent"]
+        half = np.where(row[12:14] > 0, row[12:14], far)
+        shape = surface("plane", (float(half[0]), float(half[1])))
+        assert shape is not None
+        target = np.array(self.scene["camera"]["target"], dtype=float)
+        there = (target - row[:3]) @ row[3:12].reshape(3, 3)
+        middle = np.where(row[12:14] > 0, 0.0, there[:2])
+        return Surface(shape.vertices + np.append(middle, 0.0), shape.normals, shape.faces)
+
+    def _soft(self) -> Iterator[Solid]:
+        """Flexes and skins: their vertices are in the frame, in the world."""
+        for part, start, floats in (("flexes", "flex", 3), ("skins", "skin", 6)):
+            for item in self.scene[part]:
+                first = self.layout[start] + floats * item["start"]
+                rows = self._row(first, floats * item["count"]).reshape(-1, floats)
+                if item["group"] not in _VISIBLE or not np.isfinite(rows).all():
+                    continue
+                shape = _flex(item, rows) if part == "flexes" else _skin(item, rows)
+                looks = self._looks(item["material"])
+                texture = None
+                if shape.uv is not None:
+                    texture = _mapping("mesh", (1.0, 1.0, 1.0), looks, given=True)
+                where = np.zeros(3), np.eye(3)
+                rgba = item["rgba"]
+                if item["material"] >= 0 and tuple(rgba) == _UNSET:
+                    rgba = self.scene["materials"][item["material"]]["rgba"]
+                yield Solid(shape, *where, _rgba(rgba), looks.material, texture, open=True)
+
+
+def _mapping(
+    kind: Kind,
+    size: tuple[float, float, float],
+    looks: _Looks,
+    *,
+    endless: bool = False,
+    given: bool = False,
+) -> TextureMapping | None:
+    if looks.texture is None:
+        return None
+    if kind == "sphere":
+        size = (size[0],) * 3
+    elif kind in ("capsule", "cylinder"):
+        size = (size[0], size[0], size[1])
+    return TextureMapping(looks.texture, kind, size, looks.repeat, looks.uniform, endless, given)
+
+
+def _rgba(values: Any) -> RGBA:
+    red, green, blue, alpha = (float(x) for x in values)
+    return red, green, blue, alpha
+
+
+def _flex(item: dict[str, Any], points: Array) -> Surface:
+    elements = np.asarray(item["elements"], dtype=np.int64)
+    if item["dim"] == 1:
+        return ropes(points, elements.reshape(-1, 2), item["radius"])
+    faces = elements.reshape(-1, 3)
+    return flat_surface(points, faces) if item["flat"] else smooth_surface(points, faces)
+
+
+def _skin(item: dict[str, Any], rows: Array) -> Surface:
+    uv = item["texcoords"]
+    faces = np.asarray(item["faces"], dtype=np.int64).reshape(-1, 3)
+    given = None if uv is None else np.asarray(uv, dtype=float).reshape(-1, 2)
+    return Surface(rows[:, :3], rows[:, 3:], faces, given)
+
+
+def _mesh(mesh: dict[str, Any]) -> Surface:
+    """A mesh with the normals of its file, smooth as the live view has them."""
+
+    def take(values: str, which: str, width: int) -> Array:
+        rows = np.asarray(mesh[values], dtype=float).reshape(-1, width)
+        found: Array = rows[np.asarray(mesh[which], dtype=np.int64)]
+        return found
+
+    corners = take("vertices", "faces", 3).reshape(-1, 3, 3)
+    normals = sharpen(corners, take("normals", "faceNormals", 3).reshape(-1, 3, 3))
+    uv = None if mesh["texcoords"] is None else take("texcoords", "faceTexcoords", 2)
+    faces = np.arange(3 * len(corners)).reshape(-1, 3)
+    return Surface(corners.reshape(-1, 3), normals.reshape(-1, 3), faces, uv)
+
+
+def _height_field(field: dict[str, Any]) -> Surface:
+    """A height field: its surface, and its four sides down to its floor."""
+    rows, columns = field["rows"], field["columns"]
+    half_x, half_y, top, base = field["size"]
+    x, y = np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows)
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    vertices = np.column_stack((grid, np.asarray(field["data"], dtype=float) * top))
+    # Rows go up along y, so that seen from above the faces of the grid are clockwise.
+    parts = [smooth_surface(vertices, grid_faces(rows, columns)[:, ::-1])]
+    index = np.arange(rows * columns).reshape(rows, columns)
+    for edge in (index[0], index[:, -1], index[-1, ::-1], index[::-1, 0]):
+        upper = vertices[edge]
+        lower = np.column_stack((upper[:, :2], np.full(len(edge), -base)))
+        parts.append(flat_surface(np.concatenate((upper, lower)), grid_faces(2, len(edge))))
+    return join_surfaces(parts)

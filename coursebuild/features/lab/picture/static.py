@@ -1,0 +1,98 @@
+"""The static form of a lab: what its trial recorded, as a picture, plots and a table.
+
+Entry points: `draw_picture(lab, main)`, `static_form(lab, main, picture)`; `png(pixels)`.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coursebuild.core.model.results import StaticForm
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.picture.draw import FreeCamera, draw
+from coursebuild.features.lab.picture.light import light_of
+from coursebuild.features.lab.picture.plots import plot_svg
+from coursebuild.features.lab.picture.scenery import scene_solids
+from coursebuild.features.lab.picture.textures import SKY, texture_of
+from coursebuild.features.lab.reply import unpack_arrays
+
+_WIDTH = 640
+_FROM_AFAR = 1000.0
+_LARGE = 1e9
+"""From here on numbers are shown as powers of ten, as in the live lab."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
+    """The start of the main run of a lab's trial, as PNG."""
+    scene = unpack_arrays(main["scene"])
+    frame = unpack_arrays(main["pictures"][0]["frame"])
+    camera = scene["camera"]
+    distance, fovy = camera["distance"], camera["fovy"]
+    if camera["orthographic"]:  # whose `fovy` is a length: the same seen from far away
+        distance *= _FROM_AFAR
+        fovy = math.degrees(2 * math.atan(fovy / 2 / distance))
+    target = tuple(camera["target"])
+    seen = FreeCamera(camera["azimuth"], camera["elevation"], distance, target, fovy)
+    light = light_of(scene, np.asarray(frame, dtype=float), seen.forward)
+    skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
+    solids = tuple(scene_solids(scene, frame))
+    return png(draw(solids, seen, _size(lab), light, next(skies, None)))
+
+
+def png(pixels: NDArray[np.uint8]) -> bytes:
+    """An RGBA picture as a PNG file, with the same bytes each time."""
+    opaque = bool((pixels[..., 3] == 255).all())
+    height, width = pixels.shape[:2]
+    rows = pixels[..., : 3 if opaque else 4].reshape(height, -1)
+    # Each row as its difference from the one above, which is PNG's filter 2.
+    filtered = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
+    filtered = np.column_stack((np.full(height, 2, np.uint8), filtered))
+    header = struct.pack(">IIBBBBB", width, height, 8, 2 if opaque else 6, 0, 0, 0)
+    data = zlib.compress(filtered.tobytes(), 9)
+    file = b"\x89PNG\r\n\x1a\n"
+    for chunk in (b"IHDR" + header, b"IDAT" + data, b"IEND"):
+        file += struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    return file
+
+
+def _size(lab: Lab) -> tuple[int, int]:
+    """Width and height of a lab's picture, pixels."""
+    return (_WIDTH, max(160, min(round(_WIDTH * lab.fields.height / 480), 480)))
+
+
+def static_form(lab: Lab, main: dict[str, Any], picture: bytes) -> StaticForm:
+    """The static form of a lab whose trial's main run is `main`."""
+    first, last = main["pictures"][0], main["pictures"][-1]
+    recorded = main["plots"]
+    plots = tuple(
+        plot_svg(plot, recorded["times"], traces, narrow=lab.fields.dock)
+        for plot, traces in zip(lab.fields.plots, recorded["plots"], strict=True)
+    )
+    readouts = tuple(
+        (readout.label, _shown(value, readout.digits))
+        for readout, value in zip(lab.fields.readouts, last["readouts"] or (), strict=False)
+    )
+    return StaticForm(picture, _size(lab), first["time"], readouts, last["time"], plots)
+
+
+def _shown(value: Any, digits: int) -> str:
+    if isinstance(value, str):
+        return value
+    if not isinstance(value, int | float):
+        return "\u2013"
+    if not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "\u221e" if value > 0 else "\u2212\u221e"
+    if abs(value) >= _LARGE:
+        mantissa, exponent = f"{value:.{max(2, digits)}e}".split("e")
+        return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}".replace("-", "\u2212")
+    text = f"{value:.{digits}f}"
+    if float(text) == 0:
+        text = text.lstrip("-")
+    return text.replace("-", "\u2212")

@@ -1,0 +1,185 @@
+"""What hangs together inside a `simlab`.
+
+Entry point: `check_lab(node, structs)`.
+
+Each part is checked as far as its own fields are right, so that one misspelt field does not hide
+what is wrong elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from msgspec import Struct
+
+from coursebuild.core.syntax.fields import one_of, repeated
+from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
+from coursebuild.core.syntax.wording import quoted
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.features.lab.schema import Button, Expect, Plot, Select, SimLab, Slider
+
+Structs = Mapping[ObjectNode, Struct]
+Known = Mapping[str, Struct | None]
+"""The controls of a lab by their labels; `None`: its fields are wrong."""
+
+
+def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    """Everything that the types of the fields cannot say."""
+    yield from one_of(node, SimLab, ("model", "xml"))
+    for name in ("toggles", "overlays"):
+        strings = [(item.value, item.span) for item in _strings(node.get(name))]
+        yield from repeated(strings, "field-value", "the overlay `{}` is named twice")
+    controls = node.objects("controls")
+    labels = [(label.value, label.span) for c in controls if (label := _label(c)) is not None]
+    yield from repeated(labels, "field-value", "two controls are called `{}`")
+    for control in controls:
+        match structs.get(control):
+            case Slider() as slider:
+                yield from one_of(control, Slider, ("set", "apply", "param"))
+                yield from _check_slider(control, slider)
+            case Select() as select:
+                yield from one_of(control, Select, ("set", "apply", "param"))
+                yield from _check_select(control, select)
+            case _:
+                pass
+    for plot in node.objects("plots"):
+        struct = structs.get(plot)
+        if isinstance(struct, Plot):
+            yield from _check_axis(plot, struct)
+    for claim in node.objects("expect"):
+        yield from _check_expect(claim, controls, structs)
+
+
+def _check_axis(node: ObjectNode, plot: Plot) -> Iterator[Diagnostic]:
+    if plot.ymin is not None and plot.ymax is not None and not plot.ymin < plot.ymax:
+        message = f"`ymax` must be greater than `ymin`, which is {plot.ymin:g}"
+        yield diagnose("field-value", node.place("ymax"), message)
+
+
+def _strings(node: Node | None) -> tuple[StringNode, ...]:
+    items = node.items if isinstance(node, ArrayNode) else ()
+    return tuple(item for item in items if isinstance(item, StringNode))
+
+
+def _label(control: ObjectNode) -> StringNode | None:
+    label = control.get("label")
+    return label if isinstance(label, StringNode) else None
+
+
+def _check_slider(node: ObjectNode, slider: Slider) -> Iterator[Diagnostic]:
+    low, high = slider.min, slider.max
+    if not low < high:
+        message = f"`max` must be greater than `min`, which is {low:g}"
+        yield diagnose("field-value", node.place("max"), message)
+        return
+    if not low <= slider.value <= high:
+        message = f"`value` must lie between `min` and `max`: {low:g} to {high:g}"
+        yield diagnose("field-value", node.place("value"), message)
+    if slider.step is not None and slider.step > high - low:
+        message = f"`step` is larger than the range from `min` to `max`, {high - low:g}"
+        yield diagnose("field-value", node.place("step"), message)
+
+
+def _check_select(node: ObjectNode, select: Select) -> Iterator[Diagnostic]:
+    options = node.get("options")
+    items = options.items if isinstance(options, ArrayNode) else ()
+    pairs = [pair.items for pair in items if isinstance(pair, ArrayNode)]
+    labels = [(o[0], pair[0].span) for o, pair in zip(select.options, pairs, strict=True)]
+    yield from repeated(labels, "field-value", "two options are called `{}`")
+    values = [(o[1], pair[1].span) for o, pair in zip(select.options, pairs, strict=True)]
+    yield from repeated(values, "field-value", "two options have the value `{}`")
+    given = node.get("value")
+    if select.value is not None and given is not None:
+        yield from _check_choice(given, "value", select.value, select)
+
+
+def _check_choice(
+    node: Node, name: str, value: float | str, select: Select
+) -> Iterator[Diagnostic]:
+    if any(value == known for _, known in select.options):
+        return
+    texts = {label: v if isinstance(v, str) else f"{v:g}" for label, v in select.options}
+    help = f"the options have {', '.join(f'`{text}`' for text in texts.values())}"
+    if value in texts:
+        help = f"`{value}` is the label of an option whose value is `{texts[str(value)]}`"
+    message = f"`{name}` cannot be {quoted(node)}: no option has this value"
+    yield diagnose("field-value", node.mark, message, help=help)
+
+
+def _check_expect(
+    node: ObjectNode, controls: tuple[ObjectNode, ...], structs: Structs
+) -> Iterator[Diagnostic]:
+    claim = structs.get(node)
+    if not isinstance(claim, Expect):
+        return
+    yield from one_of(node, Expect, ("min", "max"), only=False)
+    if claim.min is not None and claim.max is not None and claim.min > claim.max:
+        message = f"`max` must be at least `min`, which is {claim.min:g}"
+        yield diagnose("field-value", node.place("max"), message)
+    known = {label.value: structs.get(c) for c in controls if (label := _label(c)) is not None}
+    after = node.get("after")
+    if isinstance(after, ArrayNode):
+        for i, step in enumerate(after.items):
+            yield from _check_step(step, f"after[{i}]", known)
+    elif after is not None:
+        yield from _check_step(after, "after", known)
+
+
+def _check_step(node: Node, name: str, known: Known) -> Iterator[Diagnostic]:
+    """One thing to do before a claim; messages call it `name`."""
+    match node:
+        case StringNode():
+            yield from _check_pressed(node, known)
+        case ObjectNode():
+            if not node.members:
+                yield diagnose("field-value", node.mark, f"`{name}` names no control")
+            for member in node.members:
+                if isinstance(known.get(member.key.value), Button):
+                    help = _pressed_instead(member.key.value, node, name)
+                    message = f"`{member.key.value}` is a button and has no value"
+                    yield diagnose("lab-name", member.key.span, message, help=help)
+                else:
+                    yield from _check_moved(member.key, member.value, known)
+        case _:
+            pass
+
+
+def _pressed_instead(label: str, node: ObjectNode, name: str) -> str:
+    if len(node.members) > 1:
+        return f'press it in a step of its own, as in `"after": [{{…}}, "{label}"]`'
+    return f'write `"{label}"`' if name != "after" else f'write `"after": "{label}"`'
+
+
+def _check_pressed(label: StringNode, known: Known) -> Iterator[Diagnostic]:
+    buttons = [name for name, struct in known.items() if isinstance(struct, Button | None)]
+    if label.value in buttons:
+        return
+    if label.value in known:
+        message = f"`{label.value}` is no button"
+        help = f'give the value that it is set to: `{{"{label.value}": …}}`'
+    else:
+        message = f"the lab has no button `{label.value}`"
+        help = did_you_mean(label.value, buttons)
+    yield diagnose("lab-name", label.span, message, help=help)
+
+
+def _check_moved(label: StringNode, value: Node, known: Known) -> Iterator[Diagnostic]:
+    if label.value not in known:
+        names = [name for name, struct in known.items() if not isinstance(struct, Button)]
+        message = f"the lab has no control `{label.value}`"
+        yield diagnose("lab-name", label.span, message, help=did_you_mean(label.value, names))
+        return
+    match known[label.value]:
+        case Slider() as slider:
+            if not isinstance(value, NumberNode):
+                message = f"`{label.value}` is a slider: its value is a number"
+                yield diagnose("field-value", value.mark, message)
+            elif not slider.min <= value.value <= slider.max:
+                bounds = f"{slider.min:g} to {slider.max:g}"
+                message = f"`{label.value}` goes from {bounds}, and cannot be {quoted(value)}"
+                yield diagnose("field-value", value.mark, message)
+        case Select() as select:
+            if isinstance(value, NumberNode | StringNode):
+                yield from _check_choice(value, label.value, value.value, select)
+        case _:
+            pass

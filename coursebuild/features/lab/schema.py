@@ -1,0 +1,235 @@
+"""The fields of a `lab` fence.
+
+Entry points: `SimLab` (a live MuJoCo simulation), `CommonLab` (what labs of every kind have). The
+decoder checks a fence against them, and the JSON Schema for editors is made from `SimLab`; how
+fields hang together (`min` below `max`, an `expect` that names a control) is checked in
+`relations`.
+"""
+
+# Annotations are no texts here: msgspec would evaluate each again in every struct that inherits it.
+
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+
+from msgspec import Meta, Struct
+
+from coursebuild.core.syntax.fields import Digits, NotNegative, OptionalBlocks, Positive, Text
+
+Overlay: TypeAlias = Literal["frames", "contacts", "forces", "com", "inertia", "joints"]
+Scalar: TypeAlias = float | str
+Step: TypeAlias = Text | dict[str, Scalar]
+Height: TypeAlias = Annotated[int, Meta(ge=80, le=2000)]
+JAVASCRIPT_NAME = r"^[A-Za-z_$][A-Za-z0-9_$]*$"
+
+
+class Overlays(Struct, frozen=True, forbid_unknown_fields=True):
+    """Which overlays start on, one by one."""
+
+    frames: bool = False
+    contacts: bool = False
+    forces: bool = False
+    com: bool = False
+    inertia: bool = False
+    joints: bool = False
+
+
+class Camera(Struct, frozen=True, forbid_unknown_fields=True):
+    """MuJoCo's free camera; what is left out is the engine's default for the model."""
+
+    azimuth: Annotated[float | None, Meta(description="degrees")] = None
+    elevation: Annotated[float | None, Meta(description="degrees, negative to look down")] = None
+    distance: Annotated[Positive | None, Meta(description="from the target, in metres")] = None
+    target: Annotated[
+        tuple[float, float, float] | None, Meta(description="the point looked at, in metres")
+    ] = None
+
+
+class SettingFields(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What a slider and a select share: a value, and what becomes of it."""
+
+    label: Annotated[Text, Meta(description="unique among the controls of the lab")]
+    set: Annotated[
+        Text | None, Meta(description="an assignable expression, as in `model.opt.timestep`")
+    ] = None
+    apply: Annotated[Text | None, Meta(description="statements that read `value`")] = None
+    param: Annotated[
+        Annotated[
+            str,
+            Meta(pattern=JAVASCRIPT_NAME, extra={"expects": "a name of JavaScript"}),
+        ]
+        | None,
+        Meta(description="the value is stored as `ctx.NAME`"),
+    ] = None
+    init: Annotated[bool, Meta(description="applied again after every reset")] = False
+    reset: Annotated[bool, Meta(description="changing it resets the simulation")] = False
+
+
+class Slider(SettingFields, frozen=True, kw_only=True, tag_field="type", tag="slider"):
+    """A slider: the control that `type` need not name."""
+
+    implied: ClassVar[bool] = True
+
+    min: Annotated[float, Meta(description="the left end")]
+    max: Annotated[float, Meta(description="the right end")]
+    value: Annotated[float, Meta(description="where it starts")]
+    step: Annotated[Positive | None, Meta(description="the grid of its values")] = None
+    unit: Annotated[str, Meta(description="shown after the value")] = ""
+    digits: Annotated[Digits | None, Meta(description="decimal places shown")] = None
+
+    @property
+    def start(self) -> float:
+        """Where it starts."""
+        return self.value
+
+
+class Select(SettingFields, frozen=True, kw_only=True, tag_field="type", tag="select"):
+    """A choice between named values."""
+
+    options: Annotated[
+        tuple[tuple[Text, Scalar], ...],
+        Meta(min_length=1, description="pairs of a label and a value"),
+    ]
+    value: Annotated[Scalar | None, Meta(description="where it starts; else the first")] = None
+    unit: Annotated[str, Meta(description="shown after the value")] = ""
+
+    @property
+    def start(self) -> Scalar:
+        """Where it starts."""
+        return self.options[0][1] if self.value is None else self.value
+
+
+class Button(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag="button"):
+    """A button that runs statements."""
+
+    label: Annotated[Text, Meta(description="unique among the controls of the lab")]
+    run: Annotated[Text, Meta(description="statements run when it is pressed")]
+
+
+Control: TypeAlias = Slider | Select | Button
+
+
+class Readout(Struct, frozen=True, forbid_unknown_fields=True):
+    """A number or text shown while the simulation runs."""
+
+    label: Text
+    expr: Annotated[Text, Meta(description="an expression that gives a number or a string")]
+    digits: Annotated[Digits, Meta(description="decimal places of a number")] = 3
+
+
+class TraceFields(Struct, frozen=True, forbid_unknown_fields=True):
+    """A line of a plot."""
+
+    label: Text
+    expr: Annotated[Text, Meta(description="an expression that gives a number")]
+    dash: Annotated[
+        bool | Annotated[tuple[NotNegative, ...], Meta(min_length=1)],
+        Meta(
+            description="dashed, or the lengths of dashes and gaps in px; without it the first "
+            "trace is solid, and each further one has a pattern of its own"
+        ),
+    ] = False
+
+
+class RefLine(Struct, frozen=True, forbid_unknown_fields=True):
+    """A horizontal line across a plot."""
+
+    y: float
+    label: str = ""
+
+
+class Plot(Struct, frozen=True, forbid_unknown_fields=True):
+    """A plot against simulated time."""
+
+    traces: Annotated[tuple[TraceFields, ...], Meta(min_length=1)]
+    ylabel: str = ""
+    xlabel: str = ""
+    window: Annotated[Positive | None, Meta(description="seconds shown; else all")] = None
+    ymin: float | None = None
+    ymax: float | None = None
+    height: Annotated[Annotated[int, Meta(ge=40, le=2000)] | None, Meta(description="in px")] = None
+    refLines: tuple[RefLine, ...] = ()  # noqa: N815  # the author's spelling
+
+
+class Expect(Struct, frozen=True, forbid_unknown_fields=True):
+    """A claim that the build proves: `expr` is at least `min` and at most `max` at the time `t`."""
+
+    t: Annotated[NotNegative, Meta(description="simulated time in seconds")]
+    expr: Annotated[Text, Meta(description="an expression that gives a number")]
+    after: Annotated[
+        Step | Annotated[tuple[Step, ...], Meta(min_length=1)] | None,
+        Meta(
+            description="the label of a button to press, or values of controls by their labels; "
+            "or a list of these, done in order"
+        ),
+    ] = None
+    min: float | None = None
+    max: float | None = None
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """What is done before, in order; none: the claim is of the lab as it starts."""
+        if self.after is None:
+            return ()
+        return self.after if isinstance(self.after, tuple) else (self.after,)
+
+
+class Verify(Struct, frozen=True, forbid_unknown_fields=True):
+    """How much of the lab the build runs."""
+
+    seconds: Annotated[Positive | None, Meta(description="simulated time")] = None
+    rtol: Annotated[
+        NotNegative | None, Meta(description="relative difference allowed to the native engine")
+    ] = None
+    deep: Annotated[bool, Meta(description="bodies are to lie deep in each other")] = False
+
+
+class CommonLab(Struct, frozen=True):
+    """What labs of every kind have; a kind's own code reads the rest."""
+
+    title: Annotated[str, Meta(description="the caption; plain text")] = ""
+    note: Annotated[OptionalBlocks, Meta(description="Markdown under the lab")] = ""
+    height: Annotated[Height, Meta(description="of the canvas, in px")] = 320
+    dock: Annotated[bool, Meta(description="stays beside the text on wide screens")] = False
+
+
+class SimLab(Struct, frozen=True, forbid_unknown_fields=True):
+    """A live MuJoCo simulation; `model` or `xml` is required."""
+
+    model: Annotated[Text | None, Meta(description="the name of a model in models/")] = None
+    xml: Annotated[Text | None, Meta(description="the model itself, as MJCF")] = None
+    title: Annotated[str, Meta(description="the caption; plain text")] = ""
+    note: Annotated[OptionalBlocks, Meta(description="Markdown under the lab")] = ""
+    height: Annotated[Height, Meta(description="of the canvas, in px")] = 320
+    dock: Annotated[bool, Meta(description="stays beside the text on wide screens")] = False
+    key: Annotated[
+        Annotated[int, Meta(ge=0)] | Text | None,
+        Meta(description="the keyframe to start and reset from: its index or name"),
+    ] = None
+    camera: Camera | None = None
+    toggles: Annotated[tuple[Overlay, ...], Meta(description="overlays that can be switched")] = ()
+    overlays: Annotated[
+        tuple[Overlay, ...] | Overlays, Meta(description="overlays that start on")
+    ] = ()
+    forceScale: Annotated[Positive | None, Meta(description="of drawn forces, in m/N")] = None  # noqa: N815
+    autoplay: Annotated[bool, Meta(description="starts running")] = False
+    stopAt: Annotated[  # noqa: N815
+        Positive | None, Meta(description="pauses at this simulated time, in seconds")
+    ] = None
+    setup: Annotated[str, Meta(description="statements run after load and every reset")] = ""
+    controller: Annotated[str, Meta(description="statements run before every step")] = ""
+    controls: tuple[Control, ...] = ()
+    readouts: tuple[Readout, ...] = ()
+    plots: tuple[Plot, ...] = ()
+    trail: Annotated[Text | None, Meta(description="a site whose path is drawn")] = None
+    expect: Annotated[tuple[Expect, ...], Meta(description="claims that the build proves")] = ()
+    seed: Annotated[
+        Annotated[int, Meta(ge=0, le=4294967295)] | None, Meta(description="of random numbers")
+    ] = None
+    verify: Verify | None = None
+
+
+def refine_schema(definitions: dict[str, Any]) -> None:
+    """Add to a JSON Schema what the types do not say: a lab has a model in one of two ways."""
+    if "Slider" in definitions:  # the tag that an author may leave out
+        definitions["Slider"]["required"].remove("type")
+    if "SimLab" in definitions:
+        definitions["SimLab"]["oneOf"] = [{"required": ["model"]}, {"required": ["xml"]}]

@@ -1,0 +1,321 @@
+"""Trying every lab of a course: models → V8 and native MuJoCo → results and diagnostics.
+
+Entry point: `LabTrials`.
+
+1. Each lab's model is compiled natively and saved; the same bytes go to the browser.
+2. Each piece of its code must parse; then the trial takes the lab through everything that a reader
+   can do with it, in the engine that the browser has.
+3. The main run is repeated natively and compared; for a build, what it recorded becomes the static
+   form.
+4. The script that the page offers is run natively and compared with it too.
+
+Saved models, trials and pictures are kept, each by the hash of all that it depends on, so that
+where nothing has changed neither engine is started.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import time
+import zlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from msgspec import Struct
+
+from coursebuild.core.features import Trial, TrialContext, Tried
+from coursebuild.core.model.results import LabResult, StaticForm
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.native import NativeEngine, NativeError
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.scripts.dependencies import Inputs
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.features.lab.compile import LabCode, LabModule, compile_lab, pieces
+from coursebuild.features.lab.custom import custom_lab
+from coursebuild.features.lab.export import difference as export_check
+from coursebuild.features.lab.export.trial import LabExport, exported
+from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
+from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.models import LabModel, model_of_lab, saved_model
+from coursebuild.features.lab.reply import TrialReply, read_trial
+from coursebuild.features.lab.verdict import (
+    Parity,
+    code_diagnostic,
+    deep_diagnostics,
+    parity_diagnostics,
+    reset_diagnostics,
+    shallow_diagnostics,
+    trial_diagnostics,
+)
+
+_PARITY_SECONDS = 1.0
+"""Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
+"""
+_TRANSIENT = ("timeout", "engine")
+"""Kinds of failure that may not happen again: a trial that ends in one is not kept."""
+
+
+class Engines:
+    """The browser's engine and the native one; each is started when it is first needed."""
+
+    def __init__(self, root: Path) -> None:
+        self.native = NativeEngine(root)
+        self.browser = LabEngine()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        try:
+            self.browser.close()
+        finally:
+            self.native.__exit__(*error)
+
+    def stop(self) -> None:
+        """From another thread: end what runs, and let nothing begin."""
+        self.browser.stop()
+        self.native.interrupt()
+
+
+class LabTrials:
+    """Trials of labs whose models compile; a lab in which something is wrong is left out."""
+
+    def __init__(
+        self, context: TrialContext, engines: Engines | None = None, seconds: float = SECONDS
+    ) -> None:
+        """`seconds`: processor time that a trial may take."""
+        self._context, self._seconds = context, seconds
+        self._engines = Engines(context.root) if engines is None else engines
+
+    def run(self, trials: Sequence[Trial]) -> Tried:
+        """Try them in turn, and end the engines."""
+        results: list[LabResult] = []
+        found: list[Diagnostic] = []
+        with self._engines:
+            for trial in trials:
+                result, diagnostics = self._try(trial)
+                results += () if result is None else (result,)
+                found += diagnostics
+        return tuple(results), tuple(found)
+
+    def _try(self, trial: Trial) -> tuple[LabResult | None, list[Diagnostic]]:
+        context, engines, lab = self._context, self._engines, trial.block
+        assert isinstance(lab, Lab)
+        if any(lab.span.contains(diagnostic.span) for diagnostic in context.wrong):
+            return None, []
+        if lab.kind != SIMLAB:
+            return custom_lab(context, engines.native, trial, lab)
+        model = model_of_lab(context, lab)
+        if model is None:
+            return None, []
+        return _Attempt(context, engines, self._seconds, trial, lab, model).run()
+
+    def stop(self) -> None:
+        """From another thread: end what runs, and let nothing begin."""
+        self._engines.stop()
+
+
+class _Attempt(Struct, frozen=True):
+    """Trying one lab."""
+
+    context: TrialContext
+    engines: Engines
+    seconds: float
+    trial: Trial
+    lab: Lab
+    model: LabModel
+
+    def run(self) -> tuple[LabResult | None, list[Diagnostic]]:
+        """What became of it, and what is wrong."""
+        began = time.monotonic()
+        lab = self.lab
+        module = compile_lab(lab, self.trial.name)
+        inputs = inputs_of(lab, module)
+        try:
+            mjb = saved_model(self.context, self.engines.native, self.model)
+            key = _key(inputs, mjb)
+            reply = self._load(key)
+            cached = reply is not None
+            if reply is None:
+                mistakes = self._mistakes()
+                if mistakes:
+                    return self._failed(module, began), mistakes
+                reply = self._try(module, mjb, key)
+        except NativeError as error:
+            wrong = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
+            return self._failed(module, began), [wrong]
+        reading, parity = read_trial(reply), _parity(reply)
+        seconds, made = float(reply["seconds"]), int(reply["made"])
+        found = [*trial_diagnostics(lab, reading), *self._version(reading)]
+        found += shallow_diagnostics(lab, reading)
+        if parity is not None:
+            found += parity_diagnostics(lab, parity)
+        form = self._static(key, reading) if self.context.static and not found else None
+        offer = LabExport(None) if found else self._export(reading, parity)
+        own = () if lab.xml is not None else (self.model.path,)
+        self.context.memory.note_trial(
+            inputs,
+            (*own, *self.model.files),
+            ok=not found,
+            lasting=_is_lasting(reply),
+            seconds=seconds,
+            made=made,
+        )
+        result = LabResult(
+            span=lab.span,
+            name=module.name,
+            lesson=self.trial.owner,
+            title=lab.fields.title,
+            status="failed" if found else "ok",
+            seconds=seconds if cached else time.monotonic() - began,
+            steps_per_second=reading.steps_per_second,
+            tried=reading.tried,
+            parity=_parity_text(reply, parity, offer),
+            module=module.code,
+            config=module.config,
+            mjb=mjb,
+            static=form,
+            cached=cached,
+            export=offer.script,
+            unexported=offer.reason,
+        )
+        return result, [*found, *deep_diagnostics(lab, reading), *reset_diagnostics(lab, reading)]
+
+    def _failed(self, module: LabModule, began: float) -> LabResult:
+        """A lab that could not be tried."""
+        return LabResult(
+            span=self.lab.span,
+            name=module.name,
+            lesson=self.trial.owner,
+            title=self.lab.fields.title,
+            status="failed",
+            module=module.code,
+            config=module.config,
+            seconds=time.monotonic() - began,
+        )
+
+    def _mistakes(self) -> list[Diagnostic]:
+        """What no engine could run."""
+        code = pieces(self.lab)
+        wrong = self.engines.browser.mistakes([_to_parse(piece) for piece in code])
+        return [
+            code_diagnostic(self.lab, piece, text)
+            for piece, text in zip(code, wrong, strict=True)
+            if text is not None
+        ]
+
+    def _load(self, key: str) -> dict[str, Any] | None:
+        """The reply of an earlier trial."""
+        found = self.context.memory.store.get("labs", key)
+        try:
+            return None if found is None else json.loads(zlib.decompress(found))
+        except (zlib.error, ValueError, RecursionError):
+            return None
+
+    def _try(self, module: LabModule, mjb: bytes, key: str) -> dict[str, Any]:
+        """The reply of the trial, with the comparison in place of what it was made from."""
+        request = {
+            "config": tried_data(module),
+            "code": module.literal,
+            "seconds": self.lab.verify.seconds,
+        }
+        began = time.monotonic()
+        reply = self.engines.browser.trial(request, mjb, self.seconds)
+        main = reply["main"]
+        if main is not None and main["parity"] is not None:
+            main["recorded"] = export_check.recorded(main["parity"], self._horizon(main))
+            main["parity"] = self._compared(main, mjb)
+        reply["seconds"] = round(time.monotonic() - began, 4)
+        reply["made"] = int(time.time())
+        if _is_lasting(reply):
+            self.context.memory.store.put("labs", key, zlib.compress(json.dumps(reply).encode()))
+        return reply
+
+    def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
+        """How the main run compares with native MuJoCo, or why it cannot be repeated."""
+        run = main["parity"]
+        if run["steps"] == 0:
+            return {"unrepeated": "it takes no step"}
+        if run["modelChanged"]:
+            return {"unrepeated": "its controller changes the model"}
+        if not run["complete"]:
+            return {"unrepeated": "its controller writes more than can be kept"}
+        compared = self.engines.native.parity(mjb, run, self._horizon(main))
+        return {**compared, "steps": run["steps"]}
+
+    def _horizon(self, main: dict[str, Any]) -> int:
+        """The step up to which the size of a difference counts."""
+        steps = int(main["parity"]["steps"])
+        if self.lab.verify.rtol is not None:
+            return steps
+        return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
+
+    def _export(self, trial: TrialReply, parity: Parity | None) -> LabExport:
+        """The script that does what the lab does."""
+        if trial.main is None:
+            return LabExport(None)
+        return exported(self.context, self.engines.native, self.trial, self.lab, trial.main, parity)
+
+    def _version(self, trial: TrialReply) -> Iterator[Diagnostic]:
+        if trial.version != engine_version():
+            message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
+            yield diagnose("lab-engine", self.lab.span.first_line(), message)
+
+    def _static(self, key: str, trial: TrialReply) -> StaticForm | None:
+        from coursebuild.features.lab.picture.static import draw_picture, static_form
+
+        lab, main = self.lab, trial.main
+        if main is None:
+            return None
+        digest = hashlib.sha256(f"{key}\0{lab.fields.height}\0{_drawing_digest()}".encode())
+
+        def draw() -> bytes:
+            return draw_picture(lab, main)
+
+        return static_form(
+            lab, main, self.context.memory.store.get_or_create("pictures", digest.hexdigest(), draw)
+        )
+
+
+def _is_lasting(reply: dict[str, Any]) -> bool:
+    """Whether the same trial would have the same result another time."""
+    return all(failure["kind"] not in _TRANSIENT for failure in reply["failures"])
+
+
+def _to_parse(piece: LabCode) -> tuple[str, str, str, bool]:
+    return piece.code, piece.form, piece.function, piece.takes_value
+
+
+def _key(inputs: Inputs, mjb: bytes) -> str:
+    """What the reply of a trial is kept under."""
+    parts = (inputs.text, *(value for _, value in inputs.around))
+    return hashlib.sha256("\0".join(parts).encode() + mjb).hexdigest()
+
+
+@functools.lru_cache(maxsize=1)
+def _drawing_digest() -> str:
+    """A hash of how pictures are drawn."""
+    files = sorted(Path(__file__).with_name("picture").glob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def _parity(reply: dict[str, Any]) -> Parity | None:
+    main = reply["main"]
+    run = main["parity"] if main is not None else None
+    if run is None or "unrepeated" in run:
+        return None
+    return Parity(run["steps"], run["timestep"], run["first"], run["relative"], run["exact"])
+
+
+def _parity_text(reply: dict[str, Any], parity: Parity | None, offer: LabExport) -> str:
+    if parity is not None:
+        return parity.describe()
+    run = reply["main"]["parity"] if reply["main"] is not None else None
+    if run is None:
+        return ""
+    if offer.script is not None:
+        return "compared with native MuJoCo as its Python export"
+    return f"not compared with native MuJoCo: {run['unrepeated']}"

@@ -1,0 +1,224 @@
+"""What a trial found, as diagnostics at the entries of the lesson.
+
+Entry points: `trial_diagnostics(lab, trial)`, `deep_diagnostics(lab, trial)`,
+`reset_diagnostics(lab, trial)`, `parity_diagnostics(lab, parity)`, `code_diagnostic`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from msgspec import Struct
+
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.features.lab.compile import LabCode
+from coursebuild.features.lab.model import Entry, Lab
+from coursebuild.features.lab.reply import TrialFailure, TrialReply
+from coursebuild.features.lab.schema import Button
+
+PARITY_RTOL = 1e-9
+"""How far (relative) the two engines may be apart over the first second, unless a lab says."""
+
+_RULES = {
+    "throws": "lab-throws",
+    "nan": "lab-value",
+    "type": "lab-value",
+    "warning": "lab-warning",
+    "diverged": "lab-diverged",
+    "deep": "lab-penetration",
+    "expect": "lab-expect",
+    "stopAt": "lab-expect",
+    "timeout": "lab-timeout",
+    "engine": "lab-engine",
+    "shared": "lab-shared",
+}
+
+
+class Parity(Struct, frozen=True):
+    """A run of the browser's engine beside the native one."""
+
+    steps: int
+    timestep: float
+    """s."""
+    first: int | None
+    """The first step after which the states differ; `None`: bit-identical."""
+    relative: float
+    """Largest difference relative to the largest number of the state, where it counts."""
+    exact: bool = False
+    """Whether nothing in the model can differ between two machines, not even in the last bit."""
+
+    def allowed(self, rtol: float | None) -> float:
+        """The relative difference that is allowed: the lab's own, or what its model may have."""
+        if rtol is not None:
+            return rtol
+        return 0.0 if self.exact else PARITY_RTOL
+
+    def within(self, rtol: float | None) -> bool:
+        """Whether the difference is allowed; one of 0 allows none of any size."""
+        allowed = self.allowed(rtol)
+        return self.first is None or (allowed > 0 and self.relative <= allowed)
+
+    def describe(self) -> str:
+        """For people."""
+        if self.first is None:
+            return f"bit-identical to native MuJoCo over {self.steps} steps"
+        same = f"bit-identical to native MuJoCo for {self.first - 1} of {self.steps} steps"
+        return f"{same}, then within {self.relative:.0e}" if self.relative > 0 else same
+
+
+def _named(lab: Lab, entry: Entry) -> str:
+    """An entry in words, by the name that a reader of the page knows."""
+    match entry:
+        case ("controls", int(i), *_) if i < len(lab.fields.controls):
+            control = lab.fields.controls[i]
+            return f"the {'button' if isinstance(control, Button) else 'control'} `{control.label}`"
+        case ("readouts", int(i), *_) if i < len(lab.fields.readouts):
+            return f"the readout `{lab.fields.readouts[i].label}`"
+        case ("plots", int(i), "traces", int(j), *_) if i < len(lab.fields.plots):
+            return f"the trace `{lab.fields.plots[i].traces[j].label}`"
+        case ("expect", int(i), *_) if i < len(lab.fields.expect):
+            return "the claim"
+        case (str(name),):
+            return f"`{name}`"
+        case _:
+            return "the lab"
+
+
+def code_diagnostic(lab: Lab, piece: LabCode, message: str) -> Diagnostic:
+    """A piece of code that cannot be part of a lab."""
+    message = message[:1].lower() + message[1:].rstrip(".")
+    what = f"{_named(lab, piece.entry)} has code that cannot run: {message}"
+    return diagnose("lab-code", lab.place(piece.entry), what, help=_HELP[piece.form])
+
+
+_HELP = {
+    "statements": "",
+    "expression": "an expression has a value and no `;`, as in `data.qpos[0]`",
+    "target": "it must be something that can be assigned to, as `model.opt.timestep`",
+}
+
+
+def trial_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
+    """Each failure of a trial, at its entry.
+
+    What MuJoCo says of the main run it says again of every act; once is enough.
+    """
+    always = {f.kind for f in trial.failures if f.entry == () and f.kind in _OF_MUJOCO}
+    failures = [f for f in trial.failures if f.entry == () or f.kind not in always]
+    return tuple(_failure(lab, failure) for failure in failures if failure.kind != _DEEP)
+
+
+_OF_MUJOCO = ("warning", "diverged")
+_DEEP = "deep"
+
+
+def deep_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
+    """Bodies that lie deep in each other, and are not to; once where the main run has some."""
+    if lab.verify.deep:
+        return ()
+    failures = [f for f in trial.failures if f.kind == _DEEP]
+    always = [f for f in failures if f.entry == ()]
+    return tuple(_failure(lab, failure) for failure in always or failures)
+
+
+def shallow_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+    """That no bodies lie deep in each other, though the lab says that they are to."""
+    if lab.verify.deep and not any(failure.kind == _DEEP for failure in trial.failures):
+        what = "the lab says `deep`, and no bodies lay deep in each other"
+        span = lab.place(("verify", "deep"))
+        yield diagnose("lab-shallow", span, what, help="take `deep` away")
+
+
+def _failure(lab: Lab, failure: TrialFailure) -> Diagnostic:
+    tried = f"while trying: {failure.during}" if failure.during not in ("", "start") else ""
+    text, help = _explain(lab, failure)
+    span = lab.place(failure.entry)
+    return diagnose(_RULES.get(failure.kind, "lab-throws"), span, text, label=tried, help=help)
+
+
+def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
+    """What is wrong, and what helps."""
+    name = _named(lab, failure.entry)
+    when = f" at t = {failure.time:.6g} s" if failure.time else ""
+    message = failure.message.rstrip(".")
+    match failure.kind:
+        case "throws":
+            return f"{name} throws{when}: {message}", ""
+        case "nan":
+            return f"{name} {message}{when}", ""
+        case "type":
+            return f"{name} {message}", ""
+        case "warning":
+            return f"MuJoCo warns{when}: {message}", ""
+        case "diverged":
+            help = "try a smaller timestep, another integrator, or a narrower range"
+            return f"the simulation diverges{when}: {message}", help
+        case "deep":
+            help = (
+                "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts "
+                "(`solref`), or a narrower range; if they are to lie so, say so: "
+                '`"verify": {"deep": true}`'
+            )
+            return f"bodies lie deep in each other{when}: {message}", help
+        case "expect":
+            return f"the claim does not hold: `{_claim(lab, failure.entry)}` {message}", ""
+        case "timeout" if message == "did not finish in time":
+            return f"trying {name} takes too long", 'run less of it: `"verify": {"seconds": …}`'
+        case "timeout":
+            return f"{name} {message}", "look for a loop or a list without an end"
+        case "shared":
+            help = "labs run side by side; keep what this one needs in `ctx`"
+            return f"{name} changes what all labs share: {message}", help
+        case "engine":
+            return f"the browser's engine says: {message.replace('MuJoCo Error: ', '')}", ""
+        case _:
+            return message, ""
+
+
+def _claim(lab: Lab, entry: Entry) -> str:
+    match entry:
+        case ("expect", int(i), *_) if i < len(lab.fields.expect):
+            return _short(lab.fields.expect[i].expr)
+        case _:
+            return "the claim"
+
+
+def reset_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+    """A reset after the main run that led to another state than that of the start."""
+    found = trial.main["resetDiffers"] if trial.main is not None else None
+    if found is None:
+        return
+    entry: Entry = tuple(found["entry"])
+    message = f"a reset does not lead back to the start: `{found['what']}` differs"
+    match entry:
+        case ("controls", int(i), *_) if not getattr(lab.fields.controls[i], "init", False):
+            help = f'{_named(lab, entry)} is not applied again; give it `"init": true`'
+        case _:
+            help = (
+                "chance from `lib.random()` begins anew with each reset, from `Math.random()` it "
+                "does not; what code has changed in `ctx` or `model` stays until `setup` puts it "
+                "back"
+            )
+    yield diagnose("lab-reset", lab.place(entry), message, help=help)
+
+
+def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
+    """A difference between the engines that is larger than allowed."""
+    if parity.within(lab.verify.rtol):
+        return
+    time = (parity.first or 0) * parity.timestep
+    allowed = parity.allowed(lab.verify.rtol)
+    yield diagnose(
+        "lab-parity",
+        lab.place(("verify", "rtol")),
+        f"the browser's engine and native MuJoCo differ from step {parity.first} on "
+        f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {allowed:g} is "
+        "allowed",
+        help="a controller that changes `model` while it runs cannot be repeated natively; where "
+        'the motion is chaotic say how far it may part: `"verify": {"rtol": …, "seconds": …}`',
+    )
+
+
+def _short(code: str) -> str:
+    line = " ".join(code.split())
+    return line if len(line) <= 60 else line[:59] + "…"

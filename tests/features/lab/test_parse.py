@@ -1,0 +1,169 @@
+"""`lab` fences: what they become."""
+
+from __future__ import annotations
+
+import json
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coursebuild.core.model import Paragraph
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.schema import (
+    Button,
+    Camera,
+    Overlays,
+    Select,
+    SimLab,
+    Slider,
+    Verify,
+)
+from support.lab_fences import parse, told
+
+COMPLETE = r"""{
+  "title": "The flip", "note": "Press *Play*.", "height": 240, "dock": true,
+  "model": "tumbling_box", "key": "intermediate",
+  "camera": {"azimuth": -70, "elevation": 20, "distance": 0.8, "target": [0, 0, 0.5]},
+  "toggles": ["frames", "com"], "overlays": {"frames": true, "com": false},
+  "forceScale": 0.01, "autoplay": true, "stopAt": 20,
+  "setup": "data.qvel[4] = 6", "controller": "ctx.n += 1",
+  "controls": [
+    {"label": "mass", "unit": "kg", "min": 0.5, "max": 2, "step": 0.1, "value": 1, "digits": 1,
+     "set": "model.body_mass[1]", "init": true},
+    {"type": "slider", "label": "gain", "min": -1, "max": 1, "value": 0, "param": "gain"},
+    {"type": "select", "label": "integrator", "options": [["RK4", 1], ["Euler", 0]], "value": 0,
+     "apply": "model.opt.integrator = value", "reset": true},
+    {"type": "select", "label": "mode", "options": [["slow", "s"], ["fast", "f"]], "param": "mode"},
+    {"type": "button", "label": "Spin", "run": "data.qvel[4] = 6"}],
+  "readouts": [{"label": "E (J)", "expr": "lib.energy().kinetic", "digits": 5},
+               {"label": "n", "expr": "ctx.n"}],
+  "plots": [{"ylabel": "ω", "window": 10, "ymin": -7, "ymax": 7, "height": 200,
+    "refLines": [{"y": 6, "label": "start"}, {"y": 0}],
+    "traces": [{"label": "x", "expr": "data.qvel[3]", "dash": [4, 2]},
+               {"label": "y", "expr": "data.qvel[4]", "dash": true},
+               {"label": "z", "expr": "data.qvel[5]"}]}],
+  "trail": "tip",
+  "expect": [{"after": "Spin", "t": 5, "expr": "lib.energy().kinetic", "min": 0.1, "max": 1},
+             {"after": {"mass": 2, "mode": "f"}, "t": 0, "expr": "1", "min": 1},
+             {"t": 1, "expr": "2", "max": 2},
+             {"after": [{"mass": 2}, "Spin", {"mode": "f", "gain": 1}], "t": 0, "expr": "1",
+              "min": 1}],
+  "seed": 4294967295, "verify": {"seconds": 3, "rtol": 0}
+}"""
+
+
+def test_a_complete_lab() -> None:
+    parsed = parse(COMPLETE)
+    assert parsed.diagnostics == ()
+    lab = parsed.value
+    assert lab is not None
+    assert lab.span.text == f"```lab simlab\n{COMPLETE}\n```"
+    assert (lab.kind, lab.kind_span.text, lab.config) == ("simlab", "simlab", COMPLETE)
+    note = lab.note[0]
+    assert isinstance(note, Paragraph) and note.span.text == "Press *Play*."
+    assert (lab.xml, lab.models(), lab.is_docked()) == (None, ("tumbling_box",), True)
+    fields = lab.fields
+    assert (fields.title, fields.height, fields.key) == ("The flip", 240, "intermediate")
+    assert fields.camera == Camera(-70.0, 20.0, 0.8, (0.0, 0.0, 0.5))
+    assert (fields.toggles, fields.overlays) == (("frames", "com"), Overlays(frames=True))
+    mass, gain, integrator, mode, spin = fields.controls
+    assert isinstance(mass, Slider) and (mass.min, mass.max, mass.init) == (0.5, 2.0, True)
+    assert isinstance(gain, Slider) and (gain.param, gain.start, gain.step) == ("gain", 0.0, None)
+    assert isinstance(integrator, Select) and integrator.start == 0.0
+    assert isinstance(mode, Select) and mode.start == "s"
+    assert spin == Button("Spin", "data.qvel[4] = 6")
+    assert [trace.dash for trace in fields.plots[0].traces] == [(4.0, 2.0), True, False]
+    assert [claim.steps for claim in fields.expect] == [
+        ("Spin",),
+        ({"mass": 2.0, "mode": "f"},),
+        (),
+        ({"mass": 2.0}, "Spin", {"mode": "f", "gain": 1.0}),
+    ]
+    assert (lab.verify.seconds, lab.verify.rtol, lab.verify.deep) == (3.0, 0.0, False)
+
+
+def test_the_least_that_a_lab_needs() -> None:
+    lab = parse('{"model": "m"}').value
+    assert lab is not None
+    assert (lab.note, lab.fields) == ((), SimLab(model="m"))
+    assert (lab.fields.height, lab.is_docked(), lab.verify) == (320, False, Verify())
+    assert parse('{"model": "m", "overlays": ["com"], "camera": {"azimuth": 1}}').diagnostics == ()
+
+
+def test_the_lines_of_an_inline_model_have_places() -> None:
+    lab = parse('{"xml": "<mujoco>\\n  <worldbody/>\\n</mujoco>"}').value
+    assert lab is not None and lab.xml is not None
+    rows = lab.xml.lines()
+    assert [row.text for row in rows] == ["<mujoco>", "  <worldbody/>", "</mujoco>"]
+    assert [row.span().text for row in rows] == ["<mujoco>", "  <worldbody/>", "</mujoco>"]
+
+
+def test_of_another_kind_only_what_all_have_is_checked() -> None:
+    body = '{"title": "T", "note": "N", "height": 100, "points": [[1, 2]], "model": 3}'
+    parsed = parse(body, "graph")
+    assert parsed.diagnostics == ()
+    lab = parsed.value
+    assert lab is not None
+    assert (lab.kind, lab.config, lab.fields) == ("graph", body, SimLab(title="T", height=100))
+    assert len(lab.note) == 1
+    assert told('{"title": 4, "points": [1,], "height": 5, "a": 1, "a": 2}', "graph") == [
+        "2:11-12 field-type: `title` must be a string, not the number 4"
+        ' [put it between quotes: `"4"`]',
+        "2:26-27 json-syntax: a comma before `]` [remove the comma]",
+        "2:40-41 field-value: `height` must be at least 80, not 5",
+        "2:51-54 field-repeated: `a` is given twice",
+    ]
+    assert told("[]", "graph") == ["2:1-2 field-type: the lab must be an object, not an array"]
+
+
+def test_in_a_lesson() -> None:
+    source = Source("content/lessons/4.2-x.md", f"## Lab\n\n```lab simlab\n{COMPLETE}\n```\n")
+    parsed = parse_document(source, frozenset(), lesson=True)
+    assert parsed.diagnostics == ()
+    lab = parsed.value.blocks[1]
+    assert isinstance(lab, Lab)
+    assert lab.place(("controls", 0, "label")).line == 12
+
+
+# ------------------------------------------------------------------------------------- properties
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
+    at = data.draw(st.integers(0, len(COMPLETE)))
+    piece = data.draw(
+        st.sampled_from([*'{}[],:"\\\n 0-1e', "null", "true", '"x":', '"min": 9,', "[[1]]"])
+    )
+    mutated = COMPLETE[:at] + piece + COMPLETE[at + data.draw(st.integers(0, 12)) :]
+    for kind in ("simlab", "graph"):
+        parsed = parse(mutated, kind)
+        assert (parsed.value is None) == bool(parsed.diagnostics)
+        orders = [d.order for d in parsed.diagnostics]
+        assert orders == sorted(orders)
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_any_value_in_any_place_is_taken_or_told(data: st.DataObject) -> None:
+    """A field of the complete lab replaced by another value, at any depth."""
+    value = json.loads(COMPLETE)
+    place: object = value
+    while isinstance(place, dict | list) and place:
+        keys = sorted(place) if isinstance(place, dict) else range(len(place))
+        key = data.draw(st.sampled_from(list(keys)))
+        inner = place[key]  # type: ignore[index]
+        if not isinstance(inner, dict | list) or not inner or data.draw(st.booleans()):
+            new = data.draw(
+                st.sampled_from([None, True, -1, 0, 1e300, 0.5, "", "Spin", [], {}, [[]], ["a"]])
+            )
+            place[key] = new  # type: ignore[index]
+            break
+        place = inner
+    parsed = parse(json.dumps(value, ensure_ascii=False, indent=1))
+    assert (parsed.value is None) == bool(parsed.diagnostics)
+    if parsed.value is not None:
+        for control in parsed.value.fields.controls:
+            assert not isinstance(control, Slider) or control.min <= control.value <= control.max

@@ -1,0 +1,270 @@
+"""Recorded plots: ticks, ranges of every size, gaps, names that need room, markup that holds."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from coursebuild.features.lab.picture.plots import plot_svg, tick_texts, ticks
+from coursebuild.features.lab.schema import Plot, RefLine, TraceFields
+
+MOVE = re.compile(r"([ML])(-?[\d.]+) (-?[\d.]+)|(h0)")
+
+
+def plot(*names: str, dash: Any = False, **fields: Any) -> Plot:
+    traces = tuple(TraceFields(name, "1", dash) for name in names or ("a",))
+    return Plot(traces, **{"ylabel": "y (m)", "xlabel": "time (s)", **fields})
+
+
+def drawn(
+    traces: Sequence[Sequence[float | None]],
+    times: Sequence[float] | None = None,
+    what: Plot | None = None,
+    **how: Any,
+) -> ElementTree.Element:
+    """The plot, which must be well-formed XML with all that is drawn inside of it."""
+    shown = what or plot(*(f"t{i}" for i in range(len(traces))))
+    svg = plot_svg(shown, times or [float(i) for i in range(len(traces[0]))], traces, **how)
+    root = ElementTree.fromstring(svg)
+    _, _, width, height = (float(x) for x in root.attrib["viewBox"].split())
+    for x, y in points(root):
+        assert 0 <= x <= width and 0 <= y <= height
+    for text in root.iter("text"):
+        if "x" in text.attrib:
+            assert 0 <= float(text.attrib["x"]) <= width
+            assert 0 <= float(text.attrib["y"]) <= height
+    return root
+
+
+def lines(root: ElementTree.Element) -> list[str]:
+    return [p.attrib["d"] for p in root.iter("path") if "lab-trace" in p.attrib["class"]]
+
+
+def points(root: ElementTree.Element) -> list[tuple[float, float]]:
+    return [(float(m[2]), float(m[3])) for d in lines(root) for m in MOVE.finditer(d) if m[1]]
+
+
+def texts(root: ElementTree.Element, cls: str | None = None) -> list[str]:
+    found = (t for t in root.iter("text") if cls is None or cls in t.attrib.get("class", ""))
+    return [text.text or "" for text in found]
+
+
+class TestTicks:
+    @pytest.mark.parametrize(
+        ("low", "high", "wanted"),
+        [
+            (0, 1, "0.0 0.2 0.4 0.6 0.8 1.0"),
+            (-1, 1, "−1.0 −0.5 0.0 0.5 1.0"),
+            (0, 10, "0 2 4 6 8 10"),
+            (0, 0.01, "0.000 0.002 0.004 0.006 0.008 0.010"),
+            (9.80, 9.82, "9.800 9.805 9.810 9.815 9.820"),
+            (0, 1e-13, "0 2·10⁻¹⁴ 4·10⁻¹⁴ 6·10⁻¹⁴ 8·10⁻¹⁴ 1·10⁻¹³"),
+            (1e6, 1e6 + 1, "1000000.0 1000000.2 1000000.4 1000000.6 1000000.8 1000001.0"),
+            (-2e7, 2e7, "−2·10⁷ −1·10⁷ 0 1·10⁷ 2·10⁷"),
+            (0, 7, "0 2 4 6"),
+            (0, 12, "0.0 2.5 5.0 7.5 10.0"),
+            (0, 900000, "0 200000 400000 600000 800000"),
+        ],
+    )
+    def test_texts(self, low: float, high: float, wanted: str) -> None:
+        assert " ".join(tick_texts(ticks(low, high))) == wanted
+
+    @settings(max_examples=200)
+    @given(st.floats(-1e12, 1e12), st.floats(1e-6, 1e12), st.integers(2, 8))
+    def test_they_lie_in_the_range_and_tell_themselves_apart(
+        self, low: float, span: float, about: int
+    ) -> None:
+        high = low + span
+        found = ticks(low, high, about)
+        assert 1 <= len(found) <= 2 * about + 2
+        slack = 1e-6 * span + 1e-9 * abs(low)
+        assert all(low - slack <= value <= high + slack for value in found)
+        assert found == sorted(found)
+        if len(set(found)) == len(found) and abs(low) < 1e9 * span:
+            assert len(set(tick_texts(found))) == len(found)
+
+    def test_no_range(self) -> None:
+        assert ticks(5, 5) == [5]
+        assert ticks(5, 4) == [5]
+        assert ticks(0, math.inf) == [0]
+        assert tick_texts([0.0]) == ["0"]
+        assert tick_texts([2.5]) == ["2.5"]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [1.0, 2.0, 3.0],
+        [5.0, 5.0, 5.0],
+        [0.0, 0.0, 0.0],
+        [-3.0, -3.0, -3.0],
+        [1e-300, 2e-300, 3e-300],
+        [1e300, -1e300, 1e300],
+        [1.7e308, -1.7e308, 0.0],
+        [1e16, 1e16, 1e16],
+        [1.0, 1.0 + 2e-16, 1.0],
+        [1e-15, 2e-15, 0.0],
+        [1.0, math.nan, 2.0],
+        [1.0, math.inf, 2.0],
+        [None, None, None],
+        [math.nan, math.nan, math.nan],
+        [-0.0, 0.0, -0.0],
+    ],
+)
+@pytest.mark.parametrize("narrow", [False, True])
+def test_any_values(values: list[float | None], narrow: bool) -> None:
+    drawn([values], narrow=narrow)
+
+
+@settings(max_examples=80, deadline=None)
+@example([9007199254740994.0, 0.0], None, 1.0, None, "a large number next to a small one")
+@given(
+    st.lists(st.one_of(st.none(), st.floats(width=64)), min_size=1, max_size=12),
+    st.one_of(st.none(), st.floats(-1e6, 0)),
+    st.one_of(st.none(), st.floats(0.001, 1e6)),
+    st.one_of(st.none(), st.floats(0.1, 20)),
+    st.text(max_size=20),
+)
+def test_any_samples_become_a_plot(
+    values: list[float | None],
+    ymin: float | None,
+    ymax: float | None,
+    window: float | None,
+    label: str,
+) -> None:
+    what = plot(
+        label, ymin=ymin, ymax=ymax, window=window, ylabel=label, refLines=(RefLine(0.5, label),)
+    )
+    drawn([values], what=what)
+
+
+def test_what_is_no_number_interrupts_the_line() -> None:
+    root = drawn([[1.0, 2.0, math.nan, 3.0, None, 4.0, 5.0, 6.0]])
+    (line,) = lines(root)
+    assert [m[1] or m[4] for m in MOVE.finditer(line)] == ["M", "L", "M", "h0", "M", "L", "L"]
+    assert 'stroke-linecap="round"' in ElementTree.tostring(root).decode()
+
+
+def test_one_sample_is_a_point() -> None:
+    root = drawn([[3.0]], [7.5])
+    assert re.fullmatch(r"M[\d.]+ [\d.]+h0", lines(root)[0])
+    assert texts(root, "lab-name") == ["t0"]
+
+
+def test_nothing_recorded_is_nothing() -> None:
+    assert plot_svg(plot("a"), [], [[]]) == ""
+
+
+def test_a_window_shows_the_end() -> None:
+    times = [i / 10 for i in range(101)]
+    root = drawn([times], times, plot("a", window=2.0))
+    assert lines(root)[0].count("L") == 20
+    assert texts(root)[-4:-2] != ["0.0"] and "8.0" in texts(root) and "7.5" not in texts(root)
+
+
+def test_a_line_is_cut_at_the_frame() -> None:
+    what = plot("a", ymin=0.0, ymax=1.0)
+    root = drawn([[0.5, 5.0, 5.0, 0.5, -4.0, 0.5]], what=what)
+    found = points(root)
+    top, bottom = min(y for _, y in found), max(y for _, y in found)
+    assert (top, bottom) == (12.0, 172.0)
+    assert [m[1] for m in MOVE.finditer(lines(root)[0])] == ["M", "L", "M", "L", "L", "M", "L"]
+    # From 0.5 to 5 in a step: the frame ends a ninth of the way on.
+    step = (found[-1][0] - found[0][0]) / 5
+    assert found[1][0] - found[0][0] == pytest.approx(step / 9, abs=0.11)
+
+
+def test_a_line_outside_is_not_drawn_and_its_name_is() -> None:
+    root = drawn([[5.0, 6.0, 7.0]], what=plot("far", ymin=0.0, ymax=1.0))
+    assert lines(root) == [""]
+    assert texts(root, "lab-name") == ["far"]
+
+
+def test_limits_are_kept_to_the_letter() -> None:
+    root = drawn([[1.0, 2.0]], what=plot("a", ymin=-7.0, ymax=7.0))
+    grid = [p for p in root.iter("path") if p.attrib["class"] == "lab-grid"]
+    assert texts(root)[: len(grid)] == ["−5", "0", "5"]
+    assert drawn([[9.0, 9.0]], what=plot("a", ymax=3.0)) is not None
+    assert drawn([[-9.0, -9.0]], what=plot("a", ymin=3.0)) is not None
+
+
+class TestRoom:
+    def test_names_do_not_overlap_and_stay_inside(self) -> None:
+        for value in (0.0, 1.0, 0.5):
+            root = drawn([[0.0, value]] + [[value, value]] * 7 + [[1.0, 1.0 - value]])
+            places = sorted(
+                float(t.attrib["y"]) for t in root.iter("text") if "lab-name" in t.get("class", "")
+            )
+            assert len(places) == 9
+            assert min(b - a for a, b in pairwise(places)) >= 12.9
+
+    def test_long_names_get_room(self) -> None:
+        short, long = (drawn([[0.0, 1.0]], what=plot(name)) for name in ("a", "angular momentum"))
+        assert points(short)[-1][0] - points(long)[-1][0] > 80
+
+    def test_wide_ticks_get_room(self) -> None:
+        left = [points(drawn([[0.0, top]]))[0][0] for top in (1.0, 123456.0, 1e-13)]
+        assert left[0] < left[1]
+        assert all(x >= 26 + 6.2 * 3 for x in left)
+
+    def test_times_do_not_touch(self) -> None:
+        times = [1e5 + i / 1000 for i in range(100)]
+        root = drawn([times], times, narrow=True)
+        y = max(float(t.attrib["y"]) for t in root.iter("text") if "x" in t.attrib) - 17
+        shown = [
+            t for t in root.iter("text") if float(t.attrib.get("y", 0)) == pytest.approx(y, abs=2)
+        ]
+        places = sorted((float(t.attrib["x"]), len(t.text or "")) for t in shown)
+        for (x, n), (other, _) in pairwise(places):
+            assert other - x > 6.2 * n
+
+
+def test_lines_differ_by_more_than_colour() -> None:
+    root = drawn([[0.0, 1.0]] * 5)
+    styles = [
+        p.attrib.get("stroke-dasharray")
+        for p in root.iter("path")
+        if "lab-trace" in p.attrib["class"]
+    ]
+    assert len(set(styles)) == 5
+
+
+def test_the_author_s_dashes_are_taken() -> None:
+    for dash, wanted in ((True, "6 3"), ((4.0, 1.5), "4 1.5")):
+        root = drawn([[0.0, 1.0]], what=plot("a", dash=dash))
+        (line,) = (p for p in root.iter("path") if "lab-trace" in p.attrib["class"])
+        assert line.attrib["stroke-dasharray"] == wanted
+
+
+def test_reference_lines_inside_the_range_only() -> None:
+    what = plot(
+        "a",
+        ymin=0.0,
+        ymax=1.0,
+        refLines=(RefLine(0.5, "half"), RefLine(3.0, "three"), RefLine(1.0, "top")),
+    )
+    root = drawn([[0.0, 1.0]], what=what)
+    found = texts(root)
+    assert "half" in found and "top" in found and "three" not in found
+
+
+def test_texts_are_escaped() -> None:
+    nasty = '<b> & "x" \u2028 </svg><script> \x00\x07\ufffe'
+    root = drawn([[0.0, 1.0]], what=plot(nasty, ylabel=nasty, xlabel=nasty))
+    kept = '<b> & "x" \u2028 </svg><script> '
+    assert texts(root, "lab-name") == [kept]
+    assert kept in root.attrib["aria-label"]
+    assert not list(root.iter("script"))
+
+
+def test_the_same_each_time() -> None:
+    values = [[math.sin(i / 7) for i in range(200)]]
+    assert ElementTree.tostring(drawn(values)) == ElementTree.tostring(drawn(values))

@@ -1,0 +1,106 @@
+"""Labs through the commands: what a report says of them, and what a site shows."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import brotli
+import pytest
+
+from support.lab_lessons import BALL, RIGHT, Make, checked, course, fence
+from support.scratch_course import GOOD, Folder
+
+pytestmark = pytest.mark.engine
+
+RESETS = '{"model": "ball",\n"setup": "ctx.n = (ctx.n ?? 0) + 1; data.qvel[1] = ctx.n"}'
+
+
+class Built(NamedTuple):
+    """A course with a lab in which everything holds, and one whose reset leads elsewhere."""
+
+    folder: Folder
+    report: dict[str, Any]
+
+    @property
+    def public(self) -> Path:
+        return self.folder.root / "public"
+
+    def page(self, lesson: str) -> str:
+        (page,) = (self.public / "lessons").glob(f"{lesson}-*.html")
+        return page.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Built:
+    folder = Folder(tmp_path_factory.mktemp("built") / "course")
+    folder.fill([GOOD, "## A lab\n\n" + fence(RIGHT), "## A\n\n" + fence(RESETS)], stores)
+    folder.write("models/ball.xml", BALL)
+    report = checked(folder, status=0)
+    done = folder.main("build")
+    assert done.status == 0, done.out + done.err
+    return Built(folder, report)
+
+
+def test_a_lab_in_which_everything_holds(built: Built) -> None:
+    lab, _ = built.report["labs"]
+    assert {k: lab[k] for k in ("name", "title", "lesson", "status", "tried", "cached")} == {
+        "name": "1.2-lab-1", "title": "All of it", "lesson": "1.2", "status": "ok",
+        "tried": 1 + 3 + 3 + 2 + 1 + 6, "cached": False,
+    }  # fmt: skip
+    assert lab["parity"] == "bit-identical to native MuJoCo over 500 steps"
+    assert lab["steps_per_second"] > 100
+    text = built.folder.main("check", "1.2").out
+    assert re.search(
+        r"^ok       1\.2-lab-1  [\d,]+ steps/s, 16 things tried, "
+        r"bit-identical to native MuJoCo over 500 steps, cached$",
+        text,
+        re.MULTILINE,
+    )
+    assert "1 lab tried" in text
+
+
+def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(built: Built) -> None:
+    again = checked(built.folder, status=0)
+    for report, cached in ((built.report, False), (again, True)):
+        (found,) = report["diagnostics"]
+        assert (found["rule"], found["severity"], found["line"]) == ("lab-reset", "warning", 5)
+        assert [(lab["status"], lab["cached"]) for lab in report["labs"]] == [("ok", cached)] * 2
+    assert '<div class="lab-static">' in built.page("1.3")
+
+
+def test_only_the_lessons_that_are_asked_for(built: Built) -> None:
+    assert [lab["name"] for lab in checked(built.folder, "1.3")["labs"]] == ["1.3-lab-1"]
+    assert checked(built.folder, "1.1", status=0)["labs"] == []
+
+
+def test_a_model_that_does_not_compile_is_told_once(make: Make) -> None:
+    folder = course(make, "## A\n\n" + fence('{"model": "ball"}'))
+    folder.write("models/ball.xml", "<mujoco><nonsense/></mujoco>")
+    report = checked(folder, status=1)
+    assert [d["rule"] for d in report["diagnostics"]] == ["model-error"]
+
+
+def test_a_page_shows_what_the_trial_recorded(built: Built) -> None:
+    text = built.page("1.2")
+    assert text.count('<svg class="lab-plot"') == 1
+    assert "<dt>state</dt><dd>late</dd>" in text
+    assert "bit-identical to native MuJoCo over 500 steps" in text
+    assert len(list(built.public.glob("assets/labs/1.2-lab-1.*.png"))) == 1
+
+
+def test_files_of_labs_have_compressed_copies(built: Built) -> None:
+    public = built.public
+    found = (p for p in public.rglob("*") if p.suffix in (".br", ".gz"))
+    copies = [p for p in found if "search" not in p.relative_to(public).parts]
+    assert {p.name.split(".")[-2] for p in copies} == {"js", "css", "wasm", "json", "mjb"}
+    for copy in copies:
+        data = copy.read_bytes()
+        plain = brotli.decompress(data) if copy.suffix == ".br" else gzip.decompress(data)
+        assert plain == copy.with_suffix("").read_bytes()
+        assert len(plain) >= 1024 and len(data) < len(plain)
+        assert "assets" in copy.relative_to(public).parts
+    (whole,) = public.glob("assets/**/*.wasm")
+    assert whole.with_name(whole.name + ".br") in copies

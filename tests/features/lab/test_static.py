@@ -1,0 +1,311 @@
+"""The static form of a lab: everything that MuJoCo draws, as the real trial records it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coursebuild.features.lab.picture.draw import Solid
+from coursebuild.features.lab.picture.light import light_of
+from coursebuild.features.lab.picture.scenery import scene_solids
+from coursebuild.features.lab.picture.static import _shown, draw_picture, static_form
+from coursebuild.features.lab.reply import unpack_arrays
+from support.lab_values import Bench, make_lab
+from support.png_files import read_png
+
+pytestmark = pytest.mark.engine
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+EVERYTHING = """
+<mujoco>
+  <asset>
+    <texture name="grid" type="2d" builtin="checker" width="8" height="8" rgb1="1 0 0" rgb2="0 1 0"/>
+    <material name="floor" texture="grid" texrepeat="4 4" texuniform="true"/>
+    <mesh name="first" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/>
+    <mesh name="second" vertex="0 0 0  2 0 0  0 2 0  0 0 2"/>
+    <hfield name="hills" nrow="3" ncol="4" size="2 1 0.5 0.1" elevation="0 0 0 0  0 1 1 0  0 0 0 0"/>
+  </asset>
+  <worldbody>
+    <light pos="0 0 5"/>
+    <geom type="plane" size="5 5 1" material="floor"/>
+    <geom type="hfield" hfield="hills" pos="0 6 0"/>
+    <body pos="0 0 1"><freejoint/><geom type="sphere" size="0.1" rgba="1 0 0 1"/></body>
+    <body pos="1 0 1"><freejoint/><geom type="capsule" size="0.1 0.3"/></body>
+    <body pos="2 0 1"><freejoint/><geom type="ellipsoid" size="0.1 0.2 0.3" rgba="0 0 1 0.5"/></body>
+    <body pos="3 0 1"><freejoint/><geom type="cylinder" size="0.1 0.3"/></body>
+    <body pos="4 0 1"><freejoint/><geom type="box" size="0.1 0.2 0.3"/></body>
+    <body pos="5 0 1"><freejoint/><geom type="mesh" mesh="first"/></body>
+    <body pos="7 0 1"><freejoint/><geom type="mesh" mesh="second"/></body>
+    <body name="hidden" pos="9 0 1"><geom type="box" size="1 1 1" group="4"/></body>
+    <body name="a" pos="0 3 2"><joint type="hinge" axis="0 1 0"/><geom size="0.05"/><site name="s" pos="0 0 0.2"/></body>
+    <body name="b" pos="1 3 2"><joint type="hinge" axis="0 1 0"/><geom size="0.05"/><site name="t" type="box" size="0.02 0.02 0.02"/></body>
+  </worldbody>
+  <tendon><spatial width="0.01" rgba="0 1 0 1"><site site="s"/><site site="t"/></spatial></tendon>
+</mujoco>
+"""  # noqa: E501
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    bench = Bench(tmp_path_factory.mktemp("course"))
+    with bench.browser, bench.native:
+        yield bench
+
+
+def main_of(bench: Bench, **fields: Any) -> tuple[Any, dict[str, Any]]:
+    lab = make_lab(**{"verify": {"seconds": 0.1}, **fields})
+    reply = bench.trial(lab)
+    # Scenes that only show shapes have them in each other.
+    assert [failure for failure in reply["failures"] if failure["kind"] != "deep"] == []
+    return lab, json.loads(json.dumps(reply["main"]))
+
+
+def solids(main: dict[str, Any]) -> list[Solid]:
+    return list(
+        scene_solids(unpack_arrays(main["scene"]), unpack_arrays(main["pictures"][0]["frame"]))
+    )
+
+
+@pytest.fixture(scope="module")
+def everything(bench: Bench) -> tuple[Any, dict[str, Any]]:
+    return main_of(bench, xml=EVERYTHING, overlays=["frames", "com"], toggles=["frames"])
+
+
+def test_all_geoms_have_their_shape_and_place(everything: tuple[Any, dict[str, Any]]) -> None:
+    found = solids(everything[1])
+    scene = everything[1]["scene"]
+    visible = [g for g in scene["geoms"] if g["group"] <= 2]
+    assert Counter(g["type"] for g in visible) == Counter([0, 1, 2, 3, 4, 5, 6, 7, 7, 2, 2])
+    plane, hills, ball, capsule, ellipsoid, cylinder, box, first, second = found[:9]
+    assert plane.plane and plane.mirror == 0 and box.mirror == pytest.approx(0.3)
+    assert plane.texture is not None and (plane.texture.repeat, plane.texture.uniform) == (
+        (4, 4),
+        True,
+    )
+    assert plane.texture.texture.levels[0].shape == (1, 8, 8, 3)
+    assert np.ptp(plane.texture.texture.levels[0], axis=(0, 1, 2)).tolist() == [1, 1, 0]
+    assert hills.position == pytest.approx((0, 6, 0))
+    reach = [np.ptp(s.surface.vertices, axis=0) for s in (hills, ball, capsule, cylinder, box)]
+    assert reach[0] == pytest.approx((4, 2, 0.6)), "with what is below 0"
+    assert reach[1] == pytest.approx((0.2, 0.2, 0.2), rel=0.01)
+    assert reach[2] == pytest.approx((0.2, 0.2, 0.8), rel=0.01)
+    assert reach[3] == pytest.approx((0.2, 0.2, 0.6), rel=0.01)
+    assert reach[4] == pytest.approx((0.2, 0.4, 0.6))
+    assert ball.rgba == (1, 0, 0, 1) and ellipsoid.rgba == (0, 0, 1, 0.5)
+    assert [ball.position[0], box.position[0]] == pytest.approx([0, 4], abs=1e-5)
+    for mesh, size in ((first, 1.0), (second, 2.0)):
+        corners = mesh.surface.vertices[mesh.surface.faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        volume = np.einsum("ij,ij->", corners[:, 0], across) / 6
+        assert volume == pytest.approx(size**3 / 6, rel=1e-5), "outward, and the right mesh"
+        world = mesh.surface.vertices @ mesh.rotation.T + mesh.position
+        assert np.ptp(world, axis=0) == pytest.approx((size, size, size), abs=1e-5)
+
+
+def test_what_the_visualizer_adds_is_there(everything: tuple[Any, dict[str, Any]]) -> None:
+    found = solids(everything[1])
+    green = [s for s in found if s.rgba[:3] == (0, 1, 0)]
+    assert green, "the tendon"
+    ends = [s.surface.vertices @ s.rotation.T + s.position for s in green]
+    points = np.concatenate(ends)
+    assert points.min(axis=0) == pytest.approx((0, 3, 2), abs=0.05)
+    assert points.max(axis=0) == pytest.approx((1, 3, 2.2), abs=0.05)
+    frames = [
+        s for s in found if s.rgba[:3] != (0, 1, 0) and s.position[1] == pytest.approx(3, abs=0.2)
+    ]
+    assert len(frames) > 4, "frames and centres of mass of the bodies a and b"
+
+
+def test_a_hidden_group_is_not_shown(everything: tuple[Any, dict[str, Any]]) -> None:
+    there = [s for s in solids(everything[1]) if s.position[0] == pytest.approx(9)]
+    assert all(np.ptp(s.surface.vertices) < 1.5 for s in there), "marks of it, and not its box"
+
+
+def test_the_picture_is_the_same_each_time(everything: tuple[Any, dict[str, Any]]) -> None:
+    lab, main = everything
+    assert draw_picture(lab, main) == draw_picture(lab, json.loads(json.dumps(main)))
+
+
+def test_broken_rows_of_a_frame_are_left_out(everything: tuple[Any, dict[str, Any]]) -> None:
+    scene = unpack_arrays(everything[1]["scene"])
+    frame = unpack_arrays(everything[1]["pictures"][0]["frame"]).copy()
+    whole = len(list(scene_solids(scene, frame)))
+    start = scene["layout"]["geoms"]
+    for i, value in ((2, math.nan), (3, math.inf), (4, -math.inf)):
+        frame[start + 19 * i + i] = value
+    assert len(list(scene_solids(scene, frame))) == whole - 3
+
+
+def test_a_flex_and_a_skin_are_drawn(bench: Bench) -> None:
+    xml = """<mujoco><worldbody>
+      <flexcomp name="cloth" type="grid" count="4 4 1" spacing=".1 .1 .1" radius=".01" dim="2"
+        pos="0 0 1" mass="1" rgba="0 0.5 1 1"><edge equality="true"/></flexcomp>
+      </worldbody></mujoco>"""
+    _, main = main_of(bench, xml=xml)
+    cloth = [s for s in solids(main) if s.rgba[2] == 1.0 and len(s.surface.faces) >= 18]
+    assert len(cloth) == 1
+    assert np.ptp(cloth[0].surface.vertices, axis=0)[:2] == pytest.approx((0.3, 0.3), abs=1e-6)
+
+
+def test_a_flex_of_lines_has_its_radius(bench: Bench) -> None:
+    xml = """<mujoco><asset><material name="m" rgba="0 0.5 1 1"/></asset><worldbody>
+      <flexcomp name="rope" type="grid" count="5 1 1" spacing=".1 .1 .1" radius=".02" dim="1"
+        pos="0 0 1" mass="1" material="m"><edge equality="true"/></flexcomp></worldbody></mujoco>"""
+    _, main = main_of(bench, xml=xml)
+    (rope,) = [s for s in solids(main) if s.open]
+    assert rope.rgba == (0, 0.5, 1, 1), "of its material"
+    assert np.ptp(rope.surface.vertices, axis=0) == pytest.approx((0.44, 0.04, 0.04), rel=0.05)
+
+
+SHINY = """<mujoco>
+  <visual><headlight ambient="0.1 0.2 0.3" diffuse="0.4 0.4 0.4" specular="0.2 0.2 0.2"/></visual>
+  <asset>
+    <texture name="big" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="1024"
+      height="600"/>
+    <texture name="faces" type="cube" builtin="flat" rgb1="1 0 0" rgb2="0 0 1" width="200"
+      height="1200"/>
+    <texture type="skybox" builtin="gradient" rgb1="1 1 1" rgb2="0 0 0" width="64" height="384"/>
+    <material name="tiles" texture="big" reflectance="0.25"/>
+    <material name="box" texture="faces" metallic="0.5" roughness="0.5"/>
+    <material name="old" specular="0.75" shininess="0.25" emission="0.125"/>
+  </asset>
+  <worldbody>
+    <light type="spot" pos="0 0 3" dir="0 0 -2" cutoff="30" exponent="16" diffuse="0.6 0.5 0.4"
+      ambient="0.05 0 0" specular="0.4 0.4 0.4"/>
+    <light type="spot" pos="1 0 3" cutoff="120"/>
+    <light type="directional" dir="1 0 -1" active="false"/>
+    <geom type="plane" size="0 0 1" material="tiles" pos="0 0 -1"/>
+    <geom type="box" size="0.3 0.3 0.3" material="box"/>
+    <geom size="0.2" pos="1 0 0" material="old"/>
+  </worldbody>
+</mujoco>"""
+
+
+def test_materials_are_recorded_and_textures_made_small(bench: Bench) -> None:
+    _, main = main_of(bench, xml=SHINY)
+    sizes = [(t["width"], t["height"]) for t in main["scene"]["textures"]]
+    assert sizes == [(256, 256), (64, 384), (64, 384)]
+    floor, box, ball = solids(main)[:3]
+    assert floor.material.reflectance == 0.25 and not floor.material.physical
+    assert floor.texture is not None and floor.texture.endless
+    squares = floor.texture.texture.levels[0][0]
+    assert squares[:100, :100].min() == 1 and squares[:100, 200:].max() == 0, "still squares"
+    assert box.material.physical and box.material.metallic == 0.5
+    assert box.material.shininess == pytest.approx(2 / 0.5**4 - 2)
+    assert box.texture is not None and box.texture.texture.levels[0].shape == (6, 64, 64, 3)
+    assert (ball.material.shininess, ball.material.specular) == (32, 0.75)
+    assert ball.material.emission == 0.125 and ball.texture is None
+
+
+def test_the_light_is_that_of_the_model(bench: Bench) -> None:
+    _, main = main_of(bench, xml=SHINY)
+    scene, frame = unpack_arrays(main["scene"]), unpack_arrays(main["pictures"][0]["frame"])
+    forward = np.array((0.0, 1.0, 0.0))
+    light = light_of(scene, frame, forward)
+    spot, wide, head = light.point_lights
+    assert spot.colour == pytest.approx((0.6, 0.5, 0.4)), "the directional one is off"
+    assert spot.position == pytest.approx((0, 0, 3)) and spot.direction == pytest.approx((0, 0, -1))
+    half, inner = math.cos(math.radians(30)), math.cos(math.radians(15))
+    assert spot.cone == pytest.approx((half, inner))
+    assert wide.position == pytest.approx((1, 0, 3)) and wide.cone is None, "to all sides"
+    assert (head.position, head.direction.tolist()) == (None, [0, 1, 0])
+    assert light.ambient == pytest.approx((0.15, 0.2, 0.3))
+
+
+def test_an_endless_plane_is_around_what_the_camera_looks_at(bench: Bench) -> None:
+    camera = {"azimuth": 90, "elevation": -20, "target": [50, 7, 0], "distance": 3}
+    _, main = main_of(bench, xml=SHINY, camera=camera)
+    floor = solids(main)[0]
+    assert floor.surface.vertices.mean(axis=0) == pytest.approx((50, 7, 0))
+    assert floor.position == pytest.approx((0, 0, -1)), "so that its squares stay where they are"
+
+
+def test_an_orthographic_camera(bench: Bench) -> None:
+    xml = """<mujoco><visual><global orthographic="true" fovy="2"/></visual><worldbody>
+      <body><geom type="box" size="0.5 0.5 0.5"/></body></worldbody></mujoco>"""
+    lab, main = main_of(
+        bench, xml=xml, camera={"azimuth": 90, "elevation": 0, "target": [0, 0, 0]}, height=480
+    )
+    pixels = read_png(draw_picture(lab, main))
+    rows = np.nonzero(pixels[..., 3].any(axis=1))[0]
+    # A box of 1 m in a view that is 2 m high.
+    assert rows.max() - rows.min() + 1 == pytest.approx(pixels.shape[0] / 2, abs=2)
+
+
+def test_readouts_and_plots_belong_to_the_run(bench: Bench) -> None:
+    lab, main = main_of(
+        bench,
+        height=240,
+        verify={"seconds": 0.5},
+        readouts=[
+            {"label": "t", "expr": "data.time", "digits": 2},
+            {"label": "word", "expr": "data.time > 0.4 ? '<late>' : 'early'"},
+            {"label": "tiny", "expr": "-1e-9", "digits": 3},
+        ],
+        plots=[
+            {"ylabel": "t", "traces": [{"label": "a", "expr": "data.time"}]},
+            {"ylabel": "u", "traces": [{"label": "b", "expr": "0"}, {"label": "c", "expr": "1"}]},
+        ],
+    )
+    form = static_form(lab, main, b"PNG")
+    assert form.picture == b"PNG"
+    assert form.size == (640, 320)
+    assert (form.time, form.end) == (0, pytest.approx(0.5))
+    assert form.readouts == (("t", "0.50"), ("word", "<late>"), ("tiny", "0.000"))
+    assert [svg.count("lab-trace ") for svg in form.plots] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (1.0, 3, "1.000"),
+        (-1.5, 1, "−1.5"),
+        (-0.0004, 3, "0.000"),
+        (-0.0, 0, "0"),
+        (-0.5, 0, "0"),
+        (0.0005, 3, "0.001"),
+        (1e9, 0, "1.00·10⁹"),
+        (-2.5e300, 3, "−2.500·10³⁰⁰"),
+        (999999999.0, 1, "999999999.0"),
+        (math.nan, 3, "NaN"),
+        (math.inf, 3, "∞"),
+        (-math.inf, 3, "−∞"),
+        (None, 3, "–"),
+        ("text", 3, "text"),
+        ("-1", 3, "-1"),
+        (7, 0, "7"),
+    ],
+)
+def test_values_as_text(value: Any, digits: int, text: str) -> None:
+    assert _shown(value, digits) == text
+
+
+def test_arrays_come_back_as_they_were() -> None:
+    import base64
+
+    for kind, dtype in (
+        ("f64", "<f8"),
+        ("f32", "<f4"),
+        ("i32", "<i4"),
+        ("u32", "<u4"),
+        ("u8", "u1"),
+    ):
+        array = np.array([0, 1, 250], dtype=dtype)
+        packed = {"type": kind, "data": base64.b64encode(array.tobytes()).decode()}
+        found = unpack_arrays({"a": [packed], "type": 3, "data": packed})
+        assert np.array_equal(found["a"][0], array) and found["a"][0].dtype == array.dtype
+        assert np.array_equal(found["data"], array)
+    assert unpack_arrays({"type": 5, "data": 2}) == {"type": 5, "data": 2}
+
+
+def test_the_size_of_the_picture_follows_the_lab(tmp_path: Path) -> None:
+    main = {"plots": {"times": [], "plots": []}, "pictures": [{"time": 0, "readouts": None}]}
+    sizes = [static_form(make_lab(height=h), main, b"").size for h in (80, 260, 480, 2000)]
+    assert sizes == [(640, 160), (640, 347), (640, 480), (640, 480)]

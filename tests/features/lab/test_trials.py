@@ -1,0 +1,242 @@
+"""When labs are tried: what is kept of a trial, and what runs beside it."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coursebuild.core.features import Trial
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.lab_engine import LabEngine
+from coursebuild.core.run.lab_files import engine_digest
+from coursebuild.core.run.mjcf import compile_all
+from coursebuild.core.run.native import NativeEngine, native_digest
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.scripts.dependencies import Inputs
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
+from coursebuild.features.lab.checks import labs_in
+from coursebuild.features.lab.inputs import trial_inputs
+from coursebuild.pipeline.options import Options
+from support.lab_lessons import BALL, RIGHT, Make, checked, course, fence
+from support.lab_values import OpenEngines, try_labs
+from support.made_courses import make_course
+from support.scratch_course import GOOD, Folder, block, ended, wait_until_alone
+
+pytestmark = pytest.mark.engine
+
+LAB = (
+    '{"title": "T", "model": "ball", "height": 200, "toggles": ["frames"], "note": "A note.",\n'
+    ' "setup": "ctx.a = NUMBER", "controller": "ctx.b = 2",\n'
+    ' "controls": [{"label": "s", "min": 0, "max": 1, "value": 0.5, "param": "p"}],\n'
+    ' "readouts": [{"label": "r", "expr": "ctx.a"}],\n'
+    ' "verify": {"seconds": 0.2}}'
+)
+NEUTRAL = [
+    ("Text.", "Another text."),
+    ('"title": "T"', '"title": "Another"'),
+    ('"height": 200', '"height": 300'),
+    ('"toggles": ["frames"]', '"toggles": ["com"]'),
+    ('"note": "A note."', '"note": "Another *note*."'),
+    ('{"title"', '{ "dock": true,\n\n "title"'),
+    ('"setup": "ctx.a = ', '"setup": "ctx.a \\u003d '),
+]
+"""Edits that change nothing that a trial depends on."""
+EDITS = [
+    ('"ctx.a = ', '"ctx.a = 100 + '),
+    ("ctx.b = 2", "ctx.b = 3"),
+    ('"max": 1', '"max": 2'),
+    ('"value": 0.5', '"value": 0.6'),
+    ('"expr": "ctx.a"', '"expr": "ctx.a + 1"'),
+    ('"seconds": 0.2', '"seconds": 0.3'),
+    ('"seconds": 0.2', '"seconds": 0.2, "rtol": 0'),
+    ('"height"', '"camera": {"azimuth": 3}, "height"'),
+    ('"height"', '"seed": 3, "height"'),
+    ('"height"', '"stopAt": 3, "height"'),
+    ('"height"', '"expect": [{"t": 0, "expr": "1", "min": 1}], "height"'),
+    ('"height"', '"key": 0, "height"'),
+]
+"""Edits after which a lab must be tried again."""
+
+
+def inputs_of(text: str) -> Inputs:
+    """What the trial of the lab of a lesson depends on besides files."""
+    source = Source("content/lessons/1.2-second.md", text)
+    document = parse_document(source, frozenset(), lesson=True).value
+    (lab,) = labs_in((document,))
+    found = trial_inputs(Trial("1.2-lab-1", "1.2", lab))
+    assert found is not None
+    return found
+
+
+def test_an_edit_counts_exactly_where_a_trial_depends_on_it() -> None:
+    text = "Text.\n\n" + fence(LAB.replace("NUMBER", "1"))
+    before = inputs_of(text)
+    changed = [edit for edit in (*NEUTRAL, *EDITS) if inputs_of(text.replace(*edit, 1)) != before]
+    assert changed == EDITS
+    around = dict(before.around)
+    assert around["MuJoCo"] == engine_version()
+    assert engine_digest().startswith(around["the browser's engine and its trial"])
+    assert native_digest().startswith(around["how a lab is repeated natively"])
+
+
+def cached(folder: Folder) -> list[bool]:
+    """Of each lab: whether it was not tried again; in parts, so that the labs are looked at."""
+    return [lab["cached"] for lab in checked(folder, "--shard", "1/1", status=0)["labs"]]
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """A course with a lab whose trial is kept, and whose model has another file as a part."""
+    folder = Folder(tmp_path_factory.mktemp("kept") / "course")
+    folder.fill([GOOD, "## A lab\n\n" + fence(LAB.replace("NUMBER", "1"))], stores)
+    include = '<include file="part.xml"/><worldbody>'
+    folder.write("models/ball.xml", BALL.replace("<worldbody>", include))
+    folder.write("models/part.xml", '<mujoco><option timestep="0.002"/></mujoco>')
+    assert cached(folder) == [False]
+    return folder
+
+
+def test_lab_is_tried_again_after_an_edit_of_it_or_its_model(kept: Folder) -> None:
+    edits = ((kept.lesson(2), *NEUTRAL[1]), (kept.lesson(2), *EDITS[1]))
+    models = (
+        ("models/ball.xml", 'mass="1"', 'mass="2"'),
+        ("models/part.xml", '"0.002"', '"0.001"'),
+    )
+    again = []
+    for path, old, new in (*edits, *models):
+        kept.replace(path, old, new)
+        again.append(cached(kept) == [False])
+    assert again == [False, True, True, True]
+    assert cached(kept) == [True]
+
+
+def test_lab_with_damaged_entries_is_tried_again(kept: Folder) -> None:
+    for kind in ("labs", "mjb"):
+        for entry in (kept.root / ".coursebuild" / kind).iterdir():
+            entry.write_bytes(entry.read_bytes()[:-1])
+    assert cached(kept) == [False]
+    assert cached(kept) == [True]
+
+
+def test_no_engine_is_asked_where_all_is_kept(
+    kept: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("an engine was asked")
+
+    for engine, names in ((LabEngine, ("mistakes", "trial")), (NativeEngine, ("save", "parity"))):
+        for name in names:
+            monkeypatch.setattr(engine, name, refuse)
+    assert cached(kept) == [True]
+
+
+def test_failure_of_a_lab_is_kept_and_one_that_took_too_long_is_not(tmp_path: Path) -> None:
+    """The first lab throws; the second takes longer than it may at first."""
+    lab = '{{"model": "ball", "verify": {{"seconds": {}}}, "setup": "{}"}}'
+    fences = fence(lab.format(0.1, "null.x")) + fence(lab.format(20, ""))
+    course = make_course(fences, models={"ball": BALL})
+    models = {"ball": compile_all(tmp_path, course.models, [])[0][0]}
+    options = Options(root=tmp_path, jobs=1, quiet=True)
+    found = []
+    with closing(OpenEngines(tmp_path)) as engines:
+        for seconds in (0.2, 60.0):
+            results, wrong = try_labs(course, options, engines, models, seconds=seconds)
+            found.append(([d.rule for d in wrong], [result.cached for result in results]))
+    assert found == [
+        (["lab-throws", "lab-timeout"], [False, False]),
+        (["lab-throws"], [True, False]),
+    ]
+
+
+# --- labs are tried in a thread while scripts run
+
+
+def test_error_in_a_trial_ends_the_command_and_hangs_nothing(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = course(make, "## A\n\n" + fence(RIGHT))
+    error: Exception = EffectError("MuJoCo cannot be loaded: no library x")
+
+    def broken(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(NativeEngine, "save", broken)
+    done = folder.main("check")
+    assert done.status == 1
+    assert "coursebuild: MuJoCo cannot be loaded: no library x" in done.err
+    wait_until_alone(folder)
+    error = ZeroDivisionError()  # a mistake of the tool's own
+    with pytest.raises(ZeroDivisionError):
+        folder.main("check")
+    wait_until_alone(folder)
+
+
+def native_processes() -> list[int]:
+    """Of MuJoCo's, those that this process started."""
+    found = []
+    for number in Path(f"/proc/{os.getpid()}/task").glob("*/children"):
+        for child in number.read_text().split():
+            if b"native_worker" in Path(f"/proc/{child}/cmdline").read_bytes():
+                found.append(int(child))
+    return found
+
+
+def test_native_mujoco_that_dies_is_told_at_the_lab(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = NativeEngine.parity
+
+    def dies(engine: NativeEngine, *arguments: Any) -> Any:
+        (process,) = native_processes()
+        os.kill(process, signal.SIGKILL)
+        return original(engine, *arguments)
+
+    monkeypatch.setattr(NativeEngine, "parity", dies)
+    folder = course(make, "## A\n\n" + fence(RIGHT))
+    (found,) = checked(folder, status=1)["diagnostics"]
+    assert (found["rule"], found["line"]) == ("lab-engine", 3)
+    assert found["message"] == "native MuJoCo crashed (SIGKILL)"
+    monkeypatch.undo()
+    assert cached(folder) == [False]
+
+
+@pytest.mark.parametrize(
+    ("number", "status", "where"), [(signal.SIGINT, 130, "lab"), (signal.SIGTERM, 143, "script")]
+)
+def test_signal_ends_labs_and_scripts_at_once_and_leaves_nothing(
+    make: Make, number: int, status: int, where: str
+) -> None:
+    """The code of the second lab never returns; its time is over after a minute."""
+    script = "from pathlib import Path\nPath('running').touch()\n"
+    script += "import time\ntime.sleep(600)\n" if where == "script" else ""
+    fine = '{"model": "ball", "verify": {"seconds": 0.1}}'
+    endless = '{"model": "ball", "controller": "for (;;) ;"}'
+    folder = course(
+        make,
+        "## A\n\n" + block("a.py", script, info="timeout=600") + fence(fine) + fence(endless),
+    )
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with ended(folder.start("check", "1.2", **pipes)) as process:
+        while not ((folder.root / "running").exists() and kept_trials(folder)):
+            assert process.poll() is None
+            time.sleep(0.01)
+        os.kill(process.pid, number)
+        assert process.wait(600) == status
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert after.ru_utime - before.ru_utime < 45, "it waited until the lab's time was over"
+    wait_until_alone(folder)
+    assert list(folder.tmp.iterdir()) == []
+
+
+def kept_trials(folder: Folder) -> list[Path]:
+    return list((folder.root / ".coursebuild" / "labs").glob("*"))
