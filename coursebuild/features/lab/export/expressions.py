@@ -39,7 +39,6 @@ from coursebuild.features.lab.export.values import (
     POWER,
     PRODUCT,
     SIGN,
-    SMALL,
     Code,
     Type,
     arithmetic,
@@ -246,8 +245,8 @@ class Expressions(ABC):
         if operator == "~":
             _check_bits(operator, code)
             return Code(f"~{code.within(SIGN)}", "int", SIGN)
-        if operand.type == "number" and code.type == "nat" and code.bound > 0:
-            return Code(f"-{code.text}", "int", SIGN, code.bound)
+        if operand.type == "number" and code.whole:
+            return Code(f"-{code.text}", "int", SIGN)
         return Code(f"-{as_float(code).within(SIGN)}", "num", SIGN)
 
     def binary(self, operator: str, left: Node, right: Node) -> Code:
@@ -264,12 +263,12 @@ class Expressions(ABC):
             case "&" | "|" | "^":
                 _check_bits(operator, a, b)
                 return Code(f"{a.within(ATOM)} {operator} {b.within(ATOM)}", "int", BITS)
-            case "**" if right.type == "number" and b.type == "nat" and b.bound <= 16:
+            case "**" if right.type == "number" and b.type == "nat" and b.whole <= 16:
                 return Code(f"{as_float(a).within(ATOM)}**{b.text}", "num", POWER)
             case "**":
                 return Code(f"power({a.text}, {b.text})", "num")
-            case "%" if a.type == b.type == "nat" and right.type == "number" and b.bound > 0:
-                return Code(f"{a.within(PRODUCT)} % {b.text}", "nat", PRODUCT, b.bound)
+            case "%" if a.type == "nat" and right.type == "number" and b.whole:
+                return Code(f"{a.within(PRODUCT)} % {b.text}", "nat", PRODUCT)
             case "%":
                 return Code(f"np.fmod({as_float(a).text}, {as_float(b).text})", "num")
             case _:
@@ -303,7 +302,7 @@ class Expressions(ABC):
             raise UntranslatableError(f"{a.named} that depends on a condition")
         condition = self.test(field(node, "condition")).within(OR)
         text = f"{a.within(OR)} if {condition} else {b.text}"
-        return Code(text, type, CONDITIONAL, max(a.bound, b.bound))
+        return Code(text, type, CONDITIONAL)
 
     @abstractmethod
     def call(self, node: Node, *, single: bool) -> Code:
@@ -322,7 +321,7 @@ def _number(code: Code) -> Code:
 
 def _check_bits(operator: str, *operands: Code) -> None:
     """Bits are those of 32-bit integers in JavaScript."""
-    if any(code.type == "num" or code.bound > SMALL for code in operands):
+    if any(code.type == "num" for code in operands):
         raise UntranslatableError(
             f"`{operator}` on a number that need not be a whole one of 32 bits"
         )

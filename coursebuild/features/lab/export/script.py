@@ -153,10 +153,9 @@ class _Script:
             return Code(name, "str")
         if len(numbers) < len(values):
             raise UntranslatableError("a choice between texts and numbers")
-        bound = max(abs(value) for value in numbers)
-        if any(value != int(value) for value in numbers) or bound >= 2**31:
+        if any(value != int(value) or abs(value) >= 2**31 for value in numbers):
             return Code(name, "num")
-        return Code(name, "int" if min(numbers) < 0 else "nat", bound=bound)
+        return Code(name, "int" if min(numbers) < 0 else "nat")
 
     def _parameters(self, values: list[Code | None]) -> dict[str, Type]:
         found: dict[str, Type] = {}

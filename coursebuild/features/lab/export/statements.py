@@ -171,9 +171,7 @@ class _Statements(Calls):
         while own in RESERVED or own in self.taken or own.startswith("__") or _is_capitals(own):
             own = f"{own.lstrip('_')}_"
         self.taken.add(own)
-        self.scopes[-1][name] = Variable(
-            Code(own, code.type, bound=code.bound, element=code.element), constant
-        )
+        self.scopes[-1][name] = Variable(Code(own, code.type, element=code.element), constant)
         return own
 
     def declaration(self, node: Node, constant: bool) -> str:

@@ -28,8 +28,7 @@ ARRAYS = ("vector", "rows")
 
 CONDITIONAL, OR, AND, NOT, COMPARISON, BITS, SUM, PRODUCT, SIGN, POWER, ATOM = range(11)
 """Precedence of Python's operators."""
-_EXACT = 2.0**53
-SMALL = 2.0**31
+_SMALL = 2**31
 
 
 class Code(Struct, frozen=True):
@@ -38,14 +37,17 @@ class Code(Struct, frozen=True):
     text: str
     type: Type
     precedence: int = ATOM
-    bound: float = SMALL
-    """A `nat` or `int` is at most so far from 0."""
     element: Element = "f64"
     """What an array holds."""
 
     def within(self, precedence: int) -> str:
         """It as an operand of an operator of this precedence."""
         return self.text if self.precedence >= precedence else f"({self.text})"
+
+    @property
+    def whole(self) -> int:
+        """The number that a literal is; 0 for any other expression."""
+        return int(self.text, 0) if self.text[:1].isdigit() and self.type == "nat" else 0
 
     @property
     def flat(self) -> str:
@@ -88,8 +90,8 @@ def literal(text: str) -> Code:
         raise UntranslatableError(f"the number `{text}`")
     if plain[:2] in ("0x", "0o", "0b") or plain.isdecimal():
         whole = int(plain, 0)
-        if whole < SMALL:
-            return Code(plain, "nat", bound=float(whole))
+        if whole < _SMALL:
+            return Code(plain, "nat")
         plain = str(whole)
     value = float(plain)
     if math.isinf(value):
@@ -114,22 +116,15 @@ def as_float(code: Code) -> Code:
 def arithmetic(operator: str, a: Code, b: Code) -> Code:
     """`+`, `-`, `*` and `/` of numbers."""
     precedence = SUM if operator in "+-" else PRODUCT
-    whole = "num" not in (a.type, b.type)
-    natural = a.type == b.type == "nat"
+    whole, natural = "num" not in (a.type, b.type), a.type == b.type == "nat"
     type: Type = "num"
-    bound = SMALL
-    if whole and operator in "+-":
-        bound = a.bound + b.bound
-        type = "nat" if natural and operator == "+" else "int"
-    elif natural and operator == "*":
-        bound = a.bound * b.bound
+    if natural and operator in "+*":
         type = "nat"
-    if type != "num" and bound >= _EXACT:
-        type = "num"
-    if whole and type == "num" and operator != "/":
+    elif whole and operator in "+-":
+        type = "int"
+    elif whole and operator == "*":  # a zero may be negative
         a = as_float(a)
-    text = f"{a.within(precedence)} {operator} {b.within(precedence + 1)}"
-    return Code(text, type, precedence, bound)
+    return Code(f"{a.within(precedence)} {operator} {b.within(precedence + 1)}", type, precedence)
 
 
 def text_literal(text: str) -> Code:
