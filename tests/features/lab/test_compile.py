@@ -6,7 +6,7 @@ import json
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import pytest
 from hypothesis import given, settings
@@ -14,11 +14,10 @@ from hypothesis import strategies as st
 
 from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.features.lab.compile import LabCode, LabModule, compile_lab, pieces
-from support.lab_values import make_lab
+from support.lab_values import Bench, make_lab
 
 pytestmark = pytest.mark.engine
-
-SPAN = make_lab().span
+Form: TypeAlias = Literal["statements", "expression", "target"]
 
 
 @pytest.fixture(scope="module")
@@ -27,12 +26,13 @@ def engine() -> Iterator[LabEngine]:
         yield engine
 
 
-def mistake(engine: LabEngine, code: str, form: Any, takes_value: bool = False) -> str | None:
-    piece = LabCode(("x",), form, code, SPAN, takes_value or form == "target")
-    return engine.mistakes([(piece.code, piece.form, piece.function, piece.takes_value)])[0]
+def mistakes(engine: LabEngine, given: list[tuple[Form, str]]) -> list[str | None]:
+    """Why pieces of code cannot be part of a lab."""
+    pieces = [LabCode(("x",), form, code, form == "target") for form, code in given]
+    return engine.mistakes([(p.code, p.form, p.function, p.takes_value) for p in pieces])
 
 
-BREAKING_OUT = [
+BREAKING_OUT: list[tuple[Form, str]] = [
     ("expression", "1); evil("),
     ("expression", "1)) ; evil(("),
     ("expression", "1]) + ([2"),
@@ -96,7 +96,7 @@ BREAKING_OUT = [
     ("target", "x => x"),
     ("target", "a) = 1; (b"),
 ]
-FINE = [
+FINE: list[tuple[Form, str]] = [
     ("expression", "1 // a comment at the end"),
     ("expression", "/* ) */ 1"),
     ("expression", "data.qpos[0], data.qpos[1]"),
@@ -125,29 +125,31 @@ FINE = [
 ]
 
 
-@pytest.mark.parametrize(("form", "code"), BREAKING_OUT)
-def test_what_is_no_piece_is_told(engine: LabEngine, form: str, code: str) -> None:
-    assert mistake(engine, code, form) is not None
+def test_only_what_is_a_piece_by_itself_is_taken(engine: LabEngine) -> None:
+    told = mistakes(engine, BREAKING_OUT)
+    assert [one for one, why in zip(BREAKING_OUT, told, strict=True) if why is None] == []
+    told = mistakes(engine, FINE)
+    assert [one for one, why in zip(FINE, told, strict=True) if why is not None] == []
 
 
-@pytest.mark.parametrize(("form", "code"), FINE)
-def test_what_is_a_piece_is_taken(engine: LabEngine, form: str, code: str) -> None:
-    assert mistake(engine, code, form) is None
-
-
-def test_no_piece_is_run_when_it_is_looked_at(engine: LabEngine) -> None:
-    for form in ("expression", "statements"):
-        assert mistake(engine, "globalThis.ran = true", form) is None
-        assert mistake(engine, "(() => { globalThis.ran = true })()", form) is None
-    assert mistake(engine, "ctx[globalThis.ran = true]", "target") is None
-    isolate = engine._isolate
-    assert isolate is not None and isolate.call("String", "x", 5.0) == "x"
-    assert isolate.call("(() => typeof globalThis.ran)", "", 5.0) == "undefined"
+def test_no_piece_is_run_when_it_is_looked_at(engine: LabEngine, tmp_path: Path) -> None:
+    runs: list[tuple[Form, str]] = [
+        ("expression", "(() => { globalThis.ran = true })()"),
+        ("statements", "(() => { globalThis.ran = true })()"),
+        ("target", "ctx[globalThis.ran = true]"),
+    ]
+    assert mistakes(engine, runs) == [None] * 3
+    ordinary = make_lab(setup="if (globalThis.ran) throw 'it ran'", verify={"seconds": 0.01})
+    bench = Bench(tmp_path, engine)
+    with bench.native:
+        assert bench.trial(ordinary)["failures"] == []
 
 
 def test_value_is_only_what_setters_see(engine: LabEngine) -> None:
-    assert mistake(engine, "let value = 1", "statements", takes_value=True) is not None
-    assert mistake(engine, "let value = 1", "statements") is None
+    for takes_value in (True, False):
+        piece = LabCode(("x",), "statements", "let value = 1", takes_value)
+        (why,) = engine.mistakes([(piece.code, piece.form, piece.function, takes_value)])
+        assert (why is not None) == takes_value
 
 
 FULL: dict[str, Any] = {
@@ -237,7 +239,7 @@ def test_a_bare_lab_has_empty_lists_and_no_setup() -> None:
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(NUMBERS, st.text(min_size=1).filter(lambda t: t.strip() == t), NUMBERS)
 def test_data_arrives_to_the_last_bit(y: float, text: str, other: float) -> None:
     low, high = sorted((y, other))
