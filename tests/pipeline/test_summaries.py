@@ -14,7 +14,6 @@ from coursebuild.core.checks.course import check_course
 from coursebuild.core.model import (
     Course,
     Document,
-    Lab,
     Mjcf,
     Recording,
     Script,
@@ -34,6 +33,7 @@ from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode, fingerprint
+from coursebuild.features.lab.model import Lab
 from coursebuild.features.quiz.checks import check_output_lines
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.pipeline.fingerprints import document_fingerprint
