@@ -12,8 +12,10 @@ Entry points: `encode` and `decode`; `fingerprint`, a hash that is the same for 
 from __future__ import annotations
 
 import enum
+import functools
 import hashlib
 import importlib
+import inspect
 import sys
 from collections.abc import Callable, Mapping
 from decimal import Decimal
@@ -196,9 +198,20 @@ def _maker(name: str) -> Callable[..., Any]:
         kind = vars(kind)[part]
     if isinstance(kind, type) and issubclass(kind, enum.Enum):
         return lambda member: kind[member]
-    if isinstance(kind, type) and issubclass(kind, Struct | tuple) and kind is not tuple:
+    if isinstance(kind, type) and issubclass(kind, Struct):
+        return _struct_maker(kind)
+    if isinstance(kind, type) and issubclass(kind, tuple) and kind is not tuple:
         return kind
     raise TypeError(f"{name} is no class of values")
+
+
+@functools.cache
+def _struct_maker(kind: type[Struct]) -> Callable[..., Struct]:
+    """The class itself, unless its fields must be named."""
+    names, parameters = kind.__struct_fields__, inspect.signature(kind).parameters.values()
+    if any(parameter.kind is inspect.Parameter.KEYWORD_ONLY for parameter in parameters):
+        return lambda *items: kind(**dict(zip(names, items, strict=True)))
+    return kind
 
 
 def _module(name: str) -> Any:

@@ -49,7 +49,7 @@ def test_a_frame_put_together_from_pieces_is_that_of_the_template(
     course = replace(made.course, base_url=base_url, title=title)
     library = Library.of(course, made.results, made.assets)
     frames = Frames(library, NAMES)
-    for parts in ((), ("data-script=",), ("data-script=", "data-quiz="), ()):
+    for parts in ((), ("data-config=",), ("data-config=", "data-quiz="), ()):
         for draft in drafts():
             expected = frame_around(library, draft, NAMES, parts)
             assert frames.around(draft, parts) == expected, draft

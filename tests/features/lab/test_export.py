@@ -38,7 +38,7 @@ from support.lab_values import BALL, OpenEngines, make_lab, try_labs
 
 pytestmark = pytest.mark.engine
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 Tried: TypeAlias = Callable[..., list[LabResult]]
 
 METADATA = ExportMetadata("lab_1_1_1.py", "a lab of lesson 1.1, “First”", "A course", "3.14.0", 1.0)
