@@ -13,6 +13,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 from msgspec import Struct
 
+from coursebuild.core.features import IndexReader
 from coursebuild.core.model import ModelTarget
 from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
@@ -23,7 +24,6 @@ from coursebuild.features.lab.schema import Control, Select, Slider
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
-    from coursebuild.core.pages.search.sections import SectionReader
 
 
 class ControlView(Struct, frozen=True):
@@ -95,7 +95,7 @@ def shown_lab(page: PageContext, block: Lab) -> ShownLab | None:
     return found if isinstance(found, ShownLab) else None
 
 
-def index_lab(reader: SectionReader, lab: Lab) -> None:
+def index_lab(reader: IndexReader, lab: Lab) -> None:
     """Give the search a lab's title, note, labels and model."""
     reader.add("text", lab.fields.title)
     reader.blocks(lab.note)
