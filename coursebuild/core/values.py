@@ -12,10 +12,8 @@ Entry points: `encode` and `decode`; `fingerprint`, a hash that is the same for 
 from __future__ import annotations
 
 import enum
-import functools
 import hashlib
 import importlib
-import inspect
 import sys
 from collections.abc import Callable, Mapping
 from decimal import Decimal
@@ -205,13 +203,14 @@ def _maker(name: str) -> Callable[..., Any]:
     raise TypeError(f"{name} is no class of values")
 
 
-@functools.cache
 def _struct_maker(kind: type[Struct]) -> Callable[..., Struct]:
-    """The class itself, unless its fields must be named."""
-    names, parameters = kind.__struct_fields__, inspect.signature(kind).parameters.values()
-    if any(parameter.kind is inspect.Parameter.KEYWORD_ONLY for parameter in parameters):
-        return lambda *items: kind(**dict(zip(names, items, strict=True)))
-    return kind
+    def make(*items: Any) -> Struct:
+        try:
+            return kind(*items)
+        except TypeError:  # some fields must be named
+            return kind(**dict(zip(kind.__struct_fields__, items, strict=True)))
+
+    return make
 
 
 def _module(name: str) -> Any:
