@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pytest
 
 import coursebuild
-from coursebuild.core.features import installed_features
+from coursebuild.core.registry import installed_features
 
 PACKAGE = Path(coursebuild.__file__).parent
 ROOT = PACKAGE.parent
@@ -22,6 +22,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"core.model"}),
     frozenset({"numerics"}),
     frozenset({"core.features", "core.values"}),
+    frozenset({"core.registry"}),
     frozenset({"core.syntax", "core.checks", "core.scripts", "core.pages", "core.files"}),
     frozenset({"report", "core.engine"}),
     frozenset({"core.run"}),

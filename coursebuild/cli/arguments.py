@@ -121,7 +121,7 @@ def _serve(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(parser: argparse.ArgumentParser) -> None:
-    from coursebuild.core.features import features
+    from coursebuild.core.registry import features
 
     _running(parser)
     known = [exporter for feature in features() for exporter in feature.exporters]

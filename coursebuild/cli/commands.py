@@ -122,7 +122,7 @@ def _once_while_unchanged(
     report = work(options)
     status = print_report(report, "text", options)
     if watcher is not None and report.ok and report.depends is not None:
-        from coursebuild.core.features import package_paths
+        from coursebuild.core.registry import package_paths
         from coursebuild.report import unchanged_report
 
         remark = f"nothing has changed since the last {name}"

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from coursebuild.core.features import feature_trials
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course, Status
+from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.pipeline.documents import Documents

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-from coursebuild.core.features import feature_trials
 from coursebuild.core.model import (
     Bench,
     Course,
@@ -27,6 +26,7 @@ from coursebuild.core.model import (
     local_file,
     walk_inlines,
 )
+from coursebuild.core.registry import feature_trials
 from coursebuild.core.run.mjcf import parts
 from coursebuild.core.scripts.dependencies import (
     Inputs,

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.archives import check_target, write_archive, write_single
 from coursebuild.core.engine.prepared import prepared_folder
-from coursebuild.core.features import Exporter, find_exporter
+from coursebuild.core.features import Exporter
 from coursebuild.core.files.course_features import load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import project_lock
@@ -27,6 +27,7 @@ from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.exports.context import ExportContext
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_list
+from coursebuild.core.registry import find_exporter
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.build import prepare

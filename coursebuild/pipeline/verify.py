@@ -22,9 +22,10 @@ from msgspec import Struct
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
-from coursebuild.core.features import Trial, TrialContext, Trials, check_runs, feature_trials
+from coursebuild.core.features import Trial, TrialContext, Trials
 from coursebuild.core.model import Course, FeatureBlock, document_blocks
 from coursebuild.core.model.results import CompileResult, LabResult, Results, ScriptRun
+from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
 from coursebuild.core.scripts.bindings import document_bindings

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from coursebuild.core.checks.course import check_document
 from coursebuild.core.checks.links import LinkTargets, link_targets
 from coursebuild.core.engine.prepared import prepared_folder
-from coursebuild.core.features import PublishedTrials, publish_trials
+from coursebuild.core.features import PublishedTrials
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Page
@@ -29,6 +29,7 @@ from coursebuild.core.model.results import Outcome, Results, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library, Owner, named_models, owners
+from coursebuild.core.registry import publish_trials
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import Extraction, extract, jobs

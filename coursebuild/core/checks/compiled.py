@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from msgspec import Struct
 
 from coursebuild.core.checks.benches import check_keyframes, declared_scenarios
-from coursebuild.core.features import features, kind_of_block
 from coursebuild.core.model import (
     Bench,
     Course,
@@ -30,6 +29,7 @@ from coursebuild.core.model import (
     document_blocks,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
+from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 

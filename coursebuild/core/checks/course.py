@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.core.checks.benches import bench_findings
 from coursebuild.core.checks.links import LinkTargets, document_links, link_targets
-from coursebuild.core.features import features
 from coursebuild.core.model import (
     Block,
     Course,
@@ -21,6 +20,7 @@ from coursebuild.core.model import (
     is_blank,
     walk_inlines,
 )
+from coursebuild.core.registry import features
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 

@@ -17,9 +17,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from coursebuild.core.features import features_digest
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.resources import assets_dir, templates_dir
+from coursebuild.core.registry import features_digest
 from coursebuild.core.values import fingerprint
 
 _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120

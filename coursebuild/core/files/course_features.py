@@ -10,10 +10,11 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-from coursebuild.core.features import Feature, clash, installed_features, use_course_features
+from coursebuild.core.features import Feature
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course, CourseFeature
+from coursebuild.core.registry import clash, installed_features, use_course_features
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 

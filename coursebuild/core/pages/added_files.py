@@ -10,13 +10,13 @@ from collections.abc import Callable
 
 from msgspec import Struct
 
-from coursebuild.core.features import features
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import FileList, SiteFile
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.registry import features
 
 
 class NotedPage(Struct, frozen=True):

@@ -8,7 +8,6 @@ from __future__ import annotations
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import kind_of_block
 from coursebuild.core.model import (
     Bench,
     Block,
@@ -23,6 +22,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.plainly import without_links
+from coursebuild.core.registry import kind_of_block
 
 
 class ContentsEntry(Struct, frozen=True):

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.features import features
 from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
+from coursebuild.core.registry import features
 
 SCRIPTS = {
     "theme.js": "js/theme.js",

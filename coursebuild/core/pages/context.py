@@ -15,7 +15,6 @@ from urllib.parse import quote, unquote
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.core.features import kind_of_block
 from coursebuild.core.model import (
     Bench,
     Block,
@@ -43,6 +42,7 @@ from coursebuild.core.pages.page_inputs import ShownDocument
 from coursebuild.core.pages.shown import file_address, shown
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.tools import Tools
+from coursebuild.core.registry import kind_of_block
 
 
 class PageContext(Struct, frozen=True):

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from coursebuild.core.features import page_kind
 from coursebuild.core.model import Document, Paragraph, plain_text
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.article import article, contents
@@ -19,6 +18,7 @@ from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.listings import numbered
 from coursebuild.core.pages.page_inputs import Graphed, Highlighted, PageInputs, Plotted
 from coursebuild.core.pages.tools import Tools
+from coursebuild.core.registry import page_kind
 
 if TYPE_CHECKING:
     from coursebuild.numerics.reports.bench import ScenarioReport

@@ -17,13 +17,14 @@ from collections.abc import Mapping
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.core.features import PagePart, features, page_kind
+from coursebuild.core.features import PagePart
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.draft import Draft as Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import own_pages, page_title
+from coursebuild.core.registry import features, page_kind
 from coursebuild.core.text.patterns import pattern
 
 PAGE_WORDS = (

@@ -13,7 +13,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import PublishedTrials, feature_trials, publish_trials
+from coursebuild.core.features import PublishedTrials
 from coursebuild.core.model import (
     Bench,
     CalloutKind,
@@ -48,6 +48,7 @@ from coursebuild.core.pages.quiz_index import QuizIndex, quiz_index
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import templates_of
 from coursebuild.core.pages.tools import Tools
+from coursebuild.core.registry import feature_trials, publish_trials
 from coursebuild.core.text.patterns import pattern
 from coursebuild.numerics.reports import Reports
 

@@ -13,13 +13,14 @@ from collections.abc import Callable, Iterator
 
 from msgspec import Struct
 
-from coursebuild.core.features import PageKind, page_kind, page_kinds
+from coursebuild.core.features import PageKind
 from coursebuild.core.model import Document
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.tools import Tools
+from coursebuild.core.registry import page_kind, page_kinds
 
 
 class PageEntry(Struct, frozen=True):

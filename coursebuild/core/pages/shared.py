@@ -19,12 +19,13 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.features import Feature, PagePart, features
+from coursebuild.core.features import Feature, PagePart
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
 from coursebuild.core.pages.frame import Draft, Names
 from coursebuild.core.pages.library import Library
+from coursebuild.core.registry import features
 from coursebuild.core.text.patterns import pattern
 
 

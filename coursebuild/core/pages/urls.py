@@ -17,8 +17,8 @@ from urllib.parse import quote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.features import page_kinds
 from coursebuild.core.model import Course, Lesson, Level, Page
+from coursebuild.core.registry import page_kinds
 from coursebuild.core.text.patterns import pattern
 
 HOME = "index.html"

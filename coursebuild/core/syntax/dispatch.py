@@ -15,8 +15,9 @@ from __future__ import annotations
 import re
 from urllib.parse import unquote
 
-from coursebuild.core.features import FenceKind, fence_kind
+from coursebuild.core.features import FenceKind
 from coursebuild.core.model import Bench, BenchPart, Block, CodeBlock, FeatureBlock, Mjcf, Script
+from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import Fence, kind_doubts
 from coursebuild.core.syntax.info import Word, parse_info, read_keys
 from coursebuild.core.syntax.parsing_state import ParsingState

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
-from coursebuild.core.features import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.model import CodeBlock
+from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.info import first_word, kind_of, parse_info
 from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from coursebuild.core.features import features
+from coursebuild.core.registry import features
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.scenarios import ModelFile
 

@@ -15,6 +15,7 @@ from coursebuild.features.quiz.search import index_quiz
 
 FEATURE = Feature(
     name="quiz",
+    needs=("lab",),
     fences=(
         FenceKind(
             name="quiz",

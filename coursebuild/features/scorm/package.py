@@ -149,7 +149,7 @@ def _metadata(course: Course) -> Element:
     """What it is, and in which language (IMS Learning Resource Meta-data 1.2.1)."""
     language = course.language or "en"
 
-    def words(name: str, text: str, most: int) -> Element | None:
+    def localized(name: str, text: str, most: int) -> Element | None:
         text = " ".join(text.split())
         if not text:
             return None
@@ -158,9 +158,9 @@ def _metadata(course: Course) -> Element:
     general = element(
         "general",
         {},
-        words("title", course.title, _LANGSTRING),
+        localized("title", course.title, _LANGSTRING),
         element("language", {}, language),
-        words("description", course.summary, _DESCRIPTION),
+        localized("description", course.summary, _DESCRIPTION),
     )
     return element(
         "metadata",

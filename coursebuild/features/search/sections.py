@@ -16,7 +16,6 @@ from typing import Literal, assert_never
 
 from msgspec import Struct
 
-from coursebuild.core.features import kind_of_block
 from coursebuild.core.model import (
     Bench,
     Block,
@@ -54,6 +53,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.inlines import CodeSpan
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
+from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.patterns import pattern
 from coursebuild.features.search.tex import plain_formula
 

@@ -14,7 +14,6 @@ from typing import assert_never
 
 from msgspec import Struct
 
-from coursebuild.core.features import kind_of_block
 from coursebuild.core.model import (
     Bench,
     Block,
@@ -40,6 +39,7 @@ from coursebuild.core.pages.exports.marks import (
     quoted,
 )
 from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.registry import kind_of_block
 
 
 class Plain(Struct, frozen=True):
