@@ -72,9 +72,8 @@ def read(path: Path) -> Module:
     tree = ast.parse(text)
     imports: set[str] = set()
     calls: set[str] = set()
-    interface = (
-        path == PACKAGE / "core" / "features.py"
-    )  # which names the types that features are given
+    # The interface names the types that features are given, and the registry what it asks them.
+    interface = path.parent == PACKAGE / "core" and path.stem in ("features", "registry")
     conditions = [node for node in tree.body if interface and isinstance(node, ast.If)]
     for_types = [node for condition in conditions for node in condition.body]
     for node in ast.walk(tree):
