@@ -23,9 +23,9 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Outcome, Results, ScriptRun
 from coursebuild.core.model.summary import without_prose
+from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.lookup.lexicon import lexicon
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.shown import shown
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
@@ -93,7 +93,7 @@ def known_of(course: Course) -> Iterator[object]:
     yield [(t.term, t.owner.id, [o.id for o in t.used]) for t in references.terms.values()]
     for one in course.documents:
         try:
-            yield fingerprint(shown(library, Place("lessons/x.html"), one))
+            yield fingerprint(document_inputs(library, Place("lessons/x.html"), one))
         except KeyError as error:  # a link that leads nowhere, in a course that is never drawn
             yield repr(error)
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import shutil
 import stat
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
@@ -44,9 +45,8 @@ from coursebuild.core.engine.site_files import write_file, writing
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile, SiteFile
-from coursebuild.core.text.patterns import pattern
 
-_NO_PATH = pattern(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
+_NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """A part of a path that is empty or stands for a folder, a control character, a backslash."""
 _AUTHORED = ("content", "features", "models", "examples", ".coursebuild", ".git")
 

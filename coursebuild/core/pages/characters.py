@@ -9,16 +9,14 @@ from __future__ import annotations
 import functools
 import re
 
-from coursebuild.core.text.patterns import pattern
-
 RARE = r"\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff\U0001fffe-\U0010ffff"
 """What a class of allowed characters leaves out, besides controls of ASCII; characters past U+1FFFD
 are left to a closer look. (To compile a class takes as long as what it lists is long: the few that
 are forbidden are a tenth of the work of the many that are not.)
 """
-_ALLOWED = pattern(rf"(?:[\t\n -~]++|[^\x00-\x7e{RARE}]++)*+")
+_ALLOWED = re.compile(rf"(?:[\t\n -~]++|[^\x00-\x7e{RARE}]++)*+")
 """Text in which none is forbidden, found out fast."""
-_FORBIDDEN = pattern("[\x00-\x08\x0b-\x1f\x7f-\x9f\ufdd0-\ufdef\ufffe\uffff\ud800-\udfff]")
+_FORBIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ufdd0-\ufdef\ufffe\uffff\ud800-\udfff]")
 
 
 @functools.cache

@@ -35,11 +35,11 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages import blocks, formulas, markup, urls
 from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.document_inputs import document_inputs, file_address
 from coursebuild.core.pages.equations import NumberedFormula, numbered
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.look import Look, OwnBlock, Words
 from coursebuild.core.pages.page_inputs import ShownDocument
-from coursebuild.core.pages.shown import file_address, shown
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.tools import Tools
 from coursebuild.core.registry import kind_of_block
@@ -64,7 +64,7 @@ class PageContext(Struct, frozen=True):
     @classmethod
     def of(cls, library: Library, place: urls.Place, document: Document) -> PageContext:
         """The context of a document on a page of a course."""
-        return cls.made(library.tools, shown(library, place, document), place, document)
+        return cls.made(library.tools, document_inputs(library, place, document), place, document)
 
     @classmethod
     def made(

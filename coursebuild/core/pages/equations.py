@@ -8,6 +8,7 @@ on where ours left off. A formula with such numbers of its own, or with a `\tag`
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from html import unescape
 
@@ -15,11 +16,10 @@ from msgspec import Struct
 
 from coursebuild.core.model import Document
 from coursebuild.core.model.equations import display_formulas
-from coursebuild.core.text.patterns import pattern
 
 _COUNTED = 'class="tml-eqn"'
 _TAGGED = 'class="tml-tag"'
-_TAG = pattern(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
+_TAG = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
 class NumberedFormula(Struct, frozen=True):

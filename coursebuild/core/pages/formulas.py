@@ -22,8 +22,6 @@ import re
 from collections.abc import Iterator
 from html import escape, unescape
 
-from coursebuild.core.text.patterns import pattern
-
 LONG = 20
 """Characters; a shorter formula stays whole."""
 WIDE = 22
@@ -32,26 +30,26 @@ WIDE = 22
 _REMEMBERED = 256
 """Formulas: a text says the same ones again and again."""
 
-_ROW = pattern(r"<(/?)mrow\b[^>]*>")
-_WHOLE = pattern(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
-_ANNOTATION = pattern(r"<annotation\b.*?</annotation>", re.DOTALL)
-_TAG = pattern(r"<[^>]*>")
-_PIECE = pattern(r"<math>.*?</math>", re.DOTALL)
+_ROW = re.compile(r"<(/?)mrow\b[^>]*>")
+_WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
+_ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
+_TAG = re.compile(r"<[^>]*>")
+_PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
 _OPENING = frozenset("([“‘\"'")
 _HOLD, _LOOSE = '<span class="held">', "</span>"
-_TOUCHING = pattern(
+_TOUCHING = re.compile(
     r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
 )
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
 _SIGN = "|".join(re.escape(escape(sign)) for sign in sorted(_RELATIONS | _BINARY))
-_FIRST = pattern(rf"<math>(?<=\s<math>)(?:<semantics>)?(?:<mrow>)*+<mo(?=>(?:{_SIGN})</mo>)")
-_LAST = pattern(
+_FIRST = re.compile(rf"<math>(?<=\s<math>)(?:<semantics>)?(?:<mrow>)*+<mo(?=>(?:{_SIGN})</mo>)")
+_LAST = re.compile(
     rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?:</mrow>)*+"""
     r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
 )
-_END = pattern(r"</math>(?=\s)")
+_END = re.compile(r"</math>(?=\s)")
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Mapping
 
 from markupsafe import Markup, escape
@@ -25,7 +26,6 @@ from coursebuild.core.pages.draft import Draft as Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import own_pages, page_title
 from coursebuild.core.registry import features, page_kind
-from coursebuild.core.text.patterns import pattern
 
 PAGE_WORDS = (
     "theme.label",
@@ -198,7 +198,7 @@ def _part_scripts(
 
 _ALIKE = ("lesson", "stub", "level", "model")
 """Kinds of pages that no menu has, so that their frames differ in their own values alone."""
-_SLOT = pattern("\ue000([a-z_]+[0-9]*)\ue001")
+_SLOT = re.compile("\ue000([a-z_]+[0-9]*)\ue001")
 
 
 class Frames:

@@ -11,6 +11,7 @@ Entry point: `highlight_lines(language, code)`.
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Iterator
 from html import escape
 from itertools import chain
@@ -23,7 +24,6 @@ from pygments.token import Comment, Keyword, Literal, Name, Operator, String, To
 from pygments.util import ClassNotFound
 
 from coursebuild.core.pages.characters import visible
-from coursebuild.core.text.patterns import pattern
 
 Run: TypeAlias = tuple[str, str]
 """A class, or nothing, and the text that has it."""
@@ -47,7 +47,7 @@ _CLASSES: tuple[tuple[_TokenType, str], ...] = (
 )
 """Kinds of token and their class, the special before the general."""
 _ALIASES = {"mjcf": "xml", "urdf": "xml"}
-_WITHOUT_OUTER_SPACE = pattern(r"\S(?:.*\S)?")
+_WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
 
 
 def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:

@@ -9,14 +9,13 @@ Comments are left out.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from typing import TypeAlias
 
 from msgspec import Struct, field
 from selectolax.lexbor import LexborHTMLParser, LexborNode
-
-from coursebuild.core.text.patterns import pattern
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 """Elements that have no content and no end."""
@@ -29,8 +28,8 @@ _NAMESPACES = {
     "math": "http://www.w3.org/1998/Math/MathML",
 }
 _XLINK = "http://www.w3.org/1999/xlink"
-_XML_NAME = pattern(r"[A-Za-z_][A-Za-z0-9_.-]*")
-_NOT_XML = pattern("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+_XML_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 class HtmlElement(Struct):

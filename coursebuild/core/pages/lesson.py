@@ -9,11 +9,11 @@ from msgspec import Struct
 
 from coursebuild.core.model import Document, Lesson, Status
 from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library, document_scripts
 from coursebuild.core.pages.owners import owner_links
 from coursebuild.core.pages.page_inputs import PageInputs
-from coursebuild.core.pages.shown import shown
 
 
 class LessonLink(Struct, frozen=True):
@@ -90,7 +90,7 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         json_ld=meta.lesson_data(library, lesson),
         og_type="article",
         document=document.source.path,
-        shown=shown(library, place, document),
+        shown=document_inputs(library, place, document),
     )
 
 

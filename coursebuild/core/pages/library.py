@@ -6,6 +6,7 @@ afterwards.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
@@ -49,7 +50,6 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import templates_of
 from coursebuild.core.pages.tools import Tools
 from coursebuild.core.registry import feature_trials, publish_trials
-from coursebuild.core.text.patterns import pattern
 from coursebuild.numerics.reports import Reports
 
 _OURS = {kind.name: kind for kind in CALLOUTS}
@@ -99,7 +99,7 @@ class Library(Struct, frozen=True):
     """What of that is files of the site."""
     _formulas: Mapping[Formula, str | MathError]
     verdicts: Mapping[tuple[str, int], Verdict]
-    """By `place`."""
+    """By `recording_place`."""
     reports: Reports
     """What was measured on models and hard cases, as far as it fits the course."""
 
@@ -152,7 +152,7 @@ class Library(Struct, frozen=True):
             tried=_placed(course, trials),
             feature_files=trials.files,
             _formulas=formulas,
-            verdicts={place(verdict.recording): verdict for verdict in results.verdicts},
+            verdicts={recording_place(verdict.recording): verdict for verdict in results.verdicts},
             reports=reports or Reports(),
         )
 
@@ -171,7 +171,7 @@ class Library(Struct, frozen=True):
 
     def verdict(self, recording: Recording) -> Verdict | None:
         """How a recorded output compared with the run; `None` where nobody compared it."""
-        return self.verdicts.get(place(recording))
+        return self.verdicts.get(recording_place(recording))
 
     def callout_label(self, kind: str) -> str:
         """The label of a kind of callout: the course's own, else that of the interface."""
@@ -222,7 +222,7 @@ def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -
     )
 
 
-_MODEL_NAMED = pattern(
+_MODEL_NAMED = re.compile(
     r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?<![\w./-])(?P<file>[\w./-]+)\.xml\b"""
     r"""|(["'])(?P<word>[A-Za-z_][\w/-]{0,80})\4"""
 )
@@ -270,7 +270,7 @@ def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
     return found
 
 
-def place(recording: Recording) -> tuple[str, int]:
+def recording_place(recording: Recording) -> tuple[str, int]:
     """What a recorded output is found by."""
     return recording.span.path, recording.span.start
 

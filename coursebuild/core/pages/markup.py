@@ -9,6 +9,7 @@ Markdown, and is written here.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from itertools import zip_longest
 from typing import assert_never
@@ -56,7 +57,6 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages.look import Context, Look
 from coursebuild.core.pages.quantities import in_order, joined, quantities, unit_length
-from coursebuild.core.text.patterns import pattern
 
 _LOOK = Look()
 
@@ -72,9 +72,9 @@ def _escaped(text: str) -> str:
     return text.replace(">", "&gt;").replace('"', "&quot;")
 
 
-_SIMPLE = pattern('[^0-9&<>"]*+')
+_SIMPLE = re.compile('[^0-9&<>"]*+')
 """Text without quantities, and with nothing to escape."""
-_PLAIN_ANCHOR = pattern("[A-Za-z0-9_.~-]*+")
+_PLAIN_ANCHOR = re.compile("[A-Za-z0-9_.~-]*+")
 
 
 def _quoted(anchor: str) -> str:

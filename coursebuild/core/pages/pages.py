@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
 from coursebuild.core.pages.lesson import LessonHead, LessonLink, edit_address, lesson_link
@@ -19,7 +20,6 @@ from coursebuild.core.pages.library import Library, ModelUse
 from coursebuild.core.pages.measured import measured_view
 from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, Plotted
 from coursebuild.core.pages.quantities import number
-from coursebuild.core.pages.shown import shown
 
 
 class LevelView(Struct, frozen=True):
@@ -183,7 +183,7 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
         "page.html",
         {"title": page.title, "edit": edit_address(library, page.path)},
         document=document.source.path,
-        shown=shown(library, place, document),
+        shown=document_inputs(library, place, document),
     )
 
 

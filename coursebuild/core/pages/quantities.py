@@ -14,12 +14,11 @@ word or a label (`Figure 2 A`) loses nothing by a space that does not break.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Literal
 
 from markupsafe import Markup, escape
-
-from coursebuild.core.text.patterns import pattern
 
 _PREFIXED = (
     "(?:[YZEPTGMkhcdm\u00b5\u03bcunpf]|da)?"
@@ -38,12 +37,12 @@ _NUMBER = (
     r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
 )
 
-_ONE_UNIT = pattern(rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}")
-_AFTER_DIGIT = pattern("[0-9] ")
-_QUANTITY = pattern(
+_ONE_UNIT = re.compile(rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}")
+_AFTER_DIGIT = re.compile("[0-9] ")
+_QUANTITY = re.compile(
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
 )
-_LATIN_BEFORE = pattern("[A-Za-z]\\s*$")
+_LATIN_BEFORE = re.compile("[A-Za-z]\\s*$")
 
 
 def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:

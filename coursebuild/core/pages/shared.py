@@ -26,7 +26,6 @@ from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_scr
 from coursebuild.core.pages.frame import Draft, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.registry import features
-from coursebuild.core.text.patterns import pattern
 
 
 class PageFacts(Struct, frozen=True):
@@ -46,8 +45,8 @@ def settled(draft: Draft) -> tuple[Draft, frozenset[str]]:
     return replace(draft, body=Markup(body)), found
 
 
-_FORMULA = pattern(r"(<math\b.*?</math>)", re.DOTALL)
-_SIGN = pattern(
+_FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
+_SIGN = re.compile(
     r"(?:[\x00-%'-;=-\x7f]++|<[^>]*+>)*+"
     r"([^\x00-\x7f]|&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)|[<&])?"
 )

@@ -16,9 +16,7 @@ import re
 from collections.abc import Iterable
 from html import escape, unescape
 
-from coursebuild.core.text.patterns import pattern
-
-_PIECE = pattern(
+_PIECE = re.compile(
     r"""<!--.*?-->"""
     r"""|<(?P<raw>script|style|textarea|title)\b(?:[^"'>]|"[^"]*"|'[^']*')*>.*?</(?P=raw)\s*>"""
     r"""|<(?P<tag>[a-zA-Z](?:[^"'>]|"[^"]*"|'[^']*')*)>""",
@@ -27,7 +25,7 @@ _PIECE = pattern(
 """A comment, an element of raw text, or a tag: nothing that only looks like an attribute is taken
 for one."""
 
-_OTHERS = pattern(
+_OTHERS = re.compile(
     r"""(?:[^<]++|<(?![a-z]|!--)"""
     r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
     r"""[a-z](?:[^"'<>]++|"[^"<>]*+"|'[^'<>]*+')*+>)*+""",
@@ -35,7 +33,7 @@ _OTHERS = pattern(
 )
 """What has no style in it: texts, end tags, most tags. Where it ends, `_PIECE` may begin."""
 
-_ATTRIBUTE = pattern(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
+_ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
 
 def hoist(html: str) -> tuple[str, frozenset[str]]:

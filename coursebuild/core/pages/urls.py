@@ -13,13 +13,13 @@ Entry points: `lesson_path` and its siblings (site paths: POSIX, relative to the
 from __future__ import annotations
 
 import posixpath
+import re
 from urllib.parse import quote, urlsplit
 
 from msgspec import Struct
 
 from coursebuild.core.model import Course, Lesson, Level, Page
 from coursebuild.core.registry import page_kinds
-from coursebuild.core.text.patterns import pattern
 
 HOME = "index.html"
 NOT_FOUND = "404.html"
@@ -98,7 +98,7 @@ def base_path(course: Course) -> str:
     return f"/{path}/" if path else "/"
 
 
-_UNRESERVED = pattern("[A-Za-z0-9/~._+@,-]*+")
+_UNRESERVED = re.compile("[A-Za-z0-9/~._+@,-]*+")
 """What stays as it is in an address."""
 
 

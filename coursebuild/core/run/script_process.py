@@ -1,7 +1,7 @@
 """A process becomes a script: it finds what a bare `python examples/x.py` finds, and is watched.
 
-Entry points: `Preloaded`, the packages that are imported once for all scripts; `Script`, which sets
-up this process, and is then executed by `worker_main`.
+Entry points: `Preloaded`, the packages that are imported once for all scripts; `ScriptProcess`,
+which sets up this process, and is then executed by `worker_main`.
 
 What a script finds differs from a bare Python only in that there is one more frame below its own,
 and that modules of the standard library are in `sys.modules` which it has not imported.
@@ -150,7 +150,7 @@ def _is_installed(name: str) -> bool:
     return top not in sys.stdlib_module_names and top != "coursebuild"
 
 
-class Script:
+class ScriptProcess:
     """A script that this process is to become."""
 
     def __init__(

@@ -43,7 +43,7 @@ from pathlib import Path
 from typing import Literal, TypedDict
 
 from coursebuild.core.run.notes import Notes, read_notes
-from coursebuild.core.run.script_process import Job, Preloaded, Script
+from coursebuild.core.run.script_process import Job, Preloaded, ScriptProcess
 from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched, has_ended
 
 LENGTH = struct.Struct(">I")
@@ -69,7 +69,7 @@ class _Start(TypedDict):
     notes: str
 
 
-def main(arguments: Sequence[str], bare: Collection[str]) -> Script:
+def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
     """Run what the tool asks for until it closes the pipe; only a script's process returns.
 
     The arguments are descriptors: where jobs are read and where reports are written, and whether
@@ -117,7 +117,7 @@ class ChildReport(TypedDict):
     """Length in bytes of the `Notes` as JSON; 0 where nobody watched."""
 
 
-def _alone(start: _Start, bare: Collection[str]) -> Script:
+def _alone(start: _Start, bare: Collection[str]) -> ScriptProcess:
     """The script that this process was started for."""
     job, preloaded = start["job"], Preloaded()
     shadowed = _beside(job) & preloaded.names()
@@ -126,7 +126,7 @@ def _alone(start: _Start, bare: Collection[str]) -> Script:
     for name in [name for name in sys.modules if name.partition(".")[0] in shadowed]:
         if name not in bare:
             del sys.modules[name]
-    return Script(job, start["environment"], start["notes"], None, preloaded)
+    return ScriptProcess(job, start["environment"], start["notes"], None, preloaded)
 
 
 class _Supervisor:
@@ -151,18 +151,18 @@ class _Supervisor:
         os.chdir("/")
         self.scratch = ""
 
-    def work(self) -> Script | None:
+    def work(self) -> ScriptProcess | None:
         """Serve until the input closes; a script in a process that is to become it."""
         while (message := _receive(self.jobs)) is not None:
             job: Job = json.loads(message)
             self.scratch = job["scratch"]
             answer = self._serve(job)
-            if isinstance(answer, Script):
+            if isinstance(answer, ScriptProcess):
                 return answer
             _send(self.reports, json.dumps(answer[0]).encode(), *answer[1:])
         return None
 
-    def _serve(self, job: Job) -> tuple[ChildReport, bytes, bytes, bytes] | Script:
+    def _serve(self, job: Job) -> tuple[ChildReport, bytes, bytes, bytes] | ScriptProcess:
         folder_of_script = Path(job["root"], job["path"]).parent
         missing = missing_modules(job["requires"], folder_of_script, job["library"])
         if missing:
@@ -175,7 +175,7 @@ class _Supervisor:
         if self.may_fork:
             self.preloaded.load(job["packages"])
         folder = ""
-        launched: Launched | Script | None = None
+        launched: Launched | ScriptProcess | None = None
         start = time.monotonic()
         try:
             try:
@@ -184,7 +184,7 @@ class _Supervisor:
                 launched = self._launch(job, environment | {"TMPDIR": folder})
             except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
                 return _unstartable(f"the script cannot be started: {error}\n")
-            if isinstance(launched, Script):
+            if isinstance(launched, ScriptProcess):
                 return launched
             run = Watched(launched, start, job["timeout"], self.awake)
             try:
@@ -193,11 +193,11 @@ class _Supervisor:
                 run.end()
             return _finished(run, launched.notes)
         finally:
-            if folder and not isinstance(launched, Script):
+            if folder and not isinstance(launched, ScriptProcess):
                 remove_folder(folder)
                 remove_folder(folder + _NOTES)
 
-    def _launch(self, job: Job, environment: dict[str, str]) -> Launched | Script:
+    def _launch(self, job: Job, environment: dict[str, str]) -> Launched | ScriptProcess:
         """Start a script; the script itself in the process that is to become it."""
         if any(b"\0" in os.fsencode(argument) for argument in job["args"]):
             raise ValueError("embedded null byte")
@@ -216,7 +216,7 @@ class _Supervisor:
                 prepare()
                 signal.set_wakeup_fd(-1)
                 os.closerange(3, max(self.awake, stderr, self.reports) + 16)
-                return Script(job, environment, notes, shared, self.preloaded)
+                return ScriptProcess(job, environment, notes, shared, self.preloaded)
             return Launched(pid, out, err, functools.partial(_notes, shared, start))
         except BaseException:
             os.close(out)

@@ -19,6 +19,7 @@ other things are aligned as well: words of a line, rows of a table.
 from __future__ import annotations
 
 import enum
+import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -28,10 +29,9 @@ from msgspec import Struct
 from coursebuild.core.model import Comparison
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
-from coursebuild.core.text.patterns import pattern
 
 _ALIKE = 6
-_WORD = pattern(r"[^\W\d]+")
+_WORD = re.compile(r"[^\W\d]+")
 
 
 class StepKind(enum.Enum):

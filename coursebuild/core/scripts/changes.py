@@ -11,6 +11,7 @@ Entry points: `differences` (inside one line), `number_kind`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from msgspec import Struct
@@ -26,10 +27,9 @@ from coursebuild.core.scripts.numbers import (
     scan,
     unit,
 )
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
-_PART = pattern(r"\s+|\w+|[^\w\s]")
+_PART = re.compile(r"\s+|\w+|[^\w\s]")
 _SPACE, _NUMBER = 1, 4
 
 

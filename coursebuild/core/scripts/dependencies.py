@@ -22,7 +22,6 @@ from typing import assert_never
 from msgspec import Struct
 
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.text.patterns import pattern
 
 VERSION = "4"
 """To be changed with how scripts are run and watched: older results then count no more."""
@@ -32,7 +31,7 @@ FOLDER = "folder"
 SPECIAL = "special"
 """States of files that are none; other states are hashes, or say why nothing can be read."""
 
-_MISSING_MODULE = pattern(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
+_MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
 _PERTURBATION = "moved states"
 """Another name, once what is kept of such runs means something else: then they run again."""
 _SHOWN = 6

@@ -23,13 +23,12 @@ from coursebuild.core.model.results import Divergence, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
-_FRAME = pattern(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
-_WARNING = pattern(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
-_THREAD = pattern(r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?")
-_COLOURS = pattern(r"\x1b\[[0-9;]*[A-Za-z]")
+_FRAME = re.compile(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
+_WARNING = re.compile(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
+_THREAD = re.compile(r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?")
+_COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _CRASH = "Current thread "
 _ABORTED = "Fatal Python error: Aborted\n\n"
 """What Python says when it is asked, at the end of its time, where it is."""

@@ -21,12 +21,11 @@ from itertools import accumulate
 from msgspec import Struct
 
 from coursebuild.core.model import Filter
-from coursebuild.core.text.patterns import pattern
 
-_LINE_END = pattern(r"\r\n?|\n")
+_LINE_END = re.compile(r"\r\n?|\n")
 # Possessive, and only at the start of a run, so that long runs of white space take linear time.
-_END_OF_LINE = pattern(r"(?<![^\S\r\n])[^\S\r\n]*+(?:\r\n?|\n|\Z)")
-_EMPTY_LINES = pattern(r"(?:\A|(?<=[^\n]\n))\n++\Z")
+_END_OF_LINE = re.compile(r"(?<![^\S\r\n])[^\S\r\n]*+(?:\r\n?|\n|\Z)")
+_EMPTY_LINES = re.compile(r"(?:\A|(?<=[^\n]\n))\n++\Z")
 
 
 class MappingSegment(Struct, frozen=True):

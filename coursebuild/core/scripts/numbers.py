@@ -16,13 +16,12 @@ Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 1
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from decimal import Context, Decimal
 
 from msgspec import Struct
 from msgspec.structs import replace
-
-from coursebuild.core.text.patterns import pattern
 
 _SIGN = "[+\\-\u2212]"
 _MAGNITUDE = rf"(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE]{_SIGN}?[0-9]{{1,4}})?"
@@ -43,13 +42,13 @@ _LOOKS_LIKE_A_NUMBER = "|".join(
     )
 )
 _SPECIAL = rf"{_SIGN}?(?:nan|NaN|NAN|inf|Inf|INF|[iI]nfinity)(?!\w)"
-_TOKEN = pattern(
+_TOKEN = re.compile(
     rf"(?P<imaginary>(?<=[0-9.]){_SIGN}{_MAGNITUDE}(?=[jJ](?!\w)))"
     rf"|(?<![\w.^])(?<!\^[+\-])(?:(?P<text>{_LOOKS_LIKE_A_NUMBER})|(?P<special>{_SPECIAL})"
     rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
     r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
 )
-_NOTATION = pattern(
+_NOTATION = re.compile(
     rf"(?P<sign>{_SIGN})?(?P<whole>[0-9]*)(?:\.(?P<decimals>[0-9]*))?"
     rf"(?:(?P<mark>[eE])(?P<power_sign>{_SIGN})?(?P<power>[0-9]+))?"
 )
@@ -59,7 +58,7 @@ _EXACT = Context(prec=40_000)
 _QUOTIENT = Context(prec=34)
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-")
-_POWER = pattern(
+_POWER = re.compile(
     rf"\s*[×·]\s*10(?:\^\{{?(?P<caret>{_SIGN}?[0-9]{{1,4}})\}}?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,4}}))(?!\w)"
 )
 

@@ -12,6 +12,7 @@ Entry points: `compare_table`, `table_rows`, `TableMatcher`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from itertools import islice
@@ -54,7 +55,6 @@ from coursebuild.core.scripts.lines import (
 )
 from coursebuild.core.scripts.mapped_text import MappedText, MappingSegment, Side, filtered, plain
 from coursebuild.core.scripts.numbers import Number, relative_error
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Span
 
 _ALIKE = 6
@@ -267,8 +267,8 @@ def _cost(cell: Canon, line: Canon, place: int, same: SameNumber) -> float:
 
 # --- cells
 
-_RUN = pattern(r"\s{2,}|[^\S ]")
-_ENDS = pattern(r"\A\s+|\s+\Z")
+_RUN = re.compile(r"\s{2,}|[^\S ]")
+_ENDS = re.compile(r"\A\s+|\s+\Z")
 
 
 def cell_text(cell: Cell, filters: Iterable[Filter] = ()) -> MappedText:

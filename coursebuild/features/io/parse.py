@@ -6,19 +6,20 @@ the lines after it continue it. All three must be there, once, in this order.
 
 from __future__ import annotations
 
+import re
+
 from coursebuild.core.model import Inline
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import parse_info, read_keys
 from coursebuild.core.syntax.spans import joined, trimmed
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
-from coursebuild.core.text.patterns import pattern
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.io.model import Io
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
-_LABEL = pattern(r"\s*(INPUT|PROCESS|OUTPUT):")
-_LIKE_LABEL = pattern(r"\s*([A-Za-z]+)\s*:")
+_LABEL = re.compile(r"\s*(INPUT|PROCESS|OUTPUT):")
+_LIKE_LABEL = re.compile(r"\s*([A-Za-z]+)\s*:")
 
 
 class _Parts:

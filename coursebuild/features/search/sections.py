@@ -54,7 +54,6 @@ from coursebuild.core.model import (
 from coursebuild.core.model.inlines import CodeSpan
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
 from coursebuild.core.registry import kind_of_block
-from coursebuild.core.text.patterns import pattern
 from coursebuild.features.search.tex import plain_formula
 
 
@@ -78,7 +77,7 @@ class Section(Struct, frozen=True):
     """Texts that it is found by and that are not shown: names of TeX commands, of files."""
 
 
-_TAG = pattern(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
+_TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
 
 
 def document_sections(

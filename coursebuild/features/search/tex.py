@@ -12,10 +12,9 @@ import functools
 import re
 import unicodedata
 
-from coursebuild.core.text.patterns import pattern
 from coursebuild.features.search.words import GREEK
 
-_PIECE = pattern(r"%[^\n]*|\\([A-Za-z]+)\*?|\\.|\s+|.", re.DOTALL)
+_PIECE = re.compile(r"%[^\n]*|\\([A-Za-z]+)\*?|\\.|\s+|.", re.DOTALL)
 """A comment, a command, another character after a backslash, blanks, or a character."""
 
 _SIGNS = {
@@ -51,10 +50,10 @@ _LETTERS = {
     **{"varepsilon": "ε", "vartheta": "ϑ", "varphi": "φ", "varrho": "ϱ", "varpi": "ϖ"},
     "varsigma": "ς",
 }
-_MATHEMATICAL = pattern("[\U0001d400-\U0001d7ff]")
+_MATHEMATICAL = re.compile("[\U0001d400-\U0001d7ff]")
 # A blank is looked for first, what stands around it then: the other way about takes far longer.
-_TIGHT = pattern(r" (?:(?<=[_^(\[|⟨] )|(?=[_^)\]⟩,;]))")
-_OPERATOR = pattern(r" (?<=[Δδ∂∇] )(?=[^\W\d])")
+_TIGHT = re.compile(r" (?:(?<=[_^(\[|⟨] )|(?=[_^)\]⟩,;]))")
+_OPERATOR = re.compile(r" (?<=[Δδ∂∇] )(?=[^\W\d])")
 """Between a difference or derivative and what it is of: they are one word, as `Δt`."""
 
 

@@ -22,8 +22,6 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Literal
 
-from coursebuild.core.text.patterns import pattern
-
 LONGEST = 48
 """Characters; longer runs are data, which nobody types."""
 _LONGEST_NUMBER = 12
@@ -55,16 +53,16 @@ _UNSPACED = (
 )
 """First and last characters of scripts without spaces between words: Thai, Lao, Burmese, Khmer,
 Kana, Han."""
-_TOKEN = pattern(
+_TOKEN = re.compile(
     r"[0-9]+(?:\.[0-9]+)*[eE][+-]?[0-9]+(?!\w)|\w+(?:\.\w+)*|[" + "".join(_SYMBOLS) + "]"
 )
-_NUMBER = pattern(r"[0-9][0-9.eE+-]*\Z")
-_SEAM = pattern(
+_NUMBER = re.compile(r"[0-9][0-9.eE+-]*\Z")
+_SEAM = re.compile(
     r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])|(?<=[0-9])(?=[A-Za-z])"
     r"|_+"
 )
-_FOREIGN = pattern(r"[^\x00-\x7f]+")
-_GENITIVE = pattern("['’]s\\b")
+_FOREIGN = re.compile(r"[^\x00-\x7f]+")
+_GENITIVE = re.compile("['’]s\\b")
 
 
 def terms_of(text: str) -> list[str]:

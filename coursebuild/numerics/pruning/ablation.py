@@ -30,7 +30,7 @@ from coursebuild.numerics.pruning.trials import (
     NotTriedError,
     PruningContext,
     PruningTrial,
-    Trials,
+    PruningTrials,
 )
 from coursebuild.numerics.pruning.unused import meshes, unused
 from coursebuild.numerics.reports.diet import (
@@ -97,7 +97,7 @@ class _Surveyor:
         self.order = order
         self.seen, self.good = seen, good
         scenes = [one.scene for one in good]
-        self.trials = Trials(order.text, scenes, order.clock, quick=order.quick)
+        self.trials = PruningTrials(order.text, scenes, order.clock, quick=order.quick)
         self.findings: list[Finding] = []
         self.tried: list[Tried] = []
         self.used: set[str] = set()

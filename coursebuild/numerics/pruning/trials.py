@@ -1,6 +1,6 @@
 """What could be left out of a model, and models without it, run and timed beside the original.
 
-Entry points: `Candidate`, `Item`, `PruningContext`; `Trials`.
+Entry points: `Candidate`, `Item`, `PruningContext`; `PruningTrials`.
 
 1. A candidate is a kind of thing that may be in vain, with every place where the model has it. Why
    it must be in vain whatever happens is its `proof`; without one only runs speak for it.
@@ -121,7 +121,7 @@ class NotTriedError(Exception):
     """A change that makes no model, or one that cannot be compared."""
 
 
-class Trials:
+class PruningTrials:
     """Tries a model without things, in its scenarios."""
 
     def __init__(

@@ -9,6 +9,7 @@ of Chinese and Japanese end one by themselves.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from coursebuild.core.model import (
@@ -23,11 +24,10 @@ from coursebuild.core.model import (
     Text,
     walk_inlines,
 )
-from coursebuild.core.text.patterns import pattern
 
-_END = pattern(r"[.!?…؟।]+[\"'”’»)\]]*\s+|[。！？]+[」』）”’]*\s*")
-_CLOSED = pattern(r"[.!?…؟।。！？][\"'”’»」』）)\]]*\s*$")
-_LAST_WORD = pattern(r"[^\s(\[“‘\"']*$")
+_END = re.compile(r"[.!?…؟।]+[\"'”’»)\]]*\s+|[。！？]+[」』）”’]*\s*")
+_CLOSED = re.compile(r"[.!?…؟।。！？][\"'”’»」』）)\]]*\s*$")
+_LAST_WORD = re.compile(r"[^\s(\[“‘\"']*$")
 _ABBREVIATIONS = frozenset(
     "approx. ca. cf. ch. e.g. eq. eqs. fig. figs. i.e. p. pp. ref. refs. resp. sec. viz. vs."
     " d.h. z.b. bzw. vgl. abb. gl. p.ej. u.a.".split()

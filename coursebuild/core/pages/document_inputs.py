@@ -1,6 +1,6 @@
 """What the page of a document looks up in the course and in its results.
 
-Entry point: `shown(library, place, document)`.
+Entry point: `document_inputs(library, place, document)`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from coursebuild.core.pages.page_inputs import (
 )
 
 
-def shown(library: Library, place: urls.Place, document: Document) -> ShownDocument:
+def document_inputs(library: Library, place: urls.Place, document: Document) -> ShownDocument:
     """All that the document's page shows besides what stands in the document.
 
     The summary of a document does as well as the document.
