@@ -48,7 +48,8 @@ PYTEST = PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(BIN)/python -m py
 PARALLEL = -n $(WORKERS) --dist worksteal
 
 quick: $(VENV)/.dev npm
-	@$(PYTEST) $(PARALLEL) -m 'not (browser or engine or site or slow)' $(PYTEST_ARGS)
+	@$(PYTEST) $(PARALLEL) --ignore tests/browser --ignore tests/packaging \
+	  -m 'not (browser or engine or site or slow)' $(PYTEST_ARGS)
 
 test: $(VENV)/.dev npm system
 	@$(PYTEST) $(PARALLEL) -m 'not slow' $(PYTEST_ARGS)

@@ -7,7 +7,6 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from coursebuild.numerics.integrate import (
     NoConvergenceError,
@@ -27,6 +26,8 @@ def test_a_circle() -> None:
 
 
 def test_an_orbit_of_high_eccentricity_agrees_with_another_method() -> None:
+    from scipy.integrate import solve_ivp  # two seconds
+
     def rate(y: State) -> State:
         cube = (y[0] ** 2 + y[1] ** 2) ** 1.5
         return np.array([y[2], y[3], -y[0] / cube, -y[1] / cube])

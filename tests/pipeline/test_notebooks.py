@@ -7,10 +7,10 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import pytest
-from nbclient import NotebookClient
 
 from coursebuild.core.model import Recording, document_blocks
 from coursebuild.core.model.vocabulary import CALLOUTS
@@ -29,6 +29,12 @@ COURSES = {
     "other letters": ROOT / "tests" / "courses" / "unicode" / "course",
     "this course": ROOT,
 }
+
+
+def notebook_client(notebook: Any, **options: Any) -> Any:
+    from nbclient import NotebookClient  # a second, which all who collect this file would wait
+
+    return NotebookClient(notebook, **options)
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +100,7 @@ def executed(path: Path, folder: Path) -> dict[str, str]:
     """Run a notebook from top to bottom in an empty folder; gives what its scripts printed."""
     folder.mkdir()
     notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(
+    client = notebook_client(
         notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
     )
     client.execute()
@@ -145,7 +151,7 @@ def test_notebook_brings_the_modules_its_scripts_import(make: Make, tmp_path: Pa
         nbformat.v4.new_code_cell("%%example examples/again.py\nfrom first import *")
     )
     nbformat.write(notebook, changed)
-    client = NotebookClient(
+    client = notebook_client(
         notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(place)}}
     )
     client.execute()
@@ -165,7 +171,7 @@ def test_failing_script_stops_its_notebook(make: Make, tmp_path: Path) -> None:
     notebook = nbformat.read(folder.root / "public" / "lessons" / "1.1-one.ipynb", as_version=4)
     for cell in notebook.cells:
         cell.source = cell.source.replace("%%example --norun", "%%example")
-    client = NotebookClient(
+    client = notebook_client(
         notebook,
         timeout=300,
         kernel_name="python3",

@@ -16,7 +16,6 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
-import distributed
 import pytest
 from msgspec.structs import replace
 
@@ -71,6 +70,8 @@ class Cluster:
         )
 
     def wait_for_workers(self, count: int) -> None:
+        import distributed  # a second, which all who collect this file would wait
+
         with distributed.Client(  # type: ignore[no-untyped-call]
             f"tcp://{self.address}", set_as_default=False
         ) as client:
