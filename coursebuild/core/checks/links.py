@@ -195,7 +195,8 @@ def _check_link(
         return
     rule, name, names, missing = _named(link, target, known)
     if name not in names:
-        yield diagnose(rule, span, missing, help=did_you_mean(name, names))
+        help = _other_kind(target, known) or did_you_mean(name, names)
+        yield diagnose(rule, span, missing, help=help)
     elif isinstance(target, ModelTarget):
         declared = known.scenarios.get(target.name, ())
         yield from _model_place(span, target.anchor, known.models[target.name], declared)
@@ -205,6 +206,24 @@ def _check_link(
     elif isinstance(target, PageTarget):
         to, where = known.pages[target.id], f"page `{target.id}`"
         yield from _anchor(span, target.anchor, to, where)
+
+
+def _by_id(kind: str, id: str) -> str:
+    """How to lead to a lesson, a level or a page."""
+    if kind == "level":
+        return f"write `Level {id}` in the text, which becomes a link"
+    return f"link to it by its id, `{kind}:{id}`"
+
+
+def _other_kind(target: _Name, known: LinkTargets) -> str:
+    """What to write where a lesson is called a level, or a level a lesson."""
+    if isinstance(target, LessonTarget) and target.id in known.levels:
+        kind = "level"
+    elif isinstance(target, LevelTarget) and target.id in known.lessons:
+        kind = "lesson"
+    else:
+        return ""
+    return f"{target.id} is a {kind}: {_by_id(kind, target.id)}"
 
 
 def _named(link: Link, target: _Name, known: LinkTargets) -> tuple[str, str, Collection[str], str]:
@@ -265,11 +284,26 @@ def _check_url(
     if parts.scheme or parts.netloc:
         return
     if not parts.path:
+        route = _ROUTE.fullmatch(unquote(parts.fragment))
+        if route is not None and (ids := _ids(route[1], known)) and route[2] in ids:
+            message = f"`{url}` is an address of another tool"
+            help = _by_id(route[1], route[2])
+            yield diagnose("link-anchor", span, message, help=help)
+            return
         yield from _anchor(span, parts.fragment or None, document, "this page")
         return
     path = local_file(url, document.source.path)
     if path not in known.files:
         yield diagnose("link-file", span, f"no file `{path}`", help=_file_help(path, known))
+
+
+_ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
+"""The address of a lesson in a course that one page with a script shows."""
+
+
+def _ids(kind: str, known: LinkTargets) -> Collection[str]:
+    """The ids of lessons, levels or pages."""
+    return {"lesson": known.lessons, "level": known.levels, "page": known.pages}[kind]
 
 
 def _file_help(path: str, known: LinkTargets) -> str:
@@ -278,11 +312,8 @@ def _file_help(path: str, known: LinkTargets) -> str:
         return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
     if name.endswith(".xml") and name[:-4] in known.models:
         return f"link to a model by its name: `model:{name[:-4]}`"
-    return (
-        did_you_mean(path, known.files)
-        if known.files
-        else "files that pages may use lie in content/"
-    )
+    files = [file for file in known.files if not file.endswith(".md")]
+    return did_you_mean(path, files) if files else "files that pages may use lie in content/"
 
 
 def _check_media(

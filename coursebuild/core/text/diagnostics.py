@@ -98,9 +98,14 @@ class Parsed(Struct, Generic[T_co], frozen=True):
 
 
 def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
-    """The known name that is most like `name`, if any is alike enough; of several the first."""
+    """The known name that is most like `name`, if any is alike enough; of several the first.
+
+    Numbers are never alike: `1.3` is another lesson than `1.2`, not a misspelt one.
+    """
     import difflib
 
+    if not any(map(str.isalpha, name)):
+        return None
     found = difflib.get_close_matches(name, sorted(set(known)), n=1, cutoff=cutoff)
     return found[0] if found else None
 
