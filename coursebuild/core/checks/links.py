@@ -212,7 +212,9 @@ def _by_id(kind: str, id: str) -> str:
     """How to lead to a lesson, a level or a page."""
     if kind == "level":
         return f"write `Level {id}` in the text, which becomes a link"
-    return f"link to it by its id, `{kind}:{id}`"
+    if kind == "lesson":
+        return f"write `Lesson {id}` in the text, or link to `lesson:{id}`"
+    return f"link to `{kind}:{id}`"
 
 
 def _other_kind(target: _Name, known: LinkTargets) -> str:

@@ -38,6 +38,26 @@ _FIRST_SIGNALS = "HUP INT QUIT ILL TRAP ABRT BUS FPE KILL USR1 SEGV USR2 PIPE AL
 _SIGNALS = {**dict(enumerate(_FIRST_SIGNALS.split(), 1)), 24: "XCPU", 25: "XFSZ", 31: "SYS"}
 """As Linux numbers them (signal(7))."""
 
+_HELPS = (
+    (
+        re.compile(r"ModuleNotFoundError: No module named '(\w+)"),
+        r"install `\1`, or say `requires=\1` on its fence, to skip it where `\1` is missing",
+    ),
+    (
+        re.compile(r"FileNotFoundError: |.*Error opening file"),
+        "a script runs in the project's folder: name files from there, as `models/box.xml`",
+    ),
+    (
+        re.compile(r"EOFError: EOF when reading a line"),
+        "nobody types while a course is checked: write into the script what it asks for",
+    ),
+    (
+        re.compile(r".*(?:GLFW|gladLoadGL|OpenGL platform library|X11|\bDISPLAY\b)"),
+        "no window opens while a course is checked: leave it out, or say `norun` on its fence",
+    ),
+)
+"""The exception's line, and what mends it."""
+
 _TAIL_LINES = 30
 _TAIL_CHARACTERS = 4000
 _LABEL = 120
@@ -124,7 +144,10 @@ def failure(
     if run.outcome is Outcome.FAILED:
         if not (_parses(where) and _parses(extraction)):
             return None
-        label = _last_words(stderr)
+        words = _last_words(stderr)
+        label = shortened(words, _LABEL)
+        found = ((pattern.match(words), advice) for pattern, advice in _HELPS)
+        help = next((match.expand(advice) for match, advice in found if match), "")
     notes = _stderr_notes(run.outcome, lessons.translated(stderr))
     if where.path != extraction.path:
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
@@ -162,11 +185,11 @@ def _last_words(stderr: str) -> str:
         after = stderr[frames[-1].end() :].split("\n")[1:]
         lines = [line for line in after if line and not line[0].isspace()]
         if lines:
-            return shortened(lines[0].strip(), _LABEL)
+            return lines[0].strip()
     # Exception groups are drawn with lines and corners.
     written = [line.strip(" \t\r|+-") for line in stderr.split("\n")]
     written = [line for line in written if line]
-    return shortened(written[-1], _LABEL) if written else ""
+    return written[-1] if written else ""
 
 
 def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
