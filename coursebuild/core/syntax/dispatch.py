@@ -57,6 +57,9 @@ def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block
 
 def _unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
     """What is inside may be anything, so that nothing is said about it."""
+    if session.closes_indented and not fence.info.text:
+        session.closes_indented = False
+        return fence.code()
     marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
     name = "backticks" if marks[0] == "`" else "tildes"
     help = f"close it with a line of {len(marks)} {name} in the same quote or list item"

@@ -24,6 +24,10 @@ from coursebuild.core.text.source import Excerpt, Source, Span
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
 
 
+INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
+"""How an indented block begins that was surely meant to be a fence."""
+
+
 class Fence(Struct, frozen=True):
     """A fenced code block."""
 

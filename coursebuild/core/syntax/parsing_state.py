@@ -35,6 +35,8 @@ class ParsingState:
         """The path of the nearest script above."""
         self.script_wrong = False
         """Whether the nearest script above has no path that it may have."""
+        self.closes_indented = False
+        """Whether a fence above was indented, so that what closes it seems to open one."""
         self.level = 1
         """Level of the heading above."""
         self.notes = FootnoteList(self.report)

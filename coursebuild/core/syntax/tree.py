@@ -12,6 +12,7 @@ get).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from coursebuild.core.model import (
@@ -38,7 +39,7 @@ from coursebuild.core.model import (
 from coursebuild.core.syntax.attributes import Braces, read_label
 from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
-from coursebuild.core.syntax.fence import read_fence
+from coursebuild.core.syntax.fence import INDENTED_FENCE, is_ours, read_fence
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
 from coursebuild.core.syntax.html import Balance, html_flow, media_of, tags
 from coursebuild.core.syntax.inlines import InlineReader
@@ -181,9 +182,24 @@ class TextReader:
 
     def _code(self, token: PositionedToken) -> CodeBlock:
         code = locate(self.base, token.rows)
+        self._fence_inside(code)
         return CodeBlock(
             self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )
+
+    def _fence_inside(self, code: Excerpt) -> None:
+        """Tell of a fence that is indented, by which its block became text that is shown."""
+        opening = INDENTED_FENCE.match(code.text)
+        if opening is None:
+            return
+        closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
+        if closed and not is_ours(opening[2]):
+            return
+        message = "this fence is indented by a tab or four blanks, so its block is shown as text"
+        help = "take the white space before it away"
+        place = code.span(opening.start(1), opening.end())
+        self.session.report(diagnose("fence-indented", place, message, help=help))
+        self.session.closes_indented = not closed
 
     def _html(self, token: PositionedToken) -> HtmlBlock | HtmlFlow:
         """Raw HTML, kept as it is unless it holds formulas."""

@@ -79,6 +79,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "A code fence is never closed, or not before another one begins.",
     ),
+    ("fence-indented", "error", "A fence is indented, so that its block is shown as text."),
     ("fence-info", "error", "The info string of a fence cannot be read."),
     ("fence-key-unknown", "error", "A fence has a key that its kind does not know."),
     ("fence-key-repeated", "error", "A fence has the same key twice."),
