@@ -87,8 +87,8 @@ def clash(added: Feature, known: Iterable[Feature]) -> str:
     if rules:
         return f"there is a rule `{min(rules)}` already"
     unseen = [kind for kind in added.fences if kind.block.summary is FeatureBlock.summary]
-    if added.check is not None and unseen:
-        return f"its check would see no `{unseen[0].name}`, whose block has no `summary`"
+    if unseen and (added.check or added.check_runs or added.pages or added.exporters):
+        return f"it would see no `{unseen[0].name}` of the course: its block has no `summary`"
     read = {*CORE_FENCES, *(kind.name for feature in known for kind in feature.fences)}
     twice = [kind.name for kind in added.fences if kind.name in read]
     if twice:

@@ -60,8 +60,13 @@ def export(options: Options, name: str, out: Path | None) -> Report:
             write = write_archive if exporter.archive else write_single
             size = write(place, prepared.files)
     count = len(prepared.files)
-    said = f"wrote {f'{count} files to ' if exporter.archive else ''}{out}, {size / 1e6:.1f} MB"
+    said = f"wrote {f'{count} files to ' if exporter.archive else ''}{out}, {_size(size)}"
     return replace(prepared.report, remarks=(said,), depends=None)
+
+
+def _size(count: int) -> str:
+    """A number of bytes as people say it."""
+    return f"{count / 1e6:.1f} MB" if count >= 100_000 else f"{count / 1e3:.1f} kB"
 
 
 def _find(root: Path, name: str) -> Exporter:

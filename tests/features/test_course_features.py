@@ -115,7 +115,7 @@ def test_a_mistake_in_a_fence_of_a_feature_has_its_rule_and_place(course: Folder
         ),
         (
             SHOUT.replace('name="shout",\n    f', 'name="shout",\n    check=print,\n    f'),
-            "features/shout.py: its check would see no `shout`, whose block has no `summary`",
+            "features/shout.py: it would see no `shout` of the course: its block has no `summary`",
         ),
         (
             SHOUT.replace('name="shout",\n            b', 'name="lab",\n            b'),

@@ -31,7 +31,7 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 def test_example_of_the_docs_writes_the_lessons_as_a_table(course: Folder) -> None:
     done = course.main("export", "lessons")
     assert done.status == 0, done.out + done.err
-    assert "wrote lessons.csv, 0.0 MB" in done.out
+    assert "wrote lessons.csv, 0.1 kB" in done.out
     table = 'id,title,scripts\r\n1.1,Lesson one,1\r\n1.2,"Two, ""quoted""",0\r\n'
     assert course.read("lessons.csv") == table.encode()
     course.replace(MAP, "Lesson one", "One")
@@ -68,6 +68,45 @@ FEATURE = Feature(
     done = course.main("export", "bare", "--out", "sub/b.zip")
     assert done.status == 0 and "wrote 4 files to sub/b.zip" in done.out, done.out + done.err
     assert done.out.count("warning[bare]") == 2
+
+
+def test_exporter_finds_blocks_of_its_own_feature(course: Folder) -> None:
+    course.write(
+        "features/lessons.py",
+        """
+from coursebuild.core.features import Exporter, Feature, FenceKind
+from coursebuild.core.model import FeatureBlock, document_blocks
+from coursebuild.core.model.results import OutputFile
+from coursebuild.core.text.diagnostics import Parsed
+
+
+class Note(FeatureBlock, frozen=True):
+    text: str
+
+    def summary(self):
+        return self
+
+
+def make(context):
+    for document in context.course.documents:
+        for block in document_blocks(document):
+            if isinstance(block, Note):
+                yield OutputFile("notes.txt", block.text.encode())
+
+
+def parse(fence, texts):
+    return Parsed(Note(fence.span, fence.body.text))
+
+
+KIND = FenceKind(name="note", block=Note, parse=parse, draw=None, markdown=None)
+NOTES = Exporter(name="notes", summary="s", file="n.txt", mark="", make=make, archive=False)
+FEATURE = Feature(name="notes", fences=(KIND,), exporters=(NOTES,))
+""",
+    )
+    course.write("content/lessons/1.2-two.md", "## Two\n\n```note\nmine\n```\n")
+    done = course.main("export", "notes")
+    assert done.status == 0, done.out + done.err
+    assert course.read("n.txt") == b"mine\n"
 
 
 def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:

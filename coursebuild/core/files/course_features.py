@@ -13,7 +13,7 @@ from types import ModuleType
 from coursebuild.core.features import Feature
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model import Course, CourseFeature
+from coursebuild.core.model import Course
 from coursebuild.core.registry import clash, installed_features, use_course_features
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
@@ -30,9 +30,9 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             wrong.append(diagnose("feature-broken", named.span, error.message))
             continue
         digest.update(named.path.encode() + b"\0" + code + b"\0")
-        feature = _run(named, code)
-        if isinstance(feature, Diagnostic):
-            wrong.append(feature)
+        feature = _run(named.path, code)
+        if isinstance(feature, str):
+            wrong.append(diagnose("feature-broken", named.span, feature))
         elif reason := clash(feature, (*installed_features(), *found)):
             wrong.append(diagnose("feature-broken", named.span, f"{named.path}: {reason}"))
         else:
@@ -41,18 +41,33 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
     return tuple(wrong)
 
 
-def _run(named: CourseFeature, code: bytes) -> Feature | Diagnostic:
-    module = ModuleType(f"course_{named.path.removesuffix('.py').replace('/', '.')}")
-    module.__file__ = named.path
+def _run(path: str, code: bytes) -> Feature | str:
+    """The feature of a file, or why there is none.
+
+    An unchanged file is not run again: blocks that were read would be of another class than those
+    that are read now.
+    """
+    known = _last.get(path)
+    if known is None or known[0] != code:
+        known = _last[path] = code, _first_run(path, code)
+    return known[1]
+
+
+_last: dict[str, tuple[bytes, Feature | str]] = {}
+"""By path: the code that was run last, and what came of it."""
+
+
+def _first_run(path: str, code: bytes) -> Feature | str:
+    module = ModuleType(f"course_{path.removesuffix('.py').replace('/', '.')}")
+    module.__file__ = path
     sys.modules[module.__name__] = module  # where kept values of its classes look for these
     try:
-        exec(compile(code, named.path, "exec"), module.__dict__)
+        exec(compile(code, path, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:  # whatever an author's code raises
-        message = f"{named.path} fails: {type(error).__name__}: {error}"
-        return diagnose("feature-broken", named.span, message)
+        return f"{path} fails: {type(error).__name__}: {error}"
     feature = getattr(module, "FEATURE", None)
-    if isinstance(feature, Feature):
-        return feature
-    message = f"{named.path} has no FEATURE"
-    help = "give it one, of the type coursebuild.core.features.Feature"
-    return diagnose("feature-broken", named.span, message, help=help)
+    return (
+        feature
+        if isinstance(feature, Feature)
+        else f"{path} has no FEATURE of the type `coursebuild.core.features.Feature`"
+    )

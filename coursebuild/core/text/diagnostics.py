@@ -83,8 +83,12 @@ def diagnose(
 ) -> Diagnostic:
     """A diagnostic of a rule of the catalogue.
 
-    A rule that is not in it is a programming error (`KeyError`).
+    Raises:
+        KeyError: there is no such rule.
+        TypeError: the place is no span.
     """
+    if not isinstance(span, Span):
+        raise TypeError("the place of a diagnostic is a Span, as `excerpt.span()` gives it")
     if rule not in RULES:
         raise KeyError(f"no rule {rule!r} in the catalogue")
     return Diagnostic(rule, span, message, label, help, tuple(notes), tuple(edits))

@@ -89,7 +89,7 @@ def test_package_of_every_kind_of_question_is_whole(
     qti: Package, zoo_items: dict[str, etree._Element]
 ) -> None:
     assert qti.done.out.count("warning[package-reduced]") == 1, "the simulation"
-    assert "wrote 14 files to quizzes-qti.zip, 0.0 MB" in qti.done.out
+    assert "wrote 14 files to quizzes-qti.zip, " in qti.done.out
     check(qti.files)
     bases = "//q:responseDeclaration/@baseType"
     assert {name: shape(one, bases) for name, one in zoo_items.items()} == {
