@@ -31,7 +31,8 @@ class FolderWatcher:
     def __init__(self, root: Path) -> None:
         self._root = root
         self._stop = threading.Event()
-        self._others: frozenset[str] = frozenset()
+        self._others: dict[str, tuple[int, ...]] = {}
+        """Files elsewhere, and their state at the last look."""
         self._events: queue.SimpleQueue[frozenset[str] | OSError] = queue.SimpleQueue()
         self._begun = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
@@ -58,7 +59,8 @@ class FolderWatcher:
 
     def watch_also(self, paths: frozenset[str]) -> None:
         """Files elsewhere that count as well, by POSIX path relative to the course's folder."""
-        self._others = frozenset(path for path in paths if path.split("/")[0] not in FOLDERS)
+        others = {path for path in paths if path.split("/")[0] not in FOLDERS}
+        self._others = {path: self._others.get(path, self._state(path)) for path in others}
 
     def get(self, seconds: float) -> frozenset[str]:
         """Paths that changed, POSIX and relative to the root; empty where there is nothing new.
@@ -89,7 +91,6 @@ class FolderWatcher:
 
     def _follow(self) -> None:
         before: frozenset[str] | None = None
-        seen: dict[str, tuple[int, ...]] = {}
         while not self._stop.is_set():
             folders = self._folders()
             # Told of once they are watched: a file may be put into a new one at any time, and into
@@ -97,10 +98,9 @@ class FolderWatcher:
             news = frozenset() if before is None else before | folders.keys()
             for changed in self._watch(tuple(self._root / f for f in folders)):
                 self._begun.set()
-                known, seen = seen, {path: self._state(path) for path in self._others}
-                others = {path for path in seen if known.get(path, seen[path]) != seen[path]}
-                if changed | news | others:
-                    self._events.put(changed | news | others)
+                found = changed | news | self._changed_others()
+                if found:
+                    self._events.put(found)
                 news = frozenset()
                 if self._folders() != folders:
                     break
@@ -116,13 +116,20 @@ class FolderWatcher:
                     found[name] = (status.st_dev, status.st_ino)
         return found
 
+    def _changed_others(self) -> set[str]:
+        """The files elsewhere that are others than at the last look."""
+        others = self._others  # another dictionary where more are watched from now on
+        found = {path for path, before in others.items() if self._state(path) != before}
+        others.update((path, self._state(path)) for path in found)
+        return found
+
     def _state(self, path: str) -> tuple[int, ...]:
         """What is another after a save of a file."""
         try:
             status = (self._root / path).stat()
         except OSError:
             return ()
-        return status.st_mtime_ns, status.st_size, status.st_ino
+        return status.st_mtime_ns, status.st_size, status.st_ino, status.st_mode
 
     def _watch(self, folders: tuple[Path, ...]) -> Iterator[frozenset[str]]:
         """Changes in these folders; an empty set at first, and now and then."""

@@ -85,11 +85,11 @@ def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.site
-def test_importing_effects_loads_nothing_heavy() -> None:
+def test_importing_files_and_runners_loads_nothing_heavy() -> None:
     code = (
         "import sys\n"
-        "from coursebuild.core.run import (examples, mjcf, read, resources, runner, v8,"
-        " versions, write)\n"
+        "from coursebuild.core.files import examples, read, resources, write\n"
+        "from coursebuild.core.run import mjcf, runner, v8, versions\n"
         "versions.engine_version()\n"
         "print(sorted({'mujoco', 'numpy', 'py_mini_racer'} & set(sys.modules)))\n"
     )
