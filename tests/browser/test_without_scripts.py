@@ -94,9 +94,9 @@ def texts(document: Document) -> Iterator[str]:
         elif isinstance(block, Io):
             yield from words((*block.input, *block.process, *block.output))
         elif isinstance(block, Lab):
-            yield block.title
-            yield from (control.label for control in block.controls)
-            yield from (readout.label for readout in block.readouts)
+            yield block.fields.title
+            yield from (control.label for control in block.fields.controls)
+            yield from (readout.label for readout in block.fields.readouts)
         elif isinstance(block, Quiz):
             yield block.title
 
