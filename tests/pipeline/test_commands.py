@@ -76,7 +76,7 @@ WRONG_USAGE = [
     ("-C", "expected one argument"),
     ("-C no/such check", "there is no folder no/such"),
     ("-C content/course.toml check", "content/course.toml is not a folder"),
-    ("check 1.2", "no lesson or page is called `1.2`; did you mean `1.1`?"),
+    ("check 1.2", "no lesson or page is called `1.2`; known: `1.1`"),
     ("check oen", "no lesson or page is called `oen`; did you mean `one`?"),
     ("update 1.1 9.9.9", "no lesson or page is called `9.9.9`"),
     ("check planned", "lesson 1.77 is planned, so there is nothing in it yet"),
