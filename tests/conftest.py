@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 # No deadlines: a slow machine is no mistake. A change is judged by the same examples each time;
 # `make test-slow` tries new ones.
 settings.register_profile("free", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-fixed = settings(settings.get_profile("free"), derandomize=True, max_examples=50)
-settings.register_profile("fixed", fixed)
+settings.register_profile("fixed", settings.get_profile("free"), derandomize=True)
 settings.load_profile("fixed")
 
 # A shell starts what runs in the background with these ignored; so all that tests start would be.
