@@ -10,7 +10,7 @@ Markdown, and is written here.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import zip_longest
 from typing import assert_never
 from urllib.parse import quote
@@ -102,6 +102,16 @@ def render_footnotes(footnotes: Iterable[Footnote], context: Context, look: Look
     return Markup(_Writer(context, look).footnotes(footnotes))
 
 
+def raw_html(node: HtmlBlock | RawInline, url: Callable[[str], str]) -> str:
+    """Raw HTML; `url` gives the addresses that files of the course have where it is shown."""
+    parts, at = list[str](), 0
+    for media in node.media:
+        if (address := url(media.url)) != media.url:  # what stays is left as it is written
+            parts += (node.html[at : media.start], _escaped(address))
+            at = media.end
+    return "".join((*parts, node.html[at:]))
+
+
 def reference_id(number: int, occurrence: int) -> str:
     """The id of a reference to a footnote; no anchor made from a heading's text has a colon."""
     return f"fnref:{number}" if occurrence == 1 else f"fnref:{number}:{occurrence}"
@@ -173,7 +183,7 @@ class _Writer:
             case CodeBlock():
                 return self.context.code(block.language, block.code.text)
             case HtmlBlock():
-                return self._raw(block)
+                return raw_html(block, self.context.url)
             case HtmlFlow():
                 return f"{self.inlines(block.children)}\n"
             case ThematicBreak():
@@ -273,7 +283,7 @@ class _Writer:
             case Image():
                 return self._image(inline)
             case RawInline():
-                return self._raw(inline)
+                return raw_html(inline, self.context.url)
             case HardBreak():
                 return f"<br{self.look.void_end}\n"
             case NumberBinding():
@@ -282,14 +292,6 @@ class _Writer:
                 return self._reference(inline)
             case _:
                 assert_never(inline)
-
-    def _raw(self, node: HtmlBlock | RawInline) -> str:
-        """Raw HTML, with the addresses that files of the course have on the page."""
-        parts, at = list[str](), 0
-        for media in node.media:
-            parts += (node.html[at : media.start], _escaped(self.context.url(media.url)))
-            at = media.end
-        return "".join((*parts, node.html[at:]))
 
     def _link(self, link: Link) -> str:
         title = f' title="{_escaped(link.title)}"' if link.title else ""

@@ -80,6 +80,15 @@ def html(text: str, look: Look | None = None) -> str:
         ("```c\n<\n```", "<x-code lang='c'>&lt;\n</x-code>\n"),
         ("> [!note] A\n> b", "<x-callout>\n"),
         ("a  \nb\n\n***", "<p>a<br>\nb</p>\n<hr>\n"),
+        (
+            "<img src=a.png srcset='b.png 2x, c.png'> <video poster=\"d&amp;e.png\"></video>",
+            "<p><img src=/files/a.png srcset='/files/b.png 2x, /files/c.png'> "
+            '<video poster="/files/d&amp;e.png"></video></p>\n',
+        ),
+        (
+            "<object data='a.svg'>\n<a href='a.svg'>\n",
+            "<object data='/files/a.svg'>\n<a href='a.svg'>\n",
+        ),
         ("<b>&amp;</b>\n", "<p><b>&amp;</b></p>\n"),
         ("- a\n  - b\n- c", "<ul>\n<li>a\n<ul>\n<li>b</li>\n</ul>\n</li>\n<li>c</li>\n</ul>\n"),
     ],

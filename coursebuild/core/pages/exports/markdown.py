@@ -74,7 +74,7 @@ from coursebuild.core.pages.exports.marks import (
     text_source,
 )
 from coursebuild.core.pages.look import OwnBlock
-from coursebuild.core.pages.markup import escape, is_tight
+from coursebuild.core.pages.markup import escape, is_tight, raw_html
 
 
 class MarkdownContext(Protocol):
@@ -172,7 +172,7 @@ class _Writer:
             case CodeBlock():
                 return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
             case HtmlBlock():
-                return block.html.rstrip("\n")
+                return raw_html(block, self.context.url).rstrip("\n")
             case ThematicBreak():
                 return "___"
             case MathBlock():
@@ -273,7 +273,7 @@ class _Writer:
                 url = self.context.url(inline.url)
                 return piped(picture(inline.alt, url, inline.title), cell=cell)
             case RawInline():
-                return piped(inline.html, cell=cell)
+                return piped(raw_html(inline, self.context.url), cell=cell)
             case FootnoteRef():
                 return self.context.reference(inline.number)
             case _:

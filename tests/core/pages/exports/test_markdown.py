@@ -147,3 +147,15 @@ def test_code_spans_hold_any_code() -> None:
     for text, span in (("a", "`a`"), ("a`b", "``a`b``"), ("`", "`` ` ``"), (" a ", "`  a  `")):
         assert code_span(text) == span
         assert f"<code>{text}</code>" in plain_html(read(f"{span}\n"))
+
+
+def test_files_that_raw_html_shows_have_the_address_of_the_copy() -> None:
+    class Moved(Context):
+        def url(self, url: str) -> str:
+            return f"../files/{url}"
+
+    text = "<video src='a.mp4'>\n</video>\n\nA <img src=b.png> and <a href=c.png>c</a>.\n"
+    assert write_blocks(read(text).blocks, Moved()) == (
+        "<video src='../files/a.mp4'>\n</video>\n\n"
+        "A <img src=../files/b.png> and <a href=c.png>c</a>."
+    )
