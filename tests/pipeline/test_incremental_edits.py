@@ -130,7 +130,7 @@ def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
         max_size=7,
     )
 )
-@settings(max_examples=5)
+@settings(max_examples=8)
 def test_after_any_edits_the_site_is_that_of_a_clean_checkout(
     built: Folder,
     stores: Path,

@@ -193,7 +193,7 @@ def test_the_real_course() -> None:
     assert told(text) == []
 
 
-@settings(max_examples=40)
+@settings(max_examples=100)
 @given(st.data())
 def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))
