@@ -292,10 +292,10 @@ def browsing() -> Iterator[Any]:
 
 def race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
     """A line for each model."""
-    from coursebuild.core.run.lab_engine import LabEngine
-    from coursebuild.core.run.native import NativeEngine
     from coursebuild.core.syntax.document import parse_document
     from coursebuild.core.text.source import Source
+    from coursebuild.features.lab.engines.browser import LabEngine
+    from coursebuild.features.lab.engines.native import NativeEngine
     from coursebuild.features.lab.model import Lab
 
     with LabEngine() as engine, NativeEngine(folder) as saver:

@@ -24,11 +24,11 @@ from msgspec import Struct
 from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline
 from coursebuild.core.model.results import (
     CompileResult,
-    LabResult,
     ModelFacts,
     OutputFile,
     Results,
     ScriptRun,
+    TrialResult,
 )
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
@@ -175,7 +175,7 @@ class TrialContext(Struct, frozen=True):
     """Whether pages are made of the results."""
 
 
-Tried: TypeAlias = tuple[tuple[LabResult, ...], tuple[Diagnostic, ...]]
+Tried: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]
 """What trials gave, and what is wrong."""
 
 

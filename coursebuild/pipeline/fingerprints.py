@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+from msgspec.structs import replace
+
 from coursebuild.core.engine.tool import tool_digest
 from coursebuild.core.model import (
     Course,
@@ -71,13 +73,9 @@ def results_fingerprint(results: Results, reports: Reports) -> str:
         (v.recording.span.path, v.recording.script, v.status, v.comparison)
         for v in results.verdicts
     )
-    labs = tuple(
-        (
-            lab.span.path,
-            (lab.name, lab.lesson, lab.title, lab.status, lab.tried, lab.parity),
-            (lab.module, lab.config, lab.mjb, lab.static, lab.export, lab.unexported),
-        )
-        for lab in results.labs
+    trials = tuple(
+        (t.span.path, replace(t.line, seconds=0.0, steps_per_second=None, cached=False), t.output)
+        for t in results.trials
     )
     rest = results.formulas, results.models, results.python, results.engine
-    return fingerprint((tool_digest(), runs, verdicts, labs, rest, reports), _SHOWN)
+    return fingerprint((tool_digest(), runs, verdicts, trials, rest, reports), _SHOWN)

@@ -10,9 +10,9 @@ from collections.abc import Collection, Iterable, Sequence
 from fnmatch import fnmatchcase
 
 from coursebuild.core.model import Course, Silence
-from coursebuild.core.model.results import Outcome, Results
+from coursebuild.core.model.results import Outcome, Results, TrialLine
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
-from coursebuild.report import LabLine, Report, ScriptLine, Summary
+from coursebuild.report import Report, ScriptLine, Summary
 
 _NOT_RUN = ("skipped", "norun")
 _OF_RUNS = (
@@ -34,7 +34,7 @@ def judge(
     began: float | None = None,
     *,
     scripts: Sequence[ScriptLine] = (),
-    labs: tuple[LabLine, ...] = (),
+    labs: tuple[TrialLine, ...] = (),
     lessons: int | None = None,
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),

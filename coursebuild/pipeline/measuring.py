@@ -19,7 +19,6 @@ import mujoco
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import EffectError
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
@@ -31,13 +30,8 @@ from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.scene import SceneError, scenes
 from coursebuild.pipeline.scenes import CourseScene
 
-_STEPS = 5000
-"""Of a run in the browser's engine, at most."""
-_RUNS = 8
-"""The first of them compile; the fastest counts."""
 _SECONDS = 20.0
 """Processor time that a run may take."""
-_CODE = "({controls: [], readouts: [], plots: [], expect: []})"
 
 
 class CompiledScene(Struct, frozen=True):
@@ -130,39 +124,17 @@ def with_card(
         touched=len(touched),
         mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
         mjb=int(mujoco.mj_sizeModel(model)),
-        browser=_browser(root, scene, found[0].scenario, seconds),
+        browser=_in_browser(root, scene, found[0].scenario, seconds),
     )
     return replace(report, card=card)
 
 
-def _browser(root: Path, scene: CourseScene, scenario: Scenario, seconds: float) -> float | None:
-    """Simulated time over the time it takes in WebAssembly; `None` where no run came to an end."""
-    from coursebuild.core.run.lab_engine import LabEngine
-    from coursebuild.core.run.native import NativeEngine, NativeError
-    from coursebuild.core.run.v8 import StoppedError
-
-    source, timestep = scene.model.source, scene.facts.timestep
-    data = {"id": "speed", "title": "", "key": None if scenario.keyframe < 0 else scenario.keyframe}
-    nothing = dict.fromkeys(("camera", "forceScale", "stopAt", "trail", "seed"))
-    lists: dict[str, list[object]] = {
-        name: [] for name in ("overlays", "controls", "readouts", "plots", "expect")
-    }
-    request = {
-        "config": {**data, **nothing, **lists, "autoplay": False},
-        "code": _CODE,
-        "seconds": min(scenario.duration, _STEPS * timestep),
-        "parity": False,
-    }
-    best = 0
+def _in_browser(root: Path, scene: CourseScene, scenario: Scenario, seconds: float) -> float | None:
+    """Simulated time over the time that it takes in a browser; `None` where that is not known."""
     try:
-        with NativeEngine(root) as native:
-            mjb = native.save(source.path, source.text)
-        with LabEngine() as engine:
-            for _ in range(_RUNS):
-                reply = engine.trial(request, mjb, seconds)
-                if reply["main"] is None:
-                    break
-                best = max(best, reply.get("stepsPerSecond") or 0)
-    except (NativeError, EffectError, StoppedError):
-        return None
-    return best * timestep if best else None
+        from coursebuild.features.lab.engines.speed import real_time_factor
+    except ImportError:
+        return None  # installed without labs
+    key = None if scenario.keyframe < 0 else scenario.keyframe
+    run = scenario.duration, scene.facts.timestep
+    return real_time_factor(root, scene.model.source, key, run, seconds)

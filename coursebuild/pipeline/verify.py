@@ -24,7 +24,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Trial, TrialContext, Trials
 from coursebuild.core.model import Course, FeatureBlock, document_blocks
-from coursebuild.core.model.results import CompileResult, LabResult, Results, ScriptRun
+from coursebuild.core.model.results import CompileResult, Results, ScriptRun, TrialLine, TrialResult
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
@@ -38,7 +38,7 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
 from coursebuild.pipeline.trials import run_with_trials
-from coursebuild.report import LabLine, ScriptLine
+from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
     from coursebuild.core.run.runner import RunAll
@@ -51,7 +51,7 @@ class Verified(Struct, frozen=True):
     results: Results
     diagnostics: tuple[Diagnostic, ...]
     scripts: tuple[ScriptLine, ...]
-    labs: tuple[LabLine, ...]
+    labs: tuple[TrialLine, ...]
 
 
 def verify(
@@ -81,12 +81,12 @@ def verify(
     scripts = functools.partial(
         run, chosen, options, progress, memory=memory, run_all=run_all, known=known
     )
-    labs: tuple[LabResult, ...] = ()
+    tried: tuple[TrialResult, ...] = ()
     found = [*extracted.diagnostics, *compiled]
     if trials:
         beside = Memory(options.root, options.store)  # for another thread
         context = TrialContext(options.root, course, dict(models), beside, compiled, static)
-        runs, (labs, wrong) = run_with_trials(scripts, trials, context, progress)
+        runs, (tried, wrong) = run_with_trials(scripts, trials, context, progress)
         found += wrong
     else:
         runs = scripts()
@@ -100,8 +100,10 @@ def verify(
 
         found += repeat_findings(course, chosen, memory.differing)
     found += check_runs(course, runs)
-    results = Results(runs, verdicts, (), models, python_version(), engine_version(), labs)
-    return Verified(results, tuple(found), script_lines(chosen, runs, verdicts), lab_lines(labs))
+    results = Results(runs, verdicts, (), models, python_version(), engine_version(), tried)
+    scripts_ran = script_lines(chosen, runs, verdicts)
+    labs = tuple(trial.line for trial in tried)
+    return Verified(results, tuple(found), scripts_ran, labs)
 
 
 def _chosen(
@@ -168,25 +170,6 @@ class KeptBindings:
         """Keep what was found."""
         if self._now != self._before:
             self._store.put_value("bindings", self._key, sorted(self._now), local=True)
-
-
-def lab_lines(labs: Sequence[LabResult]) -> tuple[LabLine, ...]:
-    """How each lab did, as a report lists it."""
-    return tuple(
-        LabLine(
-            lab.name,
-            lab.title,
-            lab.lesson,
-            lab.status,
-            lab.seconds,
-            lab.steps_per_second,
-            len(lab.tried),
-            lab.parity,
-            lab.cached,
-            lab.unexported,
-        )
-        for lab in labs
-    )
 
 
 # --- models

@@ -264,7 +264,7 @@ class Session:
     ) -> None:
         """Take what verifying a course found, and what else is wrong with it."""
         results, trials = verified.results, self._trials
-        if results.labs != self._results.labs:
+        if results.trials != self._results.trials:
             trials = publish_trials(results, self._assets)
         with self.changed:
             self.found_by_running = (*verified.diagnostics, *others)

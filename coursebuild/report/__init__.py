@@ -10,7 +10,6 @@ from typing import Literal, TypeAlias, assert_never
 from coursebuild.report.terminal import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
 from coursebuild.report.text import to_text
-from coursebuild.report.values import LabLine as LabLine
 from coursebuild.report.values import Report as Report
 from coursebuild.report.values import ScriptLine as ScriptLine
 from coursebuild.report.values import Summary as Summary

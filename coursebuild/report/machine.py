@@ -9,13 +9,14 @@ import json
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
 from coursebuild.report.terminal import Style
 from coursebuild.report.text import diagnostic_text, location
-from coursebuild.report.values import LabLine, Report, ScriptLine, json_text, plain
+from coursebuild.report.values import Report, ScriptLine, json_text, plain
 
 
 def to_json(report: Report) -> str:
@@ -36,7 +37,7 @@ def to_json(report: Report) -> str:
     return json_text(value)
 
 
-def _timed(line: ScriptLine | LabLine) -> dict[str, Any]:
+def _timed(line: ScriptLine | TrialLine) -> dict[str, Any]:
     value: dict[str, Any] = plain(line, unexported="no_python_export")
     return value | {"seconds": round(line.seconds, 3)}
 

@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from typing import assert_never
 
+from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.core.text.source import Span
@@ -29,7 +30,7 @@ from coursebuild.report.terminal import (
     visible,
     visible_lines,
 )
-from coursebuild.report.values import LabLine, Report, ScriptLine, plural, summary_line
+from coursebuild.report.values import Report, ScriptLine, plural, summary_line
 
 
 def to_text(report: Report, style: Style) -> str:
@@ -59,7 +60,7 @@ def script_line(line: ScriptLine, style: Style) -> str:
     return f"{verdict} {line.path}  {style.paint(took, FAINT)}"
 
 
-def lab_line(line: LabLine, style: Style) -> str:
+def lab_line(line: TrialLine, style: Style) -> str:
     """One lab: verdict, name, how fast it ran, what was tried, how it compares."""
     verdict = style.paint(f"{line.status:<8}", GREEN if line.status == "ok" else RED)
     parts = [] if line.steps_per_second is None else [f"{line.steps_per_second:,} steps/s"]

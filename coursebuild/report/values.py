@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.model.results import TrialLine
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.core.text.source import Span
 
@@ -33,26 +34,6 @@ class ScriptLine(Struct, frozen=True):
     cached: bool
     missing: tuple[str, ...] = ()
     """For a skipped one: the modules that are not there."""
-
-
-class LabLine(Struct, frozen=True):
-    """One lab, as a report lists it."""
-
-    name: str
-    title: str
-    lesson: str
-    status: str
-    """`ok` or `failed`."""
-    seconds: float
-    """Wall time of its trial."""
-    steps_per_second: int | None
-    tried: int
-    """How many things were tried."""
-    parity: str
-    """How it compares with native MuJoCo, in words."""
-    cached: bool
-    unexported: str = ""
-    """Why its page offers no Python script, in words."""
 
 
 class Summary(Struct, frozen=True):
@@ -79,7 +60,7 @@ class Report(Struct, frozen=True):
     summary: Summary
     remarks: tuple[str, ...] = ()
     """What was done, a line each, such as the files written."""
-    labs: tuple[LabLine, ...] = ()
+    labs: tuple[TrialLine, ...] = ()
     depends: tuple[str, ...] | None = None
     """Files that all of this depends on beside those in the course's own folders, absolute or
     relative to its root; `None` where they are not known."""

@@ -7,9 +7,10 @@ import xml.etree.ElementTree as ElementTree
 
 from msgspec.structs import replace
 
+from coursebuild.core.model.results import TrialLine
 from coursebuild.core.text.diagnostics import Note, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.report import LabLine, Report, ScriptLine, Style, Summary, render_report
+from coursebuild.report import Report, ScriptLine, Style, Summary, render_report
 
 SOURCE = Source("content/lessons/1.1-a,b.md", "first\nwr\x00ng <&> here\n")
 ERROR = diagnose(
@@ -28,8 +29,8 @@ SCRIPTS = (
     ScriptLine("examples/d.py", "1.1", "norun", 0.0, False),
 )
 LABS = (
-    LabLine("1.1-lab-1", "A & B", "1.1", "ok", 1.23456, 64206, 13, "bit-identical", True),
-    LabLine("1.1-lab-2", "", "1.1", "failed", 0.5, None, 0, "", False),
+    TrialLine("1.1-lab-1", "A & B", "1.1", "ok", 1.23456, 64206, 13, "bit-identical", True),
+    TrialLine("1.1-lab-2", "", "1.1", "failed", 0.5, None, 0, "", False),
 )
 REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 4, 2, 1, 1, 1, 0, 60.25), labs=LABS)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from coursebuild.core.model.results import TrialLine
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.report import (
-    LabLine,
     Report,
     ScriptLine,
     Style,
@@ -120,10 +120,10 @@ def test_colour_is_only_colour() -> None:
 
 def test_labs_are_listed_like_scripts() -> None:
     labs = (
-        LabLine("1.1-lab-1", "A", "1.1", "ok", 1.239, 64206, 13, "bit-identical", False),
-        LabLine("1.1-lab-2", "", "1.1", "ok", 0.1, 1000, 1, "", True, "a `switch`"),
-        LabLine("1.1-lab-3", "", "1.1", "failed", 0.5, None, 0, "", False),
-        LabLine("1.1-lab-4", "", "1.1", "ok", 0.0, None, 0, "", False),
+        TrialLine("1.1-lab-1", "A", "1.1", "ok", 1.239, 64206, 13, "bit-identical", False),
+        TrialLine("1.1-lab-2", "", "1.1", "ok", 0.1, 1000, 1, "", True, "a `switch`"),
+        TrialLine("1.1-lab-3", "", "1.1", "failed", 0.5, None, 0, "", False),
+        TrialLine("1.1-lab-4", "", "1.1", "ok", 0.0, None, 0, "", False),
     )
     report = Report((), (), Summary(1, 0, 0, 0, 0, 0, 0, 2.0), labs=labs)
     assert render_report(report, "text", Style()) == (

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from coursebuild.core.run.lab_engine import LabEngine
-from coursebuild.core.run.native import NativeEngine
+from coursebuild.features.lab.engines.browser import LabEngine
+from coursebuild.features.lab.engines.native import NativeEngine
 
 pytestmark = pytest.mark.engine
 

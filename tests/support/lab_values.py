@@ -10,12 +10,12 @@ from typing import Any
 from coursebuild.core.features import TrialContext, Tried
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CompileResult
-from coursebuild.core.run.lab_engine import LabEngine
-from coursebuild.core.run.native import NativeEngine
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.compile import compile_lab
+from coursebuild.features.lab.engines.browser import LabEngine
+from coursebuild.features.lab.engines.native import NativeEngine
 from coursebuild.features.lab.inputs import SECONDS, lab_trials
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.trial import Engines, LabTrials

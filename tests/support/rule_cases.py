@@ -28,9 +28,9 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.shared import shared_cache
-from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options

@@ -222,55 +222,37 @@ class ModelFacts(Struct, frozen=True):
     sensors: tuple[str, ...] = ()
 
 
-class StaticForm(Struct, frozen=True):
-    """What a page shows of a lab before it starts, on paper and without JavaScript."""
+class TrialLine(Struct, frozen=True):
+    """How a trial did, as a report lists it."""
 
-    picture: bytes
-    """PNG with a clear ground."""
-    size: tuple[int, int]
-    """Width and height in pixels."""
-    time: float
-    """Simulated time of the picture, s."""
-    readouts: tuple[tuple[str, str], ...]
-    """Label and value at the end of the main run."""
-    end: float
-    """Simulated time of the readouts and of the end of the plots, s."""
-    plots: tuple[str, ...]
-    """SVG elements, one a plot."""
-
-
-class LabResult(Struct, frozen=True):
-    """A lab as it was tried, and what its page needs."""
-
-    span: Span
-    """The lab in its lesson, by which it is found again."""
     name: str
     """Unique in the course: `4.2-lab-1`."""
+    title: str
     lesson: str
     """Id of its lesson or page."""
-    title: str
     status: str
-    """`ok`, or `failed`."""
-    module: str
-    """The lab's code as an ES module."""
-    config: str
-    """The lab's data as JSON."""
-    mjb: bytes = b""
-    """Its model."""
+    """`ok` or `failed`."""
     seconds: float = 0.0
-    """Wall time of the trial."""
+    """Wall time."""
     steps_per_second: int | None = None
-    """Of the main run, in V8; `None` where it did not come to its end."""
-    tried: tuple[str, ...] = ()
+    """Of a simulation; `None` where it did not come to its end."""
+    tried: int = 0
+    """How many things were tried."""
     parity: str = ""
-    """How the run compares with native MuJoCo, in words; empty where it was not compared."""
-    static: StaticForm | None = None
+    """How it compares with native MuJoCo, in words; empty where it was not compared."""
     cached: bool = False
-    export: tuple[str, str] | None = None
-    """A Python script that does the same, its name and text: `{{control:N}}` in it stands for the
-    value of control N."""
     unexported: str = ""
-    """Why there is no script, in words."""
+    """Why its page offers no Python script, in words."""
+
+
+class TrialResult(Struct, frozen=True):
+    """What became of a trial, and what its page needs."""
+
+    span: Span
+    """What was tried, as it stands in its lesson, by which it is found again."""
+    line: TrialLine
+    output: Struct
+    """Of a type of the feature's."""
 
 
 class OutputFile(Struct, frozen=True):
@@ -333,4 +315,4 @@ class Results(Struct, frozen=True):
     """Version of the interpreter that ran the scripts."""
     engine: str
     """Version of MuJoCo that ran the scripts."""
-    labs: tuple[LabResult, ...] = ()
+    trials: tuple[TrialResult, ...] = ()

@@ -1,4 +1,4 @@
-"""Runs what a course holds: scripts in processes, formulas and labs in V8, models in MuJoCo.
+"""Runs what a course holds: scripts in processes, formulas in V8, models in MuJoCo.
 
 - `runner`: the lessons' scripts. Its processes, seen from it, are in `workers`; what scripts find
   around them is in `surroundings`
@@ -10,8 +10,6 @@
 - `surroundings`, `packages`, `versions`: what results depend on, as it is now
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
-- `lab_engine` (with `lab_pieces.js`), `lab_files`, `native` (with `native_worker`): labs in the
-  browser's engine and natively
 - `child`: processes that answer
 - `exit_immediately`: the end of this process
 """

@@ -10,16 +10,17 @@ import json
 
 from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model.results import LabResult
-from coursebuild.core.run.native import NativeEngine
+from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.features.lab.engines.native import NativeEngine
+from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.models import model_of_course, saved_model
 
 
 def custom_lab(
     context: TrialContext, native: NativeEngine, trial: Trial, lab: Lab
-) -> tuple[LabResult | None, list[Diagnostic]]:
+) -> tuple[TrialResult | None, list[Diagnostic]]:
     """A lab with its code, its data and, where its JSON has a `model`, that as an MJB file."""
     code = f"content/labs/{lab.kind}.js"
     if code not in context.course.files:
@@ -37,14 +38,10 @@ def custom_lab(
             return None, []  # which is told at the model
         mjb = saved_model(context, native, model)
     config = {"id": trial.name, "kind": lab.kind, "title": lab.fields.title, "data": data}
-    result = LabResult(
-        span=lab.span,
-        name=trial.name,
-        lesson=trial.owner,
-        title=lab.fields.title,
-        status="ok",
+    output = LabOutput(
         module=read_bytes(context.root, code).decode("utf-8", "replace"),
         config=json.dumps(config, ensure_ascii=False, separators=(",", ":")),
         mjb=mjb,
     )
-    return result, []
+    line = TrialLine(trial.name, lab.fields.title, trial.owner, "ok")
+    return TrialResult(lab.span, line, output), []

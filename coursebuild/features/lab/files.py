@@ -13,28 +13,42 @@ import json
 from msgspec import Struct
 
 from coursebuild.core.features import PublishedTrials
-from coursebuild.core.model.results import LabResult, OutputFile, Results
+from coursebuild.core.model.results import OutputFile, Results
 from coursebuild.core.pages.assets import Assets, hashed_name
 
 _FOLDER = "assets/labs"
 
 
-class ShownRecord(Struct, frozen=True):
-    """What a page shows of the trial of a lab."""
+class LabRecord(Struct, frozen=True):
+    """What a page shows of a lab before it starts, on paper and without JavaScript."""
 
-    picture: str
-    """Site path."""
     size: tuple[int, int]
-    """Pixels."""
+    """Of the picture, width and height in pixels."""
     time: float
     """Simulated time of the picture, s."""
     readouts: tuple[tuple[str, str], ...]
+    """Label and value at the end of the main run."""
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[str, ...]
-    """SVG."""
-    tried: int
-    parity: str
+    """SVG elements, one a plot."""
+
+
+class LabOutput(Struct, frozen=True):
+    """What the page of a lab needs."""
+
+    module: str
+    """The lab's code as an ES module."""
+    config: str
+    """The lab's data as JSON."""
+    mjb: bytes = b""
+    """Its model."""
+    record: LabRecord | None = None
+    picture: bytes = b""
+    """PNG with a clear ground, where there is a record."""
+    script: tuple[str, str] | None = None
+    """A Python script that does the same, its name and text: `{{control:N}}` in it stands for the
+    value of control N."""
 
 
 class ShownLab(Struct, frozen=True):
@@ -45,12 +59,16 @@ class ShownLab(Struct, frozen=True):
     """Site path, as of `script`."""
     script: str
     """The page's half of labs, shared by all."""
-    record: ShownRecord | None
+    record: LabRecord | None
+    picture: str
+    """Site path; empty where there is no record."""
+    tried: int
+    parity: str
 
 
 def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
     """Name everything that the labs need; nothing where there are none."""
-    if not results.labs:
+    if not results.trials:
         return PublishedTrials()
     files: dict[str, OutputFile] = {}
 
@@ -63,39 +81,26 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
     worker = publish("worker.js", assets.file("js/lab-worker.js"))
     wasm = publish("mujoco.wasm", assets.file("mujoco/mujoco.wasm"))
     shown = {}
-    for lab in results.labs:
+    for trial in results.trials:
+        if not isinstance(trial.output, LabOutput):
+            continue
+        name, lab = trial.line.name, trial.output
         data = json.loads(lab.config)
         # Labs of the same model share its file.
         parts = {
-            "module": publish(f"{lab.name}.js", lab.module.encode()),
-            "mjb": publish(f"{data.get('model') or lab.name}.mjb", lab.mjb),
+            "module": publish(f"{name}.js", lab.module.encode()),
+            "mjb": publish(f"{data.get('model') or name}.mjb", lab.mjb),
             "worker": worker,
             "wasm": wasm,
         }
         addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
         config = {**data, **addresses}
-        if lab.export is not None:
-            name, text = lab.export
-            config["exportPython"] = {"name": name, "text": text}
+        if lab.script is not None:
+            config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
         text = json.dumps(config, ensure_ascii=False, separators=(",", ":"))
-        static = lab.static
-        picture = publish(f"{lab.name}.png", static.picture) if static is not None else ""
-        address = publish(f"{lab.name}.json", text.encode())
-        shown[lab.name] = ShownLab(lab.name, address, script, _record(lab, picture))
+        picture = publish(f"{name}.png", lab.picture) if lab.record is not None else ""
+        address = publish(f"{name}.json", text.encode())
+        shown[name] = ShownLab(
+            name, address, script, lab.record, picture, trial.line.tried, trial.line.parity
+        )
     return PublishedTrials(shown, tuple(files.values()))
-
-
-def _record(lab: LabResult, picture: str) -> ShownRecord | None:
-    static = lab.static
-    if static is None:
-        return None
-    return ShownRecord(
-        picture=picture,
-        size=static.size,
-        time=static.time,
-        readouts=static.readouts,
-        end=static.end,
-        plots=static.plots,
-        tried=len(lab.tried),
-        parity=lab.parity,
-    )

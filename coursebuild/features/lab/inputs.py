@@ -12,13 +12,13 @@ from typing import Any
 
 from coursebuild.core.features import Trial
 from coursebuild.core.model import Course
-from coursebuild.core.run.lab_files import engine_digest
-from coursebuild.core.run.native import native_digest
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.scripts.extract import owners
 from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab
+from coursebuild.features.lab.engines.files import engine_digest
+from coursebuild.features.lab.engines.native import native_digest
 from coursebuild.features.lab.model import SIMLAB, Lab
 
 SECONDS = 60.0

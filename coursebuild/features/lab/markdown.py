@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from coursebuild.core.model import ModelTarget
 from coursebuild.core.pages.exports.marks import code_span, escaped, link, picture, table
 from coursebuild.core.pages.quantities import number
-from coursebuild.features.lab.files import ShownRecord
+from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.page import (
     control_view,
@@ -32,10 +32,10 @@ def lab_markdown(writer: Plain, lab: Lab) -> str:
     words, texts = writer.words, writer.page.tools.words
     title = title_of(writer.page, lab)
     live = shown_lab(writer.page, lab)
-    record = live.record if live is not None else None
     parts = [f"**{words('lab.label')}: {escaped(title)}**"]
-    if record is not None:
-        parts += _recorded(writer, title, record)
+    record = live.record if live is not None else None
+    if live is not None and record is not None:
+        parts += _recorded(writer, title, live.picture, record)
     parts.append(_about(writer, lab))
     if lab.fields.controls:
         views = [control_view(texts, control) for control in lab.fields.controls]
@@ -47,11 +47,11 @@ def lab_markdown(writer: Plain, lab: Lab) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def _recorded(writer: Plain, title: str, record: ShownRecord) -> Iterator[str]:
+def _recorded(writer: Plain, title: str, image: str, record: LabRecord) -> Iterator[str]:
     """The picture, and the readouts at the end."""
     words, page = writer.words, writer.page
     alt = page.tools.words("lab.picture", title=title, t=number(record.time, 4))
-    yield picture(alt, writer.locate(page.place.href(record.picture)))
+    yield picture(alt, writer.locate(page.place.href(image)))
     if record.readouts:
         yield f"{words('lab.at', t=seconds(record.end))}:"
         rows = [(_cell(label), _cell(value)) for label, value in record.readouts]

@@ -18,7 +18,7 @@ from coursebuild.core.model import ModelTarget
 from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.lab.files import ShownLab, ShownRecord
+from coursebuild.features.lab.files import ShownLab
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.schema import Control, Select, Slider
 
@@ -76,7 +76,7 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
         key=live.name if live is not None else None,
         config=page.place.href(live.config) if live is not None else None,
         script=page.place.href(live.script) if live is not None else None,
-        recorded=_recorded(page, block, live.record) if live is not None else None,
+        recorded=_recorded(page, block, live),
         paper=_paper(page, live.name) if live is not None else None,
         title=title_of(page, block),
         note=page.blocks(block.note),
@@ -117,13 +117,14 @@ def _paper(page: PageContext, name: str) -> PaperView | None:
     return PaperView(code, address, address.partition("://")[2])
 
 
-def _recorded(page: PageContext, block: Lab, record: ShownRecord | None) -> RecordedView | None:
+def _recorded(page: PageContext, block: Lab, live: ShownLab | None) -> RecordedView | None:
     """What the trial recorded; `None` where it did not come to its end."""
-    if record is None:
+    record = live.record if live is not None else None
+    if live is None or record is None:
         return None
     words = page.tools.words
     return RecordedView(
-        page.place.href(record.picture),
+        page.place.href(live.picture),
         record.size[0],
         record.size[1],
         words(
@@ -137,8 +138,8 @@ def _recorded(page: PageContext, block: Lab, record: ShownRecord | None) -> Reco
         words(
             "lab.proven",
             engine=page.shown.engine,
-            tried=str(record.tried),
-            parity=record.parity,
+            tried=str(live.tried),
+            parity=live.parity,
         ),
     )
 

@@ -25,18 +25,20 @@ from pathlib import Path
 from typing import Any, Self
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, Tried
-from coursebuild.core.model.results import LabResult, StaticForm
-from coursebuild.core.run.lab_engine import LabEngine
-from coursebuild.core.run.native import NativeEngine, NativeError
+from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.lab.compile import LabCode, LabModule, compile_lab, pieces
 from coursebuild.features.lab.custom import custom_lab
+from coursebuild.features.lab.engines.browser import LabEngine
+from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from coursebuild.features.lab.export import difference as export_check
 from coursebuild.features.lab.export.trial import LabExport, exported
+from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
 from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.models import LabModel, model_of_lab, saved_model
@@ -92,7 +94,7 @@ class LabTrials:
 
     def run(self, trials: Sequence[Trial]) -> Tried:
         """Try them in turn, and end the engines."""
-        results: list[LabResult] = []
+        results: list[TrialResult] = []
         found: list[Diagnostic] = []
         with self._engines:
             for trial in trials:
@@ -101,7 +103,7 @@ class LabTrials:
                 found += diagnostics
         return tuple(results), tuple(found)
 
-    def _try(self, trial: Trial) -> tuple[LabResult | None, list[Diagnostic]]:
+    def _try(self, trial: Trial) -> tuple[TrialResult | None, list[Diagnostic]]:
         context, engines, lab = self._context, self._engines, trial.block
         assert isinstance(lab, Lab)
         if any(lab.span.contains(diagnostic.span) for diagnostic in context.wrong):
@@ -128,7 +130,7 @@ class _Attempt(Struct, frozen=True):
     lab: Lab
     model: LabModel
 
-    def run(self) -> tuple[LabResult | None, list[Diagnostic]]:
+    def run(self) -> tuple[TrialResult | None, list[Diagnostic]]:
         """What became of it, and what is wrong."""
         began = time.monotonic()
         lab = self.lab
@@ -153,7 +155,6 @@ class _Attempt(Struct, frozen=True):
         found += shallow_diagnostics(lab, reading)
         if parity is not None:
             found += parity_diagnostics(lab, parity)
-        form = self._static(key, reading) if self.context.static and not found else None
         offer = LabExport(None) if found else self._export(reading, parity)
         own = () if lab.xml is not None else (self.model.path,)
         self.context.memory.note_trial(
@@ -164,38 +165,30 @@ class _Attempt(Struct, frozen=True):
             seconds=seconds,
             made=made,
         )
-        result = LabResult(
-            span=lab.span,
+        line = TrialLine(
             name=module.name,
-            lesson=self.trial.owner,
             title=lab.fields.title,
+            lesson=self.trial.owner,
             status="failed" if found else "ok",
             seconds=seconds if cached else time.monotonic() - began,
             steps_per_second=reading.steps_per_second,
-            tried=reading.tried,
+            tried=len(reading.tried),
             parity=_parity_text(reply, parity, offer),
-            module=module.code,
-            config=module.config,
-            mjb=mjb,
-            static=form,
             cached=cached,
-            export=offer.script,
             unexported=offer.reason,
         )
-        return result, [*found, *deep_diagnostics(lab, reading), *reset_diagnostics(lab, reading)]
+        output = LabOutput(module.code, module.config, mjb, script=offer.script)
+        if self.context.static and not found and reading.main is not None:
+            output = self._drawn(output, key, reading.main)
+        found += [*deep_diagnostics(lab, reading), *reset_diagnostics(lab, reading)]
+        return TrialResult(lab.span, line, output), found
 
-    def _failed(self, module: LabModule, began: float) -> LabResult:
+    def _failed(self, module: LabModule, began: float) -> TrialResult:
         """A lab that could not be tried."""
-        return LabResult(
-            span=self.lab.span,
-            name=module.name,
-            lesson=self.trial.owner,
-            title=self.lab.fields.title,
-            status="failed",
-            module=module.code,
-            config=module.config,
-            seconds=time.monotonic() - began,
-        )
+        seconds = time.monotonic() - began
+        title = self.lab.fields.title
+        line = TrialLine(module.name, title, self.trial.owner, "failed", seconds)
+        return TrialResult(self.lab.span, line, LabOutput(module.code, module.config))
 
     def _mistakes(self) -> list[Diagnostic]:
         """What no engine could run."""
@@ -264,20 +257,17 @@ class _Attempt(Struct, frozen=True):
             message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
             yield diagnose("lab-engine", self.lab.span.first_line(), message)
 
-    def _static(self, key: str, trial: TrialReply) -> StaticForm | None:
-        from coursebuild.features.lab.picture.static import draw_picture, static_form
+    def _drawn(self, output: LabOutput, key: str, main: dict[str, Any]) -> LabOutput:
+        """What the page needs, with the record of the main run."""
+        from coursebuild.features.lab.picture.static import draw_picture, lab_record
 
-        lab, main = self.lab, trial.main
-        if main is None:
-            return None
-        digest = hashlib.sha256(f"{key}\0{lab.fields.height}\0{_drawing_digest()}".encode())
-
-        def draw() -> bytes:
-            return draw_picture(lab, main)
-
-        return static_form(
-            lab, main, self.context.memory.store.get_or_create("pictures", digest.hexdigest(), draw)
+        text = f"{key}\0{self.lab.fields.height}\0{_drawing_digest()}"
+        picture = self.context.memory.store.get_or_create(
+            "pictures",
+            hashlib.sha256(text.encode()).hexdigest(),
+            lambda: draw_picture(self.lab, main),
         )
+        return replace(output, record=lab_record(self.lab, main), picture=picture)
 
 
 def _is_lasting(reply: dict[str, Any]) -> bool:

@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import RULES
+from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.build import build
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.export import export

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.features.lab.compile import LabCode, LabModule, compile_lab, pieces
+from coursebuild.features.lab.engines.browser import LabEngine
 from support.lab_values import Bench, make_lab
 
 pytestmark = pytest.mark.engine

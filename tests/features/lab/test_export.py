@@ -13,11 +13,11 @@ from typing import Any, TypeAlias
 
 import pytest
 
-from coursebuild.core.model.results import LabResult, Results
+from coursebuild.core.model.results import Results, TrialResult
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.run.mjcf import compile_all
-from coursebuild.core.run.native import NativeEngine
 from coursebuild.core.run.v8 import Isolate
+from coursebuild.features.lab.engines.native import NativeEngine
 from coursebuild.features.lab.export import trial as lab_export
 from coursebuild.features.lab.export.script import (
     Export,
@@ -31,7 +31,6 @@ from coursebuild.features.lab.files import publish_labs
 from coursebuild.features.lab.trial import Engines
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.verify import lab_lines
 from coursebuild.report import Style
 from coursebuild.report.text import lab_line
 from support.lab_values import BALL, OpenEngines, make_lab, try_labs
@@ -39,7 +38,7 @@ from support.lab_values import BALL, OpenEngines, make_lab, try_labs
 pytestmark = pytest.mark.engine
 
 ROOT = Path(__file__).parents[3]
-Tried: TypeAlias = Callable[..., list[LabResult]]
+Tried: TypeAlias = Callable[..., list[TrialResult]]
 
 METADATA = ExportMetadata("lab_1_1_1.py", "a lab of lesson 1.1, “First”", "A course", "3.14.0", 1.0)
 
@@ -113,7 +112,7 @@ def open_engines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenEngin
 def tried(course: Path, open_engines: OpenEngines) -> Tried:
     """Tries the labs of a lesson."""
 
-    def tried(*labs: dict[str, Any]) -> list[LabResult]:
+    def tried(*labs: dict[str, Any]) -> list[TrialResult]:
         return try_all(course, open_engines, *labs)
 
     return tried
@@ -130,7 +129,7 @@ def course(tmp_path: Path) -> Path:
     return root
 
 
-def try_all(root: Path, engines: Engines, *labs: dict[str, Any]) -> list[LabResult]:
+def try_all(root: Path, engines: Engines, *labs: dict[str, Any]) -> list[TrialResult]:
     """The labs of a lesson after their trials."""
     fences = "".join(f"```lab\n{json.dumps(lab, ensure_ascii=False)}\n```\n\n" for lab in labs)
     (root / "content" / "lessons" / "1.1-first.md").write_text(f"## First\n\n{fences}")
@@ -147,10 +146,10 @@ def exported(**fields: Any) -> Export | str:
     return export_script(make_lab(**fields), METADATA)
 
 
-def script(root: Path, result: LabResult, *values: object) -> str:
+def script(root: Path, result: TrialResult, *values: object) -> str:
     """What a script prints with these values in place of the marks."""
-    assert result.export is not None, result.unexported
-    name, text = result.export
+    assert result.output.script is not None, result.line.unexported
+    name, text = result.output.script
     for i, value in enumerate(values):
         text = text.replace(f"{{{{control:{i}}}}}", repr(value))
     path = root / name
@@ -176,8 +175,8 @@ def test_the_labs_of_lesson_4_2_are_exported(tmp_path: Path) -> None:
     documents = frozenset({lesson.path})
     results, found = try_labs(loaded.course, options, Engines(root), facts, documents=documents)
     assert found == ()
-    ours = {r.name: r for r in results if r.tried}
-    assert {name: r.unexported for name, r in ours.items()} == dict.fromkeys(ours, "")
+    ours = {r.line.name: r for r in results if r.line.tried}
+    assert {name: r.line.unexported for name, r in ours.items()} == dict.fromkeys(ours, "")
     assert len(ours) == 2
     (root / "examples").mkdir()
     first = ours["4.2-lab-1"]
@@ -189,7 +188,7 @@ def test_the_labs_of_lesson_4_2_are_exported(tmp_path: Path) -> None:
 
 def test_everything_at_once(tried: Tried, course: Path) -> None:
     (result,) = tried(RICH)
-    assert result.unexported == ""
+    assert result.line.unexported == ""
     printed = script(course, result, 2, 0.3, -9.81, 0.125, 1, "free").splitlines()
     assert printed[6] == "state: flies" or printed[6] == "state: touches"
     assert printed[8] == "steps: 200" and printed[11] == "time: 1 s"
@@ -261,8 +260,8 @@ def test_a_model_of_several_files_has_no_script() -> None:
 def test_a_reason_is_told_and_nothing_offered(tried: Tried) -> None:
     lab = {"xml": PENDULUM, "setup": "data.qpos[0] = Math.random()", "verify": {"seconds": 0.1}}
     (result,) = tried(lab)
-    assert result.status == "ok" and result.export is None
-    assert result.unexported == "`Math.random` with 0 arguments has no counterpart in Python"
+    assert result.line.status == "ok" and result.output.script is None
+    assert result.line.unexported == "`Math.random` with 0 arguments has no counterpart in Python"
 
 
 def wrong(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
@@ -296,8 +295,10 @@ def test_a_script_that_differs_is_withheld(
 ) -> None:
     wrong(monkeypatch, old, new)
     (result,) = tried(RICH)
-    assert result.export is None and result.unexported.startswith(reason), result.unexported
-    assert result.status == "ok"
+    assert result.output.script is None and result.line.unexported.startswith(reason), (
+        result.line.unexported
+    )
+    assert result.line.status == "ok"
 
 
 def test_a_script_that_never_ends_is_withheld(
@@ -306,7 +307,10 @@ def test_a_script_that_never_ends_is_withheld(
     wrong(monkeypatch, "    step(model", "    pass; 0 and step(model")
     with NativeEngine(course, seconds=2.0) as native:
         (result,) = try_all(course, open_engines.but(native=native), RICH)
-    assert (result.export, result.unexported) == (None, "the script took longer than 2 s")
+    assert (result.output.script, result.line.unexported) == (
+        None,
+        "the script took longer than 2 s",
+    )
 
 
 def test_where_the_engines_agree_the_last_bit_counts(
@@ -314,13 +318,13 @@ def test_where_the_engines_agree_the_last_bit_counts(
 ) -> None:
     lab = {"xml": BALL, "setup": "data.qvel[0] = 1 / 3", "verify": {"seconds": 0.1}}
     (result,) = tried(lab)
-    assert (result.parity, result.unexported) == (
+    assert (result.line.parity, result.line.unexported) == (
         "bit-identical to native MuJoCo over 50 steps",
         "",
     )
     wrong(monkeypatch, "1 / 3", "1 / 3 + 1e-16")
     (result,) = tried(lab)
-    assert result.unexported == "its state at the end is not that of the lab"
+    assert result.line.unexported == "its state at the end is not that of the lab"
 
 
 def test_functions_of_the_c_library_may_differ_in_the_last_bit(tried: Tried) -> None:
@@ -328,7 +332,7 @@ def test_functions_of_the_c_library_may_differ_in_the_last_bit(tried: Tried) -> 
     export = exported(**lab)
     assert isinstance(export, Export) and not export.exact
     (result,) = tried(lab)
-    assert result.unexported == ""
+    assert result.line.unexported == ""
 
 
 def test_what_changes_the_model_is_compared_too(
@@ -336,13 +340,15 @@ def test_what_changes_the_model_is_compared_too(
 ) -> None:
     lab = {"xml": PENDULUM, "controller": "model.opt.gravity[0] = sim.time > 0.5 ? 2 : 0"}
     (result,) = tried(lab)
-    assert result.parity == "compared with native MuJoCo as its Python export"
-    assert result.unexported == ""
+    assert result.line.parity == "compared with native MuJoCo as its Python export"
+    assert result.line.unexported == ""
     wrong(monkeypatch, "data.time > 0.5", "data.time > 0.25")
     (result,) = tried(lab)
-    assert result.unexported.startswith("its state after 200 steps is apart from the lab's by ")
+    assert result.line.unexported.startswith(
+        "its state after 200 steps is apart from the lab's by "
+    )
     why = "its controller changes the model"
-    assert result.parity == f"not compared with native MuJoCo: {why}"
+    assert result.line.parity == f"not compared with native MuJoCo: {why}"
 
 
 def test_the_comparison_is_kept(tried: Tried, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -351,7 +357,7 @@ def test_the_comparison_is_kept(tried: Tried, monkeypatch: pytest.MonkeyPatch) -
     runs: list[object] = []
     monkeypatch.setattr(NativeEngine, "script", lambda self, request: runs.append(request))
     (second,) = tried(lab)
-    assert second.cached and second.export == first.export and runs == []
+    assert second.line.cached and second.output.script == first.output.script and runs == []
 
 
 def test_a_short_trial_and_a_stop(tried: Tried) -> None:
@@ -362,7 +368,7 @@ def test_a_short_trial_and_a_stop(tried: Tried) -> None:
         {"xml": PENDULUM, "stopAt": 0.2, "verify": {"seconds": 0.5}},
         {"xml": PENDULUM, "verify": {"seconds": 0.0125}},
     ]
-    assert [result.unexported for result in tried(*labs)] == [""] * 4
+    assert [result.line.unexported for result in tried(*labs)] == [""] * 4
 
 
 def test_names_of_files() -> None:
@@ -377,7 +383,7 @@ def test_a_failed_lab_offers_nothing(course: Path) -> None:
     assert loaded.course is not None
     options = Options(root=course, jobs=1, quiet=True)
     (result,), found = try_labs(loaded.course, options, Engines(course))
-    assert len(found) == 1 and result.export is None and result.unexported == ""
+    assert len(found) == 1 and result.output.script is None and result.line.unexported == ""
 
 
 def test_the_page_gets_the_script_and_the_report_the_reason(tried: Tried) -> None:
@@ -390,9 +396,9 @@ def test_the_page_gets_the_script_and_the_report_the_reason(tried: Tried) -> Non
     )
     configs = [json.loads(f.data) for f in published.files if f.path.endswith(".json")]
     scripts = [config.get("exportPython") for config in configs]
-    assert results[0].export is not None
-    assert scripts == [dict(zip(("name", "text"), results[0].export, strict=True)), None]
-    lines = [lab_line(line, Style()) for line in lab_lines(results)]
+    assert results[0].output.script is not None
+    assert scripts == [dict(zip(("name", "text"), results[0].output.script, strict=True)), None]
+    lines = [lab_line(result.line, Style()) for result in results]
     assert "no Python export" not in lines[0]
     assert "no Python export: `Math.random` with 0 arguments has no counterpart" in lines[1]
 

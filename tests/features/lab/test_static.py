@@ -15,7 +15,7 @@ import pytest
 from coursebuild.features.lab.picture.draw import Solid
 from coursebuild.features.lab.picture.light import light_of
 from coursebuild.features.lab.picture.scenery import scene_solids
-from coursebuild.features.lab.picture.static import _shown, draw_picture, static_form
+from coursebuild.features.lab.picture.static import _shown, draw_picture, lab_record
 from coursebuild.features.lab.reply import unpack_arrays
 from support.lab_values import Bench, make_lab
 from support.png_files import read_png
@@ -254,8 +254,7 @@ def test_readouts_and_plots_belong_to_the_run(bench: Bench) -> None:
             {"ylabel": "u", "traces": [{"label": "b", "expr": "0"}, {"label": "c", "expr": "1"}]},
         ],
     )
-    form = static_form(lab, main, b"PNG")
-    assert form.picture == b"PNG"
+    form = lab_record(lab, main)
     assert form.size == (640, 320)
     assert (form.time, form.end) == (0, pytest.approx(0.5))
     assert form.readouts == (("t", "0.50"), ("word", "<late>"), ("tiny", "0.000"))
@@ -307,5 +306,5 @@ def test_arrays_come_back_as_they_were() -> None:
 
 def test_the_size_of_the_picture_follows_the_lab(tmp_path: Path) -> None:
     main = {"plots": {"times": [], "plots": []}, "pictures": [{"time": 0, "readouts": None}]}
-    sizes = [static_form(make_lab(height=h), main, b"").size for h in (80, 260, 480, 2000)]
+    sizes = [lab_record(make_lab(height=h), main).size for h in (80, 260, 480, 2000)]
     assert sizes == [(640, 160), (640, 347), (640, 480), (640, 480)]

@@ -15,15 +15,15 @@ import pytest
 
 from coursebuild.core.features import Trial
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.run.lab_engine import LabEngine
-from coursebuild.core.run.lab_files import engine_digest
 from coursebuild.core.run.mjcf import compile_all
-from coursebuild.core.run.native import NativeEngine, native_digest
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.checks import labs_in
+from coursebuild.features.lab.engines.browser import LabEngine
+from coursebuild.features.lab.engines.files import engine_digest
+from coursebuild.features.lab.engines.native import NativeEngine, native_digest
 from coursebuild.features.lab.inputs import trial_inputs
 from coursebuild.pipeline.options import Options
 from support.lab_lessons import BALL, RIGHT, Make, checked, course, fence
@@ -150,7 +150,7 @@ def test_failure_of_a_lab_is_kept_and_one_that_took_too_long_is_not(tmp_path: Pa
     with closing(OpenEngines(tmp_path)) as engines:
         for seconds in (0.2, 60.0):
             results, wrong = try_labs(course, options, engines, models, seconds=seconds)
-            found.append(([d.rule for d in wrong], [result.cached for result in results]))
+            found.append(([d.rule for d in wrong], [result.line.cached for result in results]))
     assert found == [
         (["lab-throws", "lab-timeout"], [False, False]),
         (["lab-throws"], [True, False]),

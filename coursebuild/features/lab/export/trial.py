@@ -16,8 +16,8 @@ from msgspec import Struct
 
 from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.model import Course
-from coursebuild.core.run.native import NativeEngine, NativeError
 from coursebuild.core.run.versions import engine_version
+from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from coursebuild.features.lab.export import difference as export_check
 from coursebuild.features.lab.export.script import (
     Export,
@@ -148,7 +148,7 @@ def _others(lab: Lab) -> list[dict[int, float | str]]:
 @functools.lru_cache(maxsize=1)
 def _digest() -> str:
     """A hash of how a script is run and held against the lab."""
-    from coursebuild.core.run import native_worker
+    from coursebuild.features.lab.engines import native_worker
 
     files = (native_worker.__file__, export_check.__file__)
     return hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()

@@ -1,6 +1,6 @@
 """The static form of a lab: what its trial recorded, as a picture, plots and a table.
 
-Entry points: `draw_picture(lab, main)`, `static_form(lab, main, picture)`; `png(pixels)`.
+Entry points: `draw_picture(lab, main)`, `lab_record(lab, main)`; `png(pixels)`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coursebuild.core.model.results import StaticForm
+from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.picture.draw import FreeCamera, draw
 from coursebuild.features.lab.picture.light import light_of
@@ -67,8 +67,8 @@ def _size(lab: Lab) -> tuple[int, int]:
     return (_WIDTH, max(160, min(round(_WIDTH * lab.fields.height / 480), 480)))
 
 
-def static_form(lab: Lab, main: dict[str, Any], picture: bytes) -> StaticForm:
-    """The static form of a lab whose trial's main run is `main`."""
+def lab_record(lab: Lab, main: dict[str, Any]) -> LabRecord:
+    """What a page shows of a lab whose trial's main run is `main`."""
     first, last = main["pictures"][0], main["pictures"][-1]
     recorded = main["plots"]
     plots = tuple(
@@ -79,7 +79,7 @@ def static_form(lab: Lab, main: dict[str, Any], picture: bytes) -> StaticForm:
         (readout.label, _shown(value, readout.digits))
         for readout, value in zip(lab.fields.readouts, last["readouts"] or (), strict=False)
     )
-    return StaticForm(picture, _size(lab), first["time"], readouts, last["time"], plots)
+    return LabRecord(_size(lab), first["time"], readouts, last["time"], plots)
 
 
 def _shown(value: Any, digits: int) -> str:

@@ -1,6 +1,6 @@
 """The files that a trial runs besides the lab itself.
 
-Entry points: `wasm_path`, `script_path`, `engine_digest`. They are apart from `lab_engine`, as who
+Entry points: `wasm_path`, `script_path`, `engine_digest`. They are apart from `browser`, as who
 only asks for the digest needs no V8.
 """
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coursebuild.core.run.native import NativeEngine, NativeError, native_digest
+from coursebuild.features.lab.engines.native import NativeEngine, NativeError, native_digest
 from support.lab_values import BALL, Bench, make_lab, xml_of
 
 pytestmark = pytest.mark.site

@@ -11,8 +11,8 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from coursebuild.core.run import native_worker
 from coursebuild.core.run.child import JsonChild
+from coursebuild.features.lab.engines import native_worker
 
 
 class NativeError(Exception):
@@ -67,7 +67,7 @@ class NativeEngine(JsonChild):
             NativeError: the child died.
             EffectError: MuJoCo cannot be loaded.
         """
-        library = str(Path(__file__).resolve().parents[3])
+        library = str(Path(__file__).resolve().parents[4])
         return self._request({"task": "script", "library": library, **request})
 
     def _request(self, request: dict[str, Any]) -> dict[str, Any]:

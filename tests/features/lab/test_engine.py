@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.run import lab_engine, lab_files
-from coursebuild.core.run.lab_engine import LabEngine
 from coursebuild.core.run.v8 import StoppedError
 from coursebuild.core.run.versions import engine_version
+from coursebuild.features.lab.engines import browser, files
+from coursebuild.features.lab.engines.browser import LabEngine
 from support.lab_values import BALL, Bench, make_lab, request
 from support.runners import computed, wait_until
 
@@ -199,7 +199,7 @@ def test_an_interrupt_ends_a_trial_and_the_process() -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=Path(lab_engine.__file__).parents[3],
+        cwd=Path(browser.__file__).parents[4],
     )
     with process:
         assert process.stdout is not None
@@ -242,11 +242,11 @@ def test_an_engine_that_is_damaged(
     folder = tmp_path / "assets"
     for name in ("mujoco/mujoco.wasm", "js/lab-trial.js"):
         (folder / name).parent.mkdir(parents=True)
-        (folder / name).write_bytes((lab_files.assets_dir() / name).read_bytes())
+        (folder / name).write_bytes((files.assets_dir() / name).read_bytes())
     wasm = folder / "mujoco/mujoco.wasm"
     wasm.write_bytes(wasm.read_bytes()[:100_000])
     with monkeypatch.context() as damaged:
-        damaged.setattr(lab_files, "assets_dir", lambda: folder)
+        damaged.setattr(files, "assets_dir", lambda: folder)
         with pytest.raises(EffectError, match=r"the browser.s engine does not start: .*Compile"):
             bench.trial(make_lab())
     assert told(bench.trial(make_lab())) == []

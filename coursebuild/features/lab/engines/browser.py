@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.run.lab_files import script_path, wasm_path
 from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
+from coursebuild.features.lab.engines.files import script_path, wasm_path
 
 _MEMORY = 1 << 30
 """Bytes: the engine's WebAssembly memory counts."""
 _START_SECONDS = 60.0
-_PIECES = Path(__file__).with_name("lab_pieces.js")
+_PIECES = Path(__file__).with_name("pieces.js")
 
 
 class LabEngine:

@@ -1,5 +1,5 @@
 /**
- * Is each piece of lab code one of the kind that it should be? Called by `lab_engine.py` in V8: JSON in, JSON out.
+ * Is each piece of lab code one of the kind that it should be? Called by `browser.py` in V8: JSON in, JSON out.
  *
  * 1. It must parse by itself: one that only parses together with what is put around it could end its function and begin another.
  *    An expression must therefore parse between round and between square brackets.
