@@ -15,11 +15,8 @@ from coursebuild.cli.output import CLEAN, WRONG, style_of, write
 
 if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
-    from coursebuild.pipeline.reports import Measurement
+    from coursebuild.report.measuring import Measurement
     from coursebuild.report.terminal import Style
-
-_AROUND = ("diagnostics", "failures", "checked", "remarks")
-"""What is said around the figures."""
 
 
 def bench(arguments: argparse.Namespace) -> int:
@@ -30,13 +27,14 @@ def bench(arguments: argparse.Namespace) -> int:
     from coursebuild.report.bench import bench_text
     from coursebuild.report.bench_json import bench_values
 
-    work = benching.bench
-    if arguments.record or arguments.check:
-        work = benching.record if arguments.record else benching.check
     plot = None if arguments.plot is None else benching.plot_file(arguments.plot)
 
     def measure(options: Options) -> Measurement[Any]:
-        found = work(options, tuple(arguments.scenes), quick=arguments.quick)
+        names, quick = tuple(arguments.scenes), arguments.quick
+        if arguments.check:
+            found = benching.check(options, names, quick=quick)
+        else:
+            found = benching.bench(options, names, quick=quick, record=arguments.record)
         if plot is None:
             return found
         return replace(found, remarks=(*found.remarks, *benching.write_plots(plot, found.reports)))
@@ -58,10 +56,13 @@ def stability(arguments: argparse.Namespace) -> int:
     from coursebuild.report.measuring import stability_text
     from coursebuild.report.values import json_text
 
-    work = cases.stability
-    if arguments.record or arguments.check:
-        work = cases.record_stability if arguments.record else cases.check_stability
-    _, found = _measured(arguments, lambda options: work(options, tuple(arguments.problems)))
+    def measure(options: Options) -> Measurement[Any]:
+        names = tuple(arguments.problems)
+        if arguments.check:
+            return cases.check_stability(options, names)
+        return cases.stability(options, names, record=arguments.record)
+
+    _, found = _measured(arguments, measure)
     if arguments.format == "json" and not (arguments.record or arguments.check):
         return write(json_text(found.reports), CLEAN)
     shown = () if arguments.check else found.reports
@@ -73,13 +74,12 @@ def diet(arguments: argparse.Namespace) -> int:
     """Say what models hold that their scenarios do not need."""
     from msgspec.structs import replace
 
-    from coursebuild.pipeline import diet as dieting
+    from coursebuild.pipeline.diet import diet
     from coursebuild.report.diet import diet_text, diet_values
 
-    work = dieting.fix if arguments.fix else dieting.record if arguments.record else dieting.diet
+    how = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
     options, found = _measured(
-        arguments,
-        lambda options: work(options, tuple(arguments.models), quick=arguments.quick),
+        arguments, lambda options: diet(options, tuple(arguments.models), **how)
     )
     if options.quiet and arguments.format == "text":
         if found.ok:
@@ -116,8 +116,7 @@ def _write(
     from coursebuild.report.measuring import measured_json, measured_text
 
     status = CLEAN if found.ok else WRONG
-    around = {name: getattr(found, name) for name in _AROUND}
     if arguments.format == "json":
-        return write(measured_json(values, **around), status)
+        return write(measured_json(values, found), status)
     style = style_of(sys.stdout)
-    return write(measured_text(text(style), style, **around) or empty, status)
+    return write(measured_text(text(style), found, style) or empty, status)

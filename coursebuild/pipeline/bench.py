@@ -1,13 +1,11 @@
 """`coursebuild bench`: speed against error of the course's models.
 
-Entry points: `bench(options, names, quick=…)`, `record(…)`, `check(…)`; `write_plots(file, …)`.
+Entry points: `bench(options, names, …)`, `check(…)`; `write_plots(file, …)`.
 
 1. Names mean models. One that does not compile is told, and the others are measured.
 2. What was measured is kept under all that it depends on, a scenario at a time: a run that was
    stopped goes on where it was. Times say something of this machine only, so they are not shared.
-3. One run of a course measures at a time, since two would disturb each other's times; the second
-   finds what the first has measured.
-4. `record` writes what was measured into `content/reports/`; `check` measures again, whatever is
+3. Recording writes what was measured into `content/reports/`; checking measures again, whatever is
    kept, and holds figures of accuracy against what is recorded there.
 """
 
@@ -16,32 +14,32 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from msgspec.structs import replace
 
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.scenarios import Bands
-from coursebuild.core.text.diagnostics import sort_diagnostics
+from coursebuild.core.run.machine import machine
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
-from coursebuild.numerics.reports.records import (
-    BENCH,
-    ReportFailure,
-    bench_path,
-    decode_bench,
-    encode_bench,
-)
+from coursebuild.numerics.reports.records import BENCH, FOLDER, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.reports import (
-    Measurement,
-    command,
+    MeasuringRun,
+    forbid_quick,
+    machine_parts,
     read_record,
-    recorded_models,
-    write_records,
+    with_records,
 )
-from coursebuild.pipeline.scene_run import Measuring, SceneRun
 from coursebuild.pipeline.scenes import CourseScene, Scenes, find_scenes
+from coursebuild.report.measuring import Measurement
+
+_CODE = ("coursebuild/numerics", "coursebuild/pipeline/measuring.py", "mjcourse/spatial")
+"""What measures and says what was measured."""
 
 
 def bench(
@@ -49,47 +47,26 @@ def bench(
     names: tuple[str, ...] = (),
     *,
     quick: bool = False,
-    measuring: Measuring | None = None,
+    record: bool = False,
+    measuring: Any = None,
 ) -> Measurement[SceneReport]:
     """Measure the models that the names mean; all where there are none.
 
-    Raises:
-        UsageError: no model is called so.
-    """
-    return _measured(options, names, measuring, quick=quick)
-
-
-def _measured(
-    options: Options,
-    names: tuple[str, ...],
-    measuring: Measuring | None,
-    *,
-    quick: bool,
-    cards: bool = False,
-) -> Measurement[SceneReport]:
-    found = find_scenes(options.root, names)
-    run = SceneRun(options, measuring, quick=quick, cards=cards)
-    reports = run.all(found.scenes)
-    return Measurement(reports, sort_diagnostics((*found.diagnostics, *run.diagnostics)))
-
-
-def record(
-    options: Options,
-    names: tuple[str, ...] = (),
-    *,
-    quick: bool = False,
-    measuring: Measuring | None = None,
-) -> Measurement[SceneReport]:
-    """Measure, and write each model's report into the course.
+    `record`: each model's report is also written into the course. `measuring`: what measures, if
+    not the module `pipeline.measuring`.
 
     Raises:
-        UsageError: no model is called so, or only a part is to be measured.
+        UsageError: no model is called so, or only a part is to be recorded.
     """
-    _whole("--record", quick=quick)
-    found = _measured(options, names, measuring, quick=False, cards=True)
-    records = ((bench_path(one.model), encode_bench(one)) for one in found.reports)
-    failures, remarks = write_records(options.root, records)
-    return replace(found, failures=failures, remarks=remarks)
+    if record:
+        forbid_quick("--record", quick=quick)
+    run = SceneRun(options, measuring, quick=quick, cards=record)
+    scenes = find_scenes(options.root, names)
+    found = run.all(scenes.scenes, scenes.diagnostics)
+    if not record:
+        return found
+    records = ((BENCH.path(one.model), BENCH.encode(one)) for one in found.reports)
+    return with_records(options.root, found, records)
 
 
 def check(
@@ -97,7 +74,7 @@ def check(
     names: tuple[str, ...] = (),
     *,
     quick: bool = False,
-    measuring: Measuring | None = None,
+    measuring: Any = None,
 ) -> Measurement[SceneReport]:
     """Measure again, and hold it against what is recorded.
 
@@ -106,70 +83,131 @@ def check(
     Raises:
         UsageError: no model is called so, or only a part is to be measured.
     """
-    _whole("--check", quick=quick)
-    found = find_scenes(options.root, names)
-    failures: list[ReportFailure] = []
+    forbid_quick("--check", quick=quick)
+    scenes = find_scenes(options.root, names)
+    run = SceneRun(options, measuring, again=True)
     recorded: dict[str, SceneReport] = {}
-    for scene in found.scenes:
-        report, failure = _recorded(options, scene.name)
-        if report is not None:
+    for scene in scenes.scenes:
+        report = read_record(options.root, BENCH, scene.name)
+        if isinstance(report, ReportFailure):
+            run.failures.append(report)
+        else:
             recorded[scene.name] = report
-        if failure is not None:
-            failures.append(failure)
-    run = SceneRun(options, measuring, quick=False, again=True)
-    reports = run.all([scene for scene in found.scenes if scene.name in recorded])
-    bands = {scene.name: _bands(scene) for scene in found.scenes}
-    checked = [_checked(recorded[one.model], one, bands[one.model]) for one in reports]
-    return Measurement(
-        reports,
-        sort_diagnostics((*found.diagnostics, *run.diagnostics)),
-        tuple(checked),
-        tuple(failures),
-        () if names else _of_no_model(options, found),
-    )
+    run.remarks += () if names else _of_no_model(options, scenes)
+    known = {scene.name: scene for scene in scenes.scenes if scene.name in recorded}
+    found = run.all(tuple(known.values()), scenes.diagnostics)
+    checked = [_checked(recorded[one.model], one, known[one.model]) for one in found.reports]
+    return replace(found, checked=tuple(checked))
 
 
-def _whole(option: str, *, quick: bool) -> None:
-    if quick:
-        raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
-
-
-def _bands(scene: CourseScene) -> Bands:
-    return Bands() if scene.declared is None else scene.declared.bands
-
-
-def _recorded(options: Options, model: str) -> tuple[SceneReport | None, ReportFailure | None]:
-    path, make = bench_path(model), command("bench", (model,), "--record")
-    found, failure = read_record(options.root, path, decode_bench, make)
-    if found is not None and found.model != model:
-        why = f"{path} holds a report of the model `{found.model}`"
-        return None, ReportFailure(why, f"make it again with `{make}`")
-    if found is not None and found.quick:
-        why = f"{path} holds a report of `{BENCH} --quick`, which measures only a part"
-        return None, ReportFailure(why, f"make it again with `{make}`")
-    return found, failure
-
-
-def _checked(recorded: SceneReport, measured: SceneReport, bands: Bands) -> Checked:
+def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -> Checked:
     remarks = []
     if recorded.digest != measured.digest:
         remarks.append("the model or its scenarios have changed since it was recorded")
-    for what, old, new in (
-        ("MuJoCo", recorded.machine.engine, measured.machine.engine),
-        ("NumPy", recorded.machine.numpy, measured.machine.numpy),
-        ("Python", recorded.machine.python, measured.machine.python),
-        ("", recorded.machine.system, measured.machine.system),
+    old, new = recorded.machine, measured.machine
+    for what, before, now in (
+        ("MuJoCo ", old.engine, new.engine),
+        ("NumPy ", old.numpy, new.numpy),
+        ("Python ", old.python, new.python),
+        ("", old.system, new.system),
     ):
-        if old != new:
-            remarks.append(f"recorded with {what} {old}, measured with {new}".replace("  ", " "))
+        if before != now:
+            remarks.append(f"recorded with {what}{before}, measured with {now}")
+    bands = Bands() if scene.declared is None else scene.declared.bands
     departures = scene_departures(recorded, measured, bands)
-    return Checked(measured.model, bench_path(measured.model), departures, tuple(remarks))
+    return Checked(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
 
 
-def _of_no_model(options: Options, found: Scenes) -> tuple[str, ...]:
+def _of_no_model(options: Options, found: Scenes) -> Iterator[str]:
     """Recorded reports that nothing is held against any more."""
-    gone = sorted(recorded_models(options.root) - set(found.names))
-    return tuple(f"{bench_path(name)} belongs to no model" for name in gone)
+    folder = options.root / FOLDER
+    for path in sorted(folder.rglob(f"*{BENCH.suffix}")) if folder.is_dir() else ():
+        name = path.relative_to(folder).as_posix().removesuffix(BENCH.suffix)
+        if name not in found.names and not name.startswith("."):
+            yield f"{BENCH.path(name)} belongs to no model"
+
+
+# --------------------------------------------------------------------------------------- measuring
+
+
+class SceneRun(MeasuringRun):
+    """Measures scenes one after the other."""
+
+    def __init__(
+        self,
+        options: Options,
+        measuring: Any,
+        *,
+        quick: bool = False,
+        again: bool = False,
+        cards: bool = False,
+    ) -> None:
+        super().__init__(options, again=again)  # again, times do not matter
+        self.quick = quick
+        self.cards = cards
+        """Whether it is also told what the models are made of."""
+        self._measuring = measuring
+
+    def all(
+        self, scenes: Sequence[CourseScene], diagnostics: Sequence[Diagnostic]
+    ) -> Measurement[SceneReport]:
+        """Every scene that can be measured; with what is wrong with the others."""
+        self.diagnostics += diagnostics
+        self.here, self.code = machine(), code_digest(*_CODE)
+        return self.each(scenes, self._one)
+
+    def _one(self, scene: CourseScene) -> SceneReport | None:
+        parts = (scene.name, scene.digest, f"{self.quick}", self.code, *machine_parts(self.here))
+        whole = (*parts, f"{self.cards}")
+        return self.once(
+            scene.name, "bench", whole, SceneReport, lambda: self._report(scene, parts)
+        )
+
+    def _report(self, scene: CourseScene, parts: tuple[str, ...]) -> SceneReport | None:
+        scenarios = self._scenarios(scene, parts)
+        if scenarios is None:
+            return None
+        report = SceneReport(scene.name, scene.digest, self.quick, self.here, scenarios)
+        if self.cards and scenarios:
+            self.progress.doing(scene.name, "what it is made of")
+            report = self.measuring.with_card(self.options.root, scene, report)
+        return report
+
+    def _scenarios(
+        self, scene: CourseScene, parts: tuple[str, ...]
+    ) -> tuple[ScenarioReport, ...] | None:
+        """Each scenario, from what is kept or measured now; nothing where one cannot be."""
+        loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
+        if isinstance(loaded, Diagnostic):
+            self.diagnostics.append(loaded)
+            return None
+        reports = []
+        for number in range(len(loaded.scenarios)):
+            own = (*parts, f"{number}")
+            found = self.kept("bench-scenarios", own, ScenarioReport)
+            if found is None:
+                found = self.measuring.measured(
+                    loaded,
+                    number,
+                    quick=self.quick,
+                    timed=not self.again,
+                    tell=lambda text: self.progress.doing(scene.name, text),
+                )
+                if isinstance(found, Diagnostic):
+                    self.diagnostics.append(found)
+                    return None
+                self.keep("bench-scenarios", own, found)
+            reports.append(found)
+        return tuple(reports)
+
+    @property
+    def measuring(self) -> Any:
+        """What measures, which is heavy."""
+        if self._measuring is None:
+            from coursebuild.pipeline import measuring
+
+            self._measuring = measuring
+        return self._measuring
 
 
 # ------------------------------------------------------------------------------------------- plots

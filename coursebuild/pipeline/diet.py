@@ -1,12 +1,11 @@
 """`coursebuild diet`: what models of the course hold that their scenarios do not need.
 
-Entry points: `diet(options, names, …)`, and `fix` and `record`, which also write.
+Entry point: `diet(options, names, …)`.
 
 1. Names mean models. One that does not compile is told, and the others are looked at.
 2. Who reads a model are the files of the course that mention it; what any of them reads is no
    finding. A finding that is wanted stands in `models/NAME.toml` with its reason.
-3. What was found is kept under all that it depends on, as of `bench`; and one run of a course
-   measures at a time.
+3. What was found is kept under all that it depends on, as of `bench`.
 4. `fix` makes the changes after which every bit is the same, until there is none left: what
    something needed that is gone may go as well. The files are read again, compiled and run before
    they are written; a file that changed meanwhile is left as it is.
@@ -14,7 +13,8 @@ Entry points: `diet(options, names, …)`, and `fix` and `record`, which also wr
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 from msgspec.structs import replace
 
@@ -22,91 +22,69 @@ from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_course
 from coursebuild.core.run.machine import machine
-from coursebuild.core.text.diagnostics import sort_diagnostics
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.diet import DietReport
-from coursebuild.numerics.reports.records import ReportFailure, diet_path, encode_diet
+from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.pipeline.diet_model import CannotError, DietModel
-from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reports import (
-    Measurement,
     MeasuringRun,
-    digest_of,
+    forbid_quick,
     machine_parts,
-    write_records,
+    with_records,
 )
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
+from coursebuild.report.measuring import Measurement
 
 if TYPE_CHECKING:
     from coursebuild.numerics.pruning.ablation import Survey
     from coursebuild.numerics.pruning.model_text import ModelText
 
-_KIND = "diet"
+_T = TypeVar("_T")
 _CODE = ("coursebuild/numerics", "coursebuild/pipeline/diet_model.py", "mjcourse/spatial")
 _ROUNDS = 20
 """Most times that something new is found after something was changed."""
 
 
 def diet(
-    options: Options, names: tuple[str, ...] = (), *, quick: bool = False
+    options: Options,
+    names: tuple[str, ...] = (),
+    *,
+    quick: bool = False,
+    fix: bool = False,
+    record: bool = False,
 ) -> Measurement[DietReport]:
     """Look at the models that the names mean; at all where there are none.
 
-    Raises:
-        UsageError: no model is called so.
-    """
-    return _diet(options, names, quick=quick)
-
-
-def _diet(
-    options: Options, names: tuple[str, ...], *, quick: bool, fix: bool = False
-) -> Measurement[DietReport]:
-    found = find_scenes(options.root, names)
-    run = _DietRun(options, quick=quick, fix=fix)
-    reports = run.each("looking at models", found.scenes, run.look_at)
-    diagnostics = sort_diagnostics((*found.diagnostics, *run.diagnostics))
-    return Measurement(
-        reports, diagnostics, failures=tuple(run.failures), remarks=tuple(run.remarks)
-    )
-
-
-def record(
-    options: Options, names: tuple[str, ...] = (), *, quick: bool = False
-) -> Measurement[DietReport]:
-    """Look at models, and write each report into the course.
+    `fix`: the changes that change no bit are made, and the reports are of what is left. `record`:
+    each report is also written into the course.
 
     Raises:
-        UsageError: no model is called so, or only a part is to be measured.
+        UsageError: no model is called so, or only a part is to be recorded.
     """
-    if quick:
-        raise UsageError("--record takes no --quick: what is recorded is measured in full")
-    found = diet(options, names)
-    records = ((diet_path(one.model), encode_diet(one)) for one in found.reports)
-    failures, remarks = write_records(options.root, records)
-    return replace(found, failures=failures, remarks=remarks)
-
-
-def fix(
-    options: Options, names: tuple[str, ...] = (), *, quick: bool = False
-) -> Measurement[DietReport]:
-    """Look at models, and make the changes that change no bit; the reports are of what is left.
-
-    Raises:
-        UsageError: no model is called so.
-    """
-    return _diet(options, names, quick=quick, fix=True)
+    if record:
+        forbid_quick("--record", quick=quick)
+    scenes = find_scenes(options.root, names)
+    run = _DietRun(options, scenes.diagnostics, quick=quick, fix=fix)
+    found = run.each(scenes.scenes, run.look_at)
+    if not record:
+        return found
+    records = ((DIET.path(one.model), DIET.encode(one)) for one in found.reports)
+    return with_records(options.root, found, records)
 
 
 class _DietRun(MeasuringRun):
     """Looks at models one after the other."""
 
-    done = "looked at"
+    stage, done = "looking at models", "looked at"
 
-    def __init__(self, options: Options, *, quick: bool, fix: bool = False) -> None:
+    def __init__(
+        self, options: Options, diagnostics: Sequence[Diagnostic], *, quick: bool, fix: bool
+    ) -> None:
         super().__init__(options)
+        self.diagnostics += diagnostics
         self.quick = quick
         self.fix = fix
-        self.failures: list[ReportFailure] = []
-        self.remarks: list[str] = []
         self.files = read_course(options.root).value
         self.here = machine()
         self.code = code_digest(*_CODE)
@@ -114,10 +92,11 @@ class _DietRun(MeasuringRun):
     def look_at(self, scene: CourseScene) -> DietReport | None:
         """What is found in a model; `None` where it cannot be looked at, or not be changed."""
         look = DietModel(self.options.root, self.files, scene)
-        key = self._key(look)
-        return self.one(scene.name, lambda: self._kept(key), lambda: self._looked(look, key))
+        return self.once(
+            scene.name, "diet", self._parts(look), DietReport, lambda: self._looked(look)
+        )
 
-    def _looked(self, look: DietModel, key: str) -> DietReport | None:
+    def _looked(self, look: DietModel) -> DietReport | None:
         from coursebuild.numerics.engine import silent
 
         try:
@@ -126,12 +105,7 @@ class _DietRun(MeasuringRun):
         except CannotError as error:
             self.diagnostics.append(error.diagnostic)
             return None
-        if report is not None:
-            report = replace(report, digest=look.digest())
-            # Somebody else may have changed the files while we waited.
-            if report.digest == look.scene.digest:
-                self.options.store.put_value(_KIND, key, report, local=True)
-        return report
+        return None if report is None else replace(report, digest=look.digest())
 
     def _surveyed(self, look: DietModel) -> tuple[DietReport, Survey, ModelText]:
         tell = lambda text: self.progress.doing(look.scene.name, text)  # noqa: E731
@@ -162,8 +136,9 @@ class _DietRun(MeasuringRun):
             self.remarks.append(f"changed {path}: {', '.join(dict.fromkeys(kinds.get(path, ())))}")
         return report
 
-    def _key(self, look: DietModel) -> str:
-        parts = [look.scene.name, look.scene.digest, f"{self.quick}", self.code]
+    def _parts(self, look: DietModel) -> tuple[str, ...]:
+        """All that what is found depends on; first the digest of the model."""
+        parts = [look.scene.digest, look.scene.name, f"{self.quick}", self.code]
         parts += machine_parts(self.here)
         declared = look.scene.declared
         for one in () if declared is None else declared.keep:
@@ -171,11 +146,16 @@ class _DietRun(MeasuringRun):
             parts.append(f"{one.finding}\0{one.reason}\0{place.line}:{place.column}")
         parts += [f"{path}\0{why}" for path, why in look.locked.items()]
         parts += [f"{reader.path}\0{reader.text}" for reader in look.readers.files]
-        return digest_of(parts)
+        return tuple(parts)
 
-    def _kept(self, key: str) -> DietReport | None:
+    def kept(self, kind: str, parts: Sequence[str], what: type[_T]) -> _T | None:
         """What was found before, if there is nothing in it to fix where that is wanted."""
-        kept = self.options.store.get_value(_KIND, key, DietReport)
-        if kept is not None and self.fix and any(one.fixable for one in kept.findings):
+        found = super().kept(kind, parts, what)
+        if self.fix and isinstance(found, DietReport) and any(o.fixable for o in found.findings):
             return None
-        return kept
+        return found
+
+    def keep(self, kind: str, parts: Sequence[str], value: object) -> None:
+        """Keep what was found, unless the files changed meanwhile, by us or somebody else."""
+        if isinstance(value, DietReport) and value.digest == parts[0]:
+            super().keep(kind, parts, value)

@@ -39,7 +39,7 @@ from coursebuild.core.scripts.dependencies import (
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.remembered import RunRecord
 from coursebuild.core.text.diagnostics import nearest
-from coursebuild.numerics.reports.records import bench_path
+from coursebuild.numerics.reports.records import BENCH
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
 from coursebuild.pipeline.remember import Memory
@@ -217,7 +217,7 @@ def _uses(document: Document, path: str) -> Iterator[object]:
 
 def _shown_of(model: str) -> tuple[str, str]:
     """The files of which a report on a model is shown."""
-    return f"models/{model}.xml", bench_path(model)
+    return f"models/{model}.xml", BENCH.path(model)
 
 
 def _local(url: str, document: Document, path: str) -> bool:

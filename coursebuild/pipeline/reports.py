@@ -1,54 +1,31 @@
 """What `bench`, `stability` and `diet` find, and reports of it in the course's folder.
 
-Entry points: `MeasuringRun`, `Measurement`; `read_record`, `write_records`, `recorded_models`.
+Entry points: `MeasuringRun`, which gives a `Measurement`; `read_record`, `with_records`.
 """
 
 from __future__ import annotations
 
 import hashlib
-import shlex
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import TypeVar
 
-from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import resolve_inside, write_atomic
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.numerics.reports.bench import Machine
-from coursebuild.numerics.reports.departures import Checked
-from coursebuild.numerics.reports.records import FOLDER, RecordError, ReportFailure
-from coursebuild.pipeline.options import Options
+from coursebuild.numerics.reports.records import RecordError, ReportFailure, ReportKind
+from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
+from coursebuild.report.measuring import Measurement
 
 _T = TypeVar("_T")
 _A = TypeVar("_A")
-_SUFFIX = ".bench.json"
-_LOCK = "bench-lock"
-
-
-class Measurement(Struct, Generic[_T], frozen=True):
-    """What a run of a command that measures found."""
-
-    reports: tuple[_T, ...]
-    """On models by name, on hard cases by number."""
-    diagnostics: tuple[Diagnostic, ...] = ()
-    """Of models and what is declared for them."""
-    checked: tuple[Checked, ...] = ()
-    failures: tuple[ReportFailure, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def ok(self) -> bool:
-        """Whether everything was measured, is as it was recorded, and nothing is to be done."""
-        departed = any(one.departures for one in self.checked)
-        wrong = any(one.severity is Severity.ERROR for one in self.diagnostics)
-        open_ones = any(not getattr(one, "ok", True) for one in self.reports)
-        return not (wrong or self.failures or departed or open_ones)
 
 
 class MeasuringRun:
@@ -58,42 +35,67 @@ class MeasuringRun:
     finds what the first has measured.
     """
 
-    done = "measured"
-    """What is said of a thing when it is done."""
+    stage, done = "measuring", "measured"
+    """What is said while things are measured, and of a thing that was."""
+    local = True
+    """Whether what is found says something of this machine only."""
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: Options, *, again: bool = False) -> None:
         self.options = options
+        self.again = again
+        """Whether nothing is taken from what is kept, nor kept."""
         self.diagnostics: list[Diagnostic] = []
+        self.failures: list[ReportFailure] = []
+        self.remarks: list[str] = []
         self.progress = Progress(quiet=options.quiet)
         options.store.listen(self.progress.say)
 
-    def each(
-        self, stage: str, things: Sequence[_A], one: Callable[[_A], _T | None]
-    ) -> tuple[_T, ...]:
+    def each(self, things: Sequence[_A], one: Callable[[_A], _T | None]) -> Measurement[_T]:
         """What there is on each thing."""
-        if not things:
-            return ()
-        with self.progress.stage(stage, len(things)):
-            found = [one(thing) for thing in things]
-        return tuple(report for report in found if report is not None)
+        found: list[_T | None] = []
+        if things:
+            with self.progress.stage(self.stage, len(things)):
+                found = [one(thing) for thing in things]
+        return Measurement(
+            tuple(report for report in found if report is not None),
+            sort_diagnostics(self.diagnostics),
+            failures=tuple(self.failures),
+            remarks=tuple(self.remarks),
+        )
 
-    def one(
-        self, name: str, kept: Callable[[], _T | None], measure: Callable[[], _T | None]
+    def once(
+        self,
+        name: str,
+        kind: str,
+        parts: Sequence[str],
+        what: type[_T],
+        measure: Callable[[], _T | None],
     ) -> _T | None:
-        """What is kept of a thing, or is measured now."""
-        found = kept()
+        """What is kept of a thing under all that it depends on, or is measured now."""
+        found = self.kept(kind, parts, what)
         if found is None:
-            with project_lock(self.options.root, self.progress.say, name=_LOCK):
-                found = kept()  # by whom we waited for, perhaps
+            with project_lock(self.options.root, self.progress.say, name="bench-lock"):
+                found = self.kept(kind, parts, what)  # by whom we waited for, perhaps
                 if found is None:
                     self.progress.started(name)
                     began = time.monotonic()
                     found = measure()
                     verdict = f"not {self.done}" if found is None else self.done
                     self.progress.finished(name, verdict, time.monotonic() - began)
+                    if found is not None:
+                        self.keep(kind, parts, found)
                     return found
         self.progress.known()
         return found
+
+    def kept(self, kind: str, parts: Sequence[str], what: type[_T]) -> _T | None:
+        """What was made of these before."""
+        return None if self.again else self.options.store.get_value(kind, digest_of(parts), what)
+
+    def keep(self, kind: str, parts: Sequence[str], value: object) -> None:
+        """Keep what was made of these."""
+        if not self.again:
+            self.options.store.put_value(kind, digest_of(parts), value, local=self.local)
 
 
 def digest_of(parts: Iterable[str]) -> str:
@@ -107,32 +109,44 @@ def machine_parts(here: Machine) -> tuple[str, ...]:
     return here.engine, here.python, here.numpy, here.system, here.cpu
 
 
-def command(name: str, names: Sequence[str], option: str) -> str:
-    """What to type, such as `coursebuild bench arm --record`."""
-    return " ".join(["coursebuild", name, *map(shlex.quote, names), option])
+def forbid_quick(option: str, *, quick: bool) -> None:
+    """Say that an option is for what was measured in full.
+
+    Raises:
+        UsageError: it was not.
+    """
+    if quick:
+        raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
 
 
 def read_record(
-    root: Path, path: str, decode: Callable[[bytes], _T], make: str
-) -> tuple[_T, None] | tuple[None, ReportFailure]:
-    """A recorded report, or why there is none; `make` is the command that makes it."""
+    root: Path,
+    kind: ReportKind[_T],
+    model: str = "",
+    decode: Callable[[ReportKind[_T], bytes, str], _T] = ReportKind.decode,
+) -> _T | ReportFailure:
+    """The recorded report on a model (or on the hard cases), or why there is none."""
+    path, make = kind.path(model), kind.command(model)
     if not (root / path).exists() and not (root / path).is_symlink():
-        return None, ReportFailure(f"{path} is not there", f"make it with `{make}`, and commit it")
+        return ReportFailure(f"{path} is not there", f"make it with `{make}`, and commit it")
     try:
-        return decode(read_bytes(root, path)), None
+        return decode(kind, read_bytes(root, path), model)
     except EffectError as error:
-        return None, ReportFailure(error.message, error.help)
+        return ReportFailure(error.message, error.help)
     except RecordError as error:
-        return None, ReportFailure(f"{path} {error.message}", f"make it again with `{make}`")
+        return ReportFailure(f"{path} {error.message}", f"make it again with `{make}`")
 
 
-def write_records(
-    root: Path, records: Iterable[tuple[str, bytes]]
-) -> tuple[tuple[ReportFailure, ...], tuple[str, ...]]:
-    """Write reports, by their paths; what could not be written, and what was done in words."""
+def with_records(
+    root: Path, found: Measurement[_T], records: Iterable[tuple[str, bytes]]
+) -> Measurement[_T]:
+    """Write reports, by their paths, and say so."""
     said = [_write_record(root, path, data) for path, data in records]
-    failures = tuple(one for one in said if isinstance(one, ReportFailure))
-    return failures, tuple(one for one in said if isinstance(one, str))
+    return replace(
+        found,
+        failures=tuple(one for one in said if isinstance(one, ReportFailure)),
+        remarks=tuple(one for one in said if isinstance(one, str)),
+    )
 
 
 def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
@@ -149,11 +163,3 @@ def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
     except OSError as error:
         return ReportFailure(f"{path} cannot be written: {reason(error)}")
     return f"wrote {path}"
-
-
-def recorded_models(root: Path) -> frozenset[str]:
-    """The names of the models that recorded reports of `bench` are there for."""
-    folder = root / FOLDER
-    found = folder.rglob(f"*{_SUFFIX}") if folder.is_dir() else iter(())
-    names = (path.relative_to(folder).as_posix().removesuffix(_SUFFIX) for path in found)
-    return frozenset(name for name in names if not name.startswith("."))

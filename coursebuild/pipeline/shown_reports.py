@@ -9,13 +9,11 @@ of MuJoCo that is installed. Any other is left out of the site, and told.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model import Course
+from coursebuild.core.model import Course, MjcfModel
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source
@@ -25,12 +23,11 @@ if TYPE_CHECKING:  # a course without reports needs none of it
     from coursebuild.numerics.reports.bench import SceneReport
     from coursebuild.numerics.reports.cases import CaseReport
     from coursebuild.numerics.reports.diet import DietReport
+    from coursebuild.numerics.reports.records import ReportKind
 
     _Scene = TypeVar("_Scene", SceneReport, DietReport)
 
 _FOLDER = "content/reports/"
-_CASES = f"{_FOLDER}stability.json"
-_BENCH, _DIET = ".bench.json", ".diet.json"
 _T = TypeVar("_T")
 
 
@@ -50,102 +47,76 @@ class _Reader:
         self._found: list[Diagnostic] = []
 
     def read(self, paths: Iterable[str]) -> Parsed[Reports]:
-        from coursebuild.numerics.reports.records import decode_bench, decode_diet, decode_stability
+        from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
 
         scenes: dict[str, SceneReport] = {}
         diets: dict[str, DietReport] = {}
         cases: tuple[CaseReport, ...] = ()
         for path in paths:
             name = path.removeprefix(_FOLDER)
-            if path == _CASES:
-                make = "coursebuild stability --record"
-                told = self._decoded(path, decode_stability, make)
-                engines = {one.engine for one in told or ()}
-                if told is not None and self._is_of_this_engine(path, engines, make):
-                    cases = told
-            elif name.endswith(_BENCH):
-                model = name.removesuffix(_BENCH)
-                scene = self._of_model(path, model, "bench", decode_bench)
-                if scene is not None:
-                    scenes[model] = scene
-            elif name.endswith(_DIET):
-                model = name.removesuffix(_DIET)
-                diet = self._of_model(path, model, "diet", decode_diet)
-                if diet is not None:
-                    diets[model] = diet
+            if path == STABILITY.path():
+                cases = self._decoded(STABILITY) or ()
+                if not self._is_of_this_engine(STABILITY, "", {one.engine for one in cases}):
+                    cases = ()
+            elif name.endswith(BENCH.suffix):
+                scenes |= self._of_model(BENCH, name.removesuffix(BENCH.suffix))
+            elif name.endswith(DIET.suffix):
+                diets |= self._of_model(DIET, name.removesuffix(DIET.suffix))
         return Parsed(Reports(scenes, diets, cases), tuple(self._found))
 
-    def _of_model(
-        self, path: str, model: str, kind: str, decode: Callable[[bytes], _Scene]
-    ) -> _Scene | None:
-        """The report on a model, if it fits."""
-        from coursebuild.pipeline.reports import command
-
-        make = command(kind, (model,), "--record")
-        if model not in self._models:
-            near = nearest(model, self._models)
+    def _of_model(self, kind: ReportKind[_Scene], name: str) -> dict[str, _Scene]:
+        """The report on a model by its name, if it fits."""
+        path, model = kind.path(name), self._models.get(name)
+        if model is None:
+            near = nearest(name, self._models)
             help = f"is it of `{near}`?" if near is not None else "remove it"
-            self._told(path, f"the report {path} belongs to no model", help)
-            return None
-        report = self._decoded(path, decode, make)
+            self._tell(path, f"the report {path} belongs to no model", help)
+            return {}
+        report = self._decoded(kind, name)
         if report is None:
-            return None
-        if report.model != model:
-            message = f"the report {path} is of the model `{report.model}`"
-            self._told(path, message, _again(make))
-        elif report.quick:
-            message = f"the report {path} was made with --quick, and is not shown"
-            self._told(path, message, _again(make))
-        elif report.digest != self._digest(model):
-            message = (
-                f"the report {path} is not shown: `{model}`, its files or its scenarios have "
-                "changed since"
-            )
-            self._told(path, message, _again(make))
-        elif self._is_of_this_engine(path, {report.machine.engine}, make):
-            return report
-        return None
+            return {}
+        if report.digest != self._digest(model):
+            why = f"`{name}`, its files or its scenarios have changed since"
+            self._leave_out(kind, name, why)
+            return {}
+        fits = self._is_of_this_engine(kind, name, {report.machine.engine})
+        return {name: report} if fits else {}
 
-    def _decoded(self, path: str, decode: Callable[[bytes], _T], make: str) -> _T | None:
-        from coursebuild.numerics.reports.records import RecordError
-
-        try:
-            found: _T = _decoded(decode, read_bytes(self._root, path))
-            return found
-        except EffectError as error:
-            self._told(path, error.message, error.help)
-        except RecordError as error:
-            self._told(path, f"the report {path} {error.message}", _again(make))
-        return None
-
-    def _is_of_this_engine(self, path: str, engines: Iterable[str], make: str) -> bool:
-        others = sorted(set(engines) - {self._engine})
-        if others:
-            message = (
-                f"the report {path} is not shown: it is of MuJoCo {', '.join(others)}, and "
-                f"{self._engine} is installed"
-            )
-            self._told(path, message, _again(make))
-        return not others
-
-    def _digest(self, name: str) -> str:
+    def _digest(self, model: MjcfModel) -> str:
         from coursebuild.pipeline.scenes import scene_digest
 
-        if name not in self._digests:
-            model, declared = self._models[name], self._declared.get(name)
-            self._digests[name] = scene_digest(self._root, model, declared)
-        return self._digests[name]
+        if model.name not in self._digests:
+            declared = self._declared.get(model.name)
+            self._digests[model.name] = scene_digest(self._root, model, declared)
+        return self._digests[model.name]
 
-    def _told(self, path: str, message: str, help: str) -> None:
+    def _decoded(self, kind: ReportKind[_T], model: str = "") -> _T | None:
+        from coursebuild.numerics.reports.records import ReportFailure
+        from coursebuild.pipeline.reports import read_record
+
+        found = read_record(self._root, kind, model, _decode)
+        if isinstance(found, ReportFailure):
+            self._tell(kind.path(model), found.message, found.help)
+            return None
+        return found
+
+    def _is_of_this_engine(self, kind: ReportKind[_T], model: str, engines: set[str]) -> bool:
+        others = sorted(engines - {self._engine})
+        if others:
+            why = f"it is of MuJoCo {', '.join(others)}, and {self._engine} is installed"
+            self._leave_out(kind, model, why)
+        return not others
+
+    def _leave_out(self, kind: ReportKind[_T], model: str, why: str) -> None:
+        path, help = kind.path(model), f"make it again with `{kind.command(model)}`"
+        self._tell(path, f"the report {path} is not shown: {why}", help)
+
+    def _tell(self, path: str, message: str, help: str) -> None:
         place = Source(path, "").span(0, 0)
         self._found.append(diagnose("report-stale", place, message, help=help))
 
 
 @functools.lru_cache(maxsize=32)
-def _decoded(decode: Callable[[bytes], _T], data: bytes) -> _T:
+def _decode(kind: ReportKind[_T], data: bytes, model: str) -> _T:
     """What a preview reads at each save, and few of them change."""
-    return decode(data)
-
-
-def _again(make: str) -> str:
-    return f"make it again with `{make}`"
+    return kind.decode(data, model)

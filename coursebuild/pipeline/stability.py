@@ -1,6 +1,6 @@
 """`coursebuild stability`: measure MuJoCo on the hard cases, beside what theory says.
 
-Entry points: `stability(options, names)`; `record_stability`, `check_stability`.
+Entry points: `stability(options, names)`, `check_stability`.
 
 1. Names mean problems, or families of them: `damped-spring` is all of its damping ratios.
 2. What was measured is kept under the engine's version, the kind of machine and the code that
@@ -13,111 +13,46 @@ from __future__ import annotations
 
 import platform
 
+from msgspec.structs import replace
+
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.versions import engine_version, package_version, python_version
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.departures import Checked, case_departures
-from coursebuild.numerics.reports.records import (
-    STABILITY_PATH,
-    ReportFailure,
-    decode_stability,
-    encode_stability,
-)
+from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.reports import (
-    Measurement,
-    MeasuringRun,
-    command,
-    digest_of,
-    read_record,
-    write_records,
-)
+from coursebuild.pipeline.reports import MeasuringRun, read_record, with_records
+from coursebuild.report.measuring import Measurement
 
-_KIND = "stability"
 _CODE = ("coursebuild/numerics", "mjcourse/spatial")
 """What measures and says what was measured."""
 
 
-def stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
+def stability(
+    options: Options, names: tuple[str, ...] = (), *, record: bool = False
+) -> Measurement[CaseReport]:
     """What was measured on the problems that the names mean; on all where there are none.
+
+    `record`: it is also written into the course.
 
     Raises:
         UsageError: no problem is called so.
     """
-    return Measurement(_measured(options, names))
-
-
-def _measured(
-    options: Options, names: tuple[str, ...], *, again: bool = False
-) -> tuple[CaseReport, ...]:
-    """`again`: measured now, whatever is kept."""
-    from coursebuild.numerics.cases import measure_case
-    from coursebuild.numerics.problems import problem_named, problem_names
-
-    run, store, state = MeasuringRun(options), options.store, _state()
-
-    def one(name: str) -> CaseReport | None:
-        key = digest_of((name, *state))
-
-        def measure() -> CaseReport:
-            report = measure_case(problem_named(name))
-            store.put_value(_KIND, key, report)
-            return report
-
-        def kept() -> CaseReport | None:
-            return None if again else store.get_value(_KIND, key, CaseReport)
-
-        return run.one(name, kept, measure)
-
-    return run.each("measuring", _chosen(names, problem_names()), one)
-
-
-def _state() -> tuple[str, ...]:
-    """All that a figure depends on beside the problem's name."""
-    versions = (engine_version(), package_version("numpy"), python_version())
-    return (*versions, platform.system(), platform.machine(), code_digest(*_CODE))
-
-
-def _chosen(names: tuple[str, ...], known: tuple[str, ...]) -> list[str]:
-    if not names:
-        return list(known)
-    wanted: set[str] = set()
-    for name in names:
-        found = {one for one in known if one == name or one.startswith(f"{name}-")}
-        if not found:
-            near = nearest(name, known)
-            all_of_them = "known: " + ", ".join(known)
-            help = all_of_them if near is None else f"did you mean `{near}`?"
-            raise UsageError(f"no hard case is called `{name}`; {help}")
-        wanted |= found
-    return [one for one in known if one in wanted]
-
-
-# ------------------------------------------------------------------------------------- the record
-
-
-def record_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
-    """Measure the cases that the names mean, and write them into the course; all without names.
-
-    Raises:
-        UsageError: no case is called so.
-    """
-    from coursebuild.numerics.problems import problem_names
-
-    measured = _measured(options, names)
-    known = frozenset(problem_names())
+    found = _CaseRun(options).all(names)
+    if not record:
+        return found
     others: list[CaseReport] = []
-    if names and (options.root / STABILITY_PATH).exists():
-        found, failure = _recorded(options)
-        if failure is not None:
-            return Measurement(measured, failures=(failure,))
-        new = {case.name for case in measured}
-        others = [case for case in found or () if case.name in known - new]
-    record = STABILITY_PATH, encode_stability([*others, *measured])
-    failures, remarks = write_records(options.root, [record])
-    return Measurement(measured, failures=failures, remarks=remarks)
+    if names and (options.root / STABILITY.path()).exists():
+        old = read_record(options.root, STABILITY)
+        if isinstance(old, ReportFailure):
+            return replace(found, failures=(old,))
+        new = {case.name for case in found.reports}
+        others = [case for case in old if case.name in _known() and case.name not in new]
+    cases = sorted([*others, *found.reports], key=lambda case: (case.case, case.name))
+    records = [(STABILITY.path(), STABILITY.encode(tuple(cases)))]
+    return with_records(options.root, found, records)
 
 
 def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
@@ -128,20 +63,53 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     Raises:
         UsageError: no case is called so.
     """
-    recorded, failure = _recorded(options)
-    if recorded is None:
-        return Measurement((), failures=() if failure is None else (failure,))
-    measured = _measured(options, names, again=True)
-    new = {case.name for case in measured}
+    recorded = read_record(options.root, STABILITY)
+    if isinstance(recorded, ReportFailure):
+        return Measurement((), failures=(recorded,))
+    found = _CaseRun(options, again=True).all(names)
+    new = {case.name for case in found.reports}
     old = [case for case in recorded if not names or case.name in new]
-    engines = sorted({case.engine for case in old} - {case.engine for case in measured})
-    here = ", ".join(sorted({case.engine for case in measured}))
-    remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in engines)
-    departures = case_departures(old, measured, Bands())
-    checked = Checked("stability", STABILITY_PATH, departures, remarks)
-    return Measurement(measured, checked=(checked,))
+    here = engine_version()
+    others = sorted({case.engine for case in old} - {here})
+    remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in others)
+    departures = case_departures(old, found.reports, Bands())
+    return replace(found, checked=(Checked("stability", STABILITY.path(), departures, remarks),))
 
 
-def _recorded(options: Options) -> tuple[tuple[CaseReport, ...] | None, ReportFailure | None]:
-    make = command("stability", (), "--record")
-    return read_record(options.root, STABILITY_PATH, decode_stability, make)
+class _CaseRun(MeasuringRun):
+    """Measures hard cases one after the other."""
+
+    local = False
+
+    def all(self, names: tuple[str, ...]) -> Measurement[CaseReport]:
+        """Those that the names mean."""
+        versions = (engine_version(), package_version("numpy"), python_version())
+        state = (*versions, platform.system(), platform.machine(), code_digest(*_CODE))
+        return self.each(_chosen(names), lambda name: self._one(name, state))
+
+    def _one(self, name: str, state: tuple[str, ...]) -> CaseReport | None:
+        from coursebuild.numerics.cases import measure_case
+        from coursebuild.numerics.problems import problem_named
+
+        measure = lambda: measure_case(problem_named(name))  # noqa: E731
+        return self.once(name, "stability", (name, *state), CaseReport, measure)
+
+
+def _known() -> tuple[str, ...]:
+    from coursebuild.numerics.problems import problem_names
+
+    return problem_names()
+
+
+def _chosen(names: tuple[str, ...]) -> list[str]:
+    known = _known()
+    wanted = set() if names else set(known)
+    for name in names:
+        found = {one for one in known if one == name or one.startswith(f"{name}-")}
+        if not found:
+            near = nearest(name, known)
+            all_of_them = "known: " + ", ".join(known)
+            help = all_of_them if near is None else f"did you mean `{near}`?"
+            raise UsageError(f"no hard case is called `{name}`; {help}")
+        wanted |= found
+    return [one for one in known if one in wanted]

@@ -1,13 +1,17 @@
 """What `bench`, `stability` and `diet` print around what they measured; the tables of `stability`.
 
-Entry points: `measured_text`, `measured_json`; `checked_text`, `failure_text`; `stability_text`.
+Entry points: `Measurement`, `measured_text`, `measured_json`; `checked_text`, `failure_text`;
+`stability_text`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Generic, TypeVar
 
-from coursebuild.core.text.diagnostics import Diagnostic
+from msgspec import Struct
+
+from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
@@ -30,41 +34,42 @@ from coursebuild.report.terminal import (
 from coursebuild.report.text import diagnostic_text
 from coursebuild.report.values import json_text, plural
 
+_T = TypeVar("_T")
 
-def measured_text(
-    measured: str,
-    style: Style,
-    *,
-    diagnostics: Sequence[Diagnostic] = (),
-    failures: Sequence[ReportFailure] = (),
-    checked: Sequence[Checked] = (),
-    remarks: Sequence[str] = (),
-) -> str:
+
+class Measurement(Struct, Generic[_T], frozen=True):
+    """What a run of a command that measures found."""
+
+    reports: tuple[_T, ...]
+    """On models by name, on hard cases by number."""
+    diagnostics: tuple[Diagnostic, ...] = ()
+    """Of models and what is declared for them."""
+    failures: tuple[ReportFailure, ...] = ()
+    checked: tuple[Checked, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything was measured, is as it was recorded, and nothing is to be done."""
+        departed = any(one.departures for one in self.checked)
+        wrong = any(one.severity is Severity.ERROR for one in self.diagnostics)
+        open_ones = any(not getattr(one, "ok", True) for one in self.reports)
+        return not (wrong or self.failures or departed or open_ones)
+
+
+def measured_text(measured: str, found: Measurement[_T], style: Style) -> str:
     """What is wrong, what was measured, how it differs from what was recorded, what was done."""
-    parts = [diagnostic_text(one, style) + "\n" for one in diagnostics]
-    parts += ["".join(failure_text(one, style) for one in failures), measured]
-    parts += [checked_text(checked, style), "".join(f"{visible(one)}\n" for one in remarks)]
+    parts = [diagnostic_text(one, style) + "\n" for one in found.diagnostics]
+    parts += ["".join(failure_text(one, style) for one in found.failures), measured]
+    parts += [checked_text(found.checked, style)]
+    parts += ["".join(f"{visible(one)}\n" for one in found.remarks)]
     return "\n".join(part for part in parts if part)
 
 
-def measured_json(
-    measured: Mapping[str, object],
-    *,
-    diagnostics: Sequence[Diagnostic] = (),
-    failures: Sequence[ReportFailure] = (),
-    checked: Sequence[Checked] = (),
-    remarks: Sequence[str] = (),
-) -> str:
+def measured_json(measured: Mapping[str, object], found: Measurement[_T]) -> str:
     """The same as one JSON object."""
-    return json_text(
-        {
-            **measured,
-            "diagnostics": diagnostics,
-            "failures": failures,
-            "checked": checked,
-            "remarks": remarks,
-        }
-    )
+    around = {name: getattr(found, name) for name in Measurement.__struct_fields__[1:]}
+    return json_text({**measured, **around})
 
 
 def failure_text(failure: ReportFailure, style: Style) -> str:

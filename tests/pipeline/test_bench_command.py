@@ -14,7 +14,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
-from coursebuild.numerics.reports.records import decode_bench, encode_bench
+from coursebuild.numerics.reports.records import BENCH
 from support.measured_course import BOX, PATH, TOML, bench_course, write
 from support.scratch_course import ROOT
 
@@ -63,10 +63,10 @@ def test_bench_check_compares_with_what_was_recorded(
     assert run(course, "--check", "-q") == 0
     assert capsys.readouterr().out == f"box  as recorded in {PATH}\n"
     path = course / PATH
-    report = decode_bench(path.read_bytes())
+    report = BENCH.decode(path.read_bytes())
     (one,) = report.scenarios
     wrong = tuple(replace(r, velocity=(0.5, 0.5)) if r.own else r for r in one.rows)
-    path.write_bytes(encode_bench(replace(report, scenarios=(replace(one, rows=wrong),))))
+    path.write_bytes(BENCH.encode(replace(report, scenarios=(replace(one, rows=wrong),))))
     assert run(course, "--check", "-q") == 1
     out = capsys.readouterr().out
     assert out.startswith(f"box  2 figures not as recorded in {PATH}\n\n  swing\n")

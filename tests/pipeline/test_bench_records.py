@@ -9,11 +9,11 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
-from coursebuild.numerics.reports.records import decode_bench, encode_bench
-from coursebuild.pipeline.bench import check, record
+from coursebuild.numerics.reports.records import BENCH
+from coursebuild.pipeline.bench import bench, check
 from coursebuild.pipeline.options import UsageError
-from coursebuild.pipeline.reports import Measurement
 from coursebuild.pipeline.scenes import find_scenes
+from coursebuild.report.measuring import Measurement
 from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, swing, write
 
 pytestmark = pytest.mark.site
@@ -26,18 +26,9 @@ def course(tmp_path: Path) -> Path:
 
 def recorded(course: Path, *found: ScenarioReport) -> Measurement[SceneReport]:
     fake: Any = Fake(*found)
-    return record(options(course), measuring=fake)
+    return bench(options(course), record=True, measuring=fake)
 
 
-@pytest.fixture
-def no_cards(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a model is made of is told elsewhere."""
-    monkeypatch.setattr(
-        "coursebuild.pipeline.measuring.with_card", lambda root, scene, report: report
-    )
-
-
-@pytest.mark.usefixtures("no_cards")
 class TestRecords:
     """`--record` and `--check`."""
 
@@ -49,7 +40,7 @@ class TestRecords:
             "wrote content/reports/arms/left arm.bench.json",
             f"wrote {PATH}",
         )
-        report = decode_bench((course / PATH).read_bytes())
+        report = BENCH.decode((course / PATH).read_bytes())
         assert report.model == "box" and report.scenarios == (swing(),)
         assert report.digest == find_scenes(course, ("box",)).scenes[0].digest
         fake = Fake()
@@ -122,7 +113,7 @@ class TestRecords:
 
     def test_a_report_of_something_else(self, course: Path) -> None:
         recorded(course)
-        report = decode_bench((course / PATH).read_bytes())
+        report = BENCH.decode((course / PATH).read_bytes())
         for other, message in (
             (replace(report, model="arm"), f"{PATH} holds a report of the model `arm`"),
             (
@@ -130,7 +121,7 @@ class TestRecords:
                 f"{PATH} holds a report of `coursebuild bench --quick`, which measures only a part",
             ),
         ):
-            (course / PATH).write_bytes(encode_bench(other))
+            (course / PATH).write_bytes(BENCH.encode(other))
             (failure,) = check(options(course), measuring=Fake()).failures
             assert failure.message == message
 
@@ -144,10 +135,11 @@ class TestRecords:
         assert check(options(course), ("box",), measuring=Fake()).remarks == ()
 
     def test_a_part_is_not_recorded(self, course: Path) -> None:
-        for command, option in ((record, "--record"), (check, "--check")):
-            why = f"{option} takes no --quick: what is recorded is measured in full"
-            with pytest.raises(UsageError, match=why):
-                command(options(course), quick=True, measuring=Fake())
+        why = " takes no --quick: what is recorded is measured in full"
+        with pytest.raises(UsageError, match=f"--record{why}"):
+            bench(options(course), quick=True, record=True, measuring=Fake())
+        with pytest.raises(UsageError, match=f"--check{why}"):
+            check(options(course), quick=True, measuring=Fake())
 
     def test_where_nothing_can_be_written(self, course: Path, tmp_path: Path) -> None:
         (tmp_path / "away").mkdir()
@@ -162,9 +154,9 @@ class TestRecords:
 
     def test_another_engine_is_told(self, course: Path) -> None:
         recorded(course)
-        report = decode_bench((course / PATH).read_bytes())
+        report = BENCH.decode((course / PATH).read_bytes())
         machine = replace(report.machine, engine="3.13.0", system="Plan 9 mips")
-        (course / PATH).write_bytes(encode_bench(replace(report, machine=machine)))
+        (course / PATH).write_bytes(BENCH.encode(replace(report, machine=machine)))
         (one,) = check(options(course), measuring=Fake()).checked
         assert one.remarks[0].startswith("recorded with MuJoCo 3.13.0, measured with ")
         assert one.remarks[1].startswith("recorded with Plan 9 mips, measured with ")

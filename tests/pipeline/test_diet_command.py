@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from coursebuild.cli import main
-from coursebuild.numerics.reports.records import RecordError, decode_diet
+from coursebuild.numerics.reports.records import DIET, RecordError
 from coursebuild.pipeline import diet_model
 
 pytestmark = pytest.mark.site
@@ -257,15 +257,15 @@ def test_a_report_is_recorded(course: Path, capsys: pytest.CaptureFixture[str]) 
     assert main(["-C", str(course), "diet", "--record"]) == 1
     assert "wrote content/reports/swing.diet.json" in capsys.readouterr().out
     data = path.read_bytes()
-    report = decode_diet(data)
+    report = DIET.decode(data)
     assert report.model == "swing" and [one.kind for one in report.findings] == ["sensor-unread"]
     assert main(["-C", str(course), "diet", "--record"]) == 1
     assert "content/reports/swing.diet.json is as it was" in capsys.readouterr().out
     assert path.read_bytes() == data
     with pytest.raises(RecordError):
-        decode_diet(data.replace(b'"label"', b'"lable"'))
+        DIET.decode(data.replace(b'"label"', b'"lable"'))
     with pytest.raises(RecordError):
-        decode_diet(b"{}")
+        DIET.decode(b"{}")
 
 
 def test_quiet_tells_only_what_is_wrong(course: Path, capsys: pytest.CaptureFixture[str]) -> None:

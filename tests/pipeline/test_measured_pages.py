@@ -9,12 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.run.versions import engine_version
-from coursebuild.numerics.reports.records import (
-    STABILITY_PATH,
-    bench_path,
-    encode_bench,
-    encode_stability,
-)
+from coursebuild.numerics.reports.records import BENCH, STABILITY
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.scenes import scene_digest
 from support.model_reports import case
@@ -49,9 +44,9 @@ def test_a_report_draws_its_page_and_no_other(course: Course) -> None:
     course.write_cases("it hangs")
     assert course.drawn() == {NUMERICS}
     slower = replace(course.bench(), card=None)
-    course.folder.write(bench_path("box"), encode_bench(slower))
+    course.folder.write(BENCH.path("box"), BENCH.encode(slower))
     assert course.drawn() == {PAGE}
-    (course.folder.root / STABILITY_PATH).unlink()
+    (course.folder.root / STABILITY.path()).unlink()
     assert course.drawn() == {"index.html", PAGE, "models/cup.html", "models/arm/part.html"}
 
 
@@ -102,18 +97,18 @@ def test_scenarios_that_changed_leave_reports_out(course: Course) -> None:
 
 def test_another_version_of_mujoco_leaves_reports_out(course: Course) -> None:
     machine = replace(course.bench().machine, engine="3.0.0")
-    course.folder.write(bench_path("box"), encode_bench(course.bench(machine=machine)))
+    course.folder.write(BENCH.path("box"), BENCH.encode(course.bench(machine=machine)))
     told = stale(course)
     installed = engine_version()
     assert f"it is of MuJoCo 3.0.0, and {installed} is installed" in told
     cases = (case("spring", 5, engine="3.0.0"),)
-    course.folder.write(STABILITY_PATH, encode_stability(cases))
+    course.folder.write(STABILITY.path(), STABILITY.encode(cases))
     assert stale(course).count("warning[report-stale]") == 2
     assert not (course.folder.root / "public" / NUMERICS).exists()
 
 
 def test_damaged_reports_keep_nothing_from_being_published(course: Course) -> None:
-    for path in (bench_path("box"), STABILITY_PATH):
+    for path in (BENCH.path("box"), STABILITY.path()):
         course.folder.write(path, course.folder.read(path)[:-40])
     course.folder.write("content/reports/notes.json", "mine")
     told = stale(course)
@@ -158,7 +153,7 @@ def test_a_model_with_an_unusual_name(course: Course) -> None:
     model = next(one for one in found.models if one.name == name)
     digest = scene_digest(course.folder.root, model, None)
     report = replace(course.bench(), model=name, digest=digest)
-    course.folder.write(bench_path(name), encode_bench(report))
+    course.folder.write(BENCH.path(name), BENCH.encode(report))
     assert course.build() == ""
     page = course.page(f"models/{name}.html")
     assert "coursebuild bench &#39;odd &amp; old/it&#39;&#34;&#39;" in page

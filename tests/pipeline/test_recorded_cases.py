@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
-from coursebuild.numerics.reports.records import STABILITY_PATH, decode_stability, encode_stability
+from coursebuild.numerics.reports.records import STABILITY
 
 pytestmark = pytest.mark.site
 
@@ -26,45 +26,45 @@ def run(course: Path, *arguments: str) -> int:
 
 
 def names(course: Path) -> list[str]:
-    return [case.name for case in decode_stability((course / STABILITY_PATH).read_bytes())]
+    return [case.name for case in STABILITY.decode((course / STABILITY.path()).read_bytes())]
 
 
 def test_recorded_then_checked(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(course, "projectile", "--record") == 0
     out = capsys.readouterr().out
     assert out.startswith("projectile  case 4: Projectile\n")
-    assert out.endswith(f"\nwrote {STABILITY_PATH}\n")
+    assert out.endswith(f"\nwrote {STABILITY.path()}\n")
     assert run(course, "projectile", "--check") == 0
-    assert capsys.readouterr().out == f"stability  as recorded in {STABILITY_PATH}\n"
+    assert capsys.readouterr().out == f"stability  as recorded in {STABILITY.path()}\n"
     assert run(course, "projectile", "--record") == 0
-    assert capsys.readouterr().out.endswith(f"\n{STABILITY_PATH} is as it was\n")
+    assert capsys.readouterr().out.endswith(f"\n{STABILITY.path()} is as it was\n")
 
 
 def test_recording_some_cases_leaves_the_others(course: Path) -> None:
-    run(course, "projectile", "--record")
-    before = (course / STABILITY_PATH).read_bytes()
-    assert run(course, "stack-1", "--record") == 0
+    run(course, "stack-1", "--record")
+    before = (course / STABILITY.path()).read_bytes()
+    assert run(course, "projectile", "--record") == 0
     assert names(course) == ["projectile", "stack-1"]
-    path = course / STABILITY_PATH
-    old = replace(decode_stability(before)[0], name="no-more")
-    path.write_bytes(encode_stability([old]))
+    path = course / STABILITY.path()
+    old = replace(STABILITY.decode(before)[0], name="no-more")
+    path.write_bytes(STABILITY.encode((old,)))
     assert run(course, "projectile", "--record") == 0
     assert names(course) == ["projectile"]
 
 
 def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run(course, "projectile", "--record")
-    path = course / STABILITY_PATH
-    (case,) = decode_stability(path.read_bytes())
+    path = course / STABILITY.path()
+    (case,) = STABILITY.decode(path.read_bytes())
     wrong = tuple(
         replace(line, measured=-0.06) if line.integrator == "Euler" else line
         for line in case.figures
     )
-    path.write_bytes(encode_stability([replace(case, engine="3.7.0", figures=wrong)]))
+    path.write_bytes(STABILITY.encode((replace(case, engine="3.7.0", figures=wrong),)))
     capsys.readouterr()
     assert run(course, "projectile", "--check") == 1
     head, remark, _, name, _, figure = capsys.readouterr().out.splitlines()
-    assert head == f"stability  1 figure not as recorded in {STABILITY_PATH}"
+    assert head == f"stability  1 figure not as recorded in {STABILITY.path()}"
     assert remark.startswith("  recorded with MuJoCo 3.7.0, measured with ")
     assert name == "  projectile"
     assert figure.startswith(
@@ -93,15 +93,15 @@ def test_where_there_is_no_report_or_a_damaged_one(
 ) -> None:
     assert run(course, "--check") == 1
     assert capsys.readouterr().out == (
-        f"error: {STABILITY_PATH} is not there\n"
+        f"error: {STABILITY.path()} is not there\n"
         "  help: make it with `coursebuild stability --record`, and commit it\n"
     )
-    path = course / STABILITY_PATH
+    path = course / STABILITY.path()
     path.parent.mkdir()
     path.write_bytes(b"{}")
     assert run(course, "--check") == 1
     assert capsys.readouterr().out == (
-        f"error: {STABILITY_PATH} holds no report of `coursebuild stability`\n"
+        f"error: {STABILITY.path()} holds no report of `coursebuild stability`\n"
         "  help: make it again with `coursebuild stability --record`\n"
     )
     assert run(course, "projectile", "--record") == 1

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.records import bench_path, encode_bench
+from coursebuild.numerics.reports.records import BENCH
 from support.preview_process import serving
 from support.recorded_course import PAGE, Course
 from support.scratch_course import GOOD, Folder
@@ -101,11 +101,11 @@ def test_another_report_draws_the_lesson_and_nothing_else(course: Course) -> Non
     assert {PAGE, "lessons/1.2"} < path(course.drawn())
     assert course.drawn() == set()
     report = course.bench()
-    course.folder.write(bench_path("box"), encode_bench(replace(report, card=None)))
+    course.folder.write(BENCH.path("box"), BENCH.encode(replace(report, card=None)))
     assert course.drawn() == {PAGE}
     swing, awkward = report.scenarios
     changed = replace(report, card=None, scenarios=(swing, replace(awkward, title="Other")))
-    course.folder.write(bench_path("box"), encode_bench(changed))
+    course.folder.write(BENCH.path("box"), BENCH.encode(changed))
     assert path(course.drawn()) == {PAGE, "lessons/1.2"}
 
 
@@ -115,7 +115,7 @@ def test_an_incremental_build_gives_what_a_clean_one_gives(
     course.build()
     first = course.bench().scenarios[0]
     changed = replace(course.bench(), scenarios=(replace(first, title="Swings"),))
-    course.folder.write(bench_path("box"), encode_bench(changed))
+    course.folder.write(BENCH.path("box"), BENCH.encode(changed))
     assert "no scenario" not in course.build()
     clean = Course(make(GOOD, FENCES, name="clean"))
     clean.folder.write("models/box.toml", SCENARIOS)
@@ -133,7 +133,7 @@ def test_a_report_that_does_not_fit_is_not_shown(course: Course) -> None:
         assert "Not measured. This measures it:" in figure and "<svg>" not in figure
         assert '<a href="../models/box.html#measured">box</a></figcaption>' in figure
     assert 'id="measured-awkward"' in course.page()  # so that links to it hold
-    (course.folder.root / bench_path("box")).unlink()
+    (course.folder.root / BENCH.path("box")).unlink()
     assert course.build().count("warning[bench-unrecorded]") == 3
 
 
@@ -154,7 +154,7 @@ def test_the_preview_follows_a_report_in_a_lesson(course: Course) -> None:
         report = course.bench()
         first = replace(report.scenarios[0], title="It hangs")
         changed = replace(report, scenarios=(first, report.scenarios[1]))
-        course.folder.write(bench_path("box"), encode_bench(changed))
+        course.folder.write(BENCH.path("box"), BENCH.encode(changed))
         assert shown("It hangs")
         text = course.folder.text(f"content/lessons/{path}")
         course.folder.write(f"content/lessons/{path}", text.replace("=awkward", "=swing"))

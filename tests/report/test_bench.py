@@ -20,7 +20,13 @@ from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report import Style
 from coursebuild.report.bench import bench_text
 from coursebuild.report.bench_json import bench_values
-from coursebuild.report.measuring import checked_text, failure_text, measured_json, measured_text
+from coursebuild.report.measuring import (
+    Measurement,
+    checked_text,
+    failure_text,
+    measured_json,
+    measured_text,
+)
 from coursebuild.report.terminal import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene, swing
 
@@ -93,7 +99,7 @@ def test_where_nothing_was_measured() -> None:
     assert text.endswith(
         "A Processor @ 2 GHz\n  nothing can move in it, so that nothing was measured\n"
     )
-    assert measured_text(bench_text([], Style()), Style()) == ""
+    assert measured_text(bench_text([], Style()), Measurement(()), Style()) == ""
 
 
 def test_names_cannot_change_the_terminal() -> None:
@@ -149,7 +155,7 @@ KINDS: dict[str, tuple[type, ...]] = {
 
 
 def bench_json(scenes: Sequence[SceneReport]) -> str:
-    return measured_json(bench_values(scenes))
+    return measured_json(bench_values(scenes), Measurement(()))
 
 
 def rows_of(text: str) -> list[dict[str, object]]:
@@ -210,10 +216,13 @@ def test_json_says_what_is_wrong() -> None:
     found = json.loads(
         measured_json(
             bench_values([]),
-            diagnostics=[diagnose("model-error", span, "the model `arm` does not compile: no")],
-            failures=[ReportFailure("a", "b")],
-            checked=[Checked("arm", "x.json", (departure,), ("c",))],
-            remarks=["d"],
+            Measurement(
+                (),
+                (diagnose("model-error", span, "the model `arm` does not compile: no"),),
+                (ReportFailure("a", "b"),),
+                (Checked("arm", "x.json", (departure,), ("c",)),),
+                ("d",),
+            ),
         )
     )
     assert found["diagnostics"][0]["message"] == "the model `arm` does not compile: no"

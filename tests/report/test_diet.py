@@ -19,10 +19,10 @@ from coursebuild.numerics.reports.diet import (
     TextEdit,
     Tried,
 )
-from coursebuild.numerics.reports.records import ReportFailure, decode_diet, encode_diet
+from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.report import Style
 from coursebuild.report.diet import diet_text, diet_values
-from coursebuild.report.measuring import measured_json, measured_text
+from coursebuild.report.measuring import Measurement, measured_json, measured_text
 
 PLACE = ModelPlace("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")
@@ -136,18 +136,19 @@ def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:
 def test_json_and_record_hold_everything() -> None:
     value = json.loads(
         measured_json(
-            diet_values([REPORT]), failures=[ReportFailure("no", "yes")], remarks=["said"]
+            diet_values([REPORT]),
+            Measurement((), failures=(ReportFailure("no", "yes"),), remarks=("said",)),
         )
     )
     assert value["models"][0]["findings"][0]["edits"][0]["old"] == EDIT.old
     assert value["failures"] == [{"message": "no", "help": "yes"}] and value["remarks"] == ["said"]
     assert value["models"][0]["ok"] is False
-    assert decode_diet(encode_diet(REPORT)) == REPORT
-    assert encode_diet(REPORT) == encode_diet(decode_diet(encode_diet(REPORT)))
+    assert DIET.decode(DIET.encode(REPORT)) == REPORT
+    assert DIET.encode(REPORT) == DIET.encode(DIET.decode(DIET.encode(REPORT)))
 
 
 def test_a_report_on_no_model() -> None:
     assert diet_text([], Style()) == ""
     failure = ReportFailure("models/a.xml was changed in the meantime")
-    failed = measured_text("", Style(), failures=[failure])
+    failed = measured_text("", Measurement((), failures=(failure,)), Style())
     assert failed == "error: models/a.xml was changed in the meantime\n"

@@ -8,7 +8,7 @@ from typing import Any
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.pipeline.measuring import CompiledScene
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene
@@ -42,6 +42,10 @@ class Fake:
         assert root.is_absolute()
         scenes: Any = tuple(self.found)
         return CompiledScene(scene, None, scenes)
+
+    def with_card(self, root: Path, scene: CourseScene, report: SceneReport) -> SceneReport:
+        """What a model is made of is told elsewhere."""
+        return report
 
     def measured(
         self,

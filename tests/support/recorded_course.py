@@ -8,14 +8,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.run.versions import engine_version
 from coursebuild.numerics.reports.bench import SceneReport
-from coursebuild.numerics.reports.records import (
-    STABILITY_PATH,
-    bench_path,
-    diet_path,
-    encode_bench,
-    encode_diet,
-    encode_stability,
-)
+from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
@@ -52,7 +45,7 @@ class Course:
 
     def record(self) -> None:
         """Put reports into the course."""
-        self.folder.write(bench_path("box"), encode_bench(self.bench()))
+        self.folder.write(BENCH.path("box"), BENCH.encode(self.bench()))
         self.write_diet("nobody reads it")
         self.write_cases("it swings")
 
@@ -60,11 +53,11 @@ class Course:
         report = diet(finding(message=message))
         here = replace(report.machine, engine=engine_version())
         report = replace(report, digest=self.digest(), machine=here)
-        self.folder.write(diet_path("box"), encode_diet(report))
+        self.folder.write(DIET.path("box"), DIET.encode(report))
 
     def write_cases(self, note: str) -> None:
         cases = (case("spring", 5, engine=engine_version(), note=note),)
-        self.folder.write(STABILITY_PATH, encode_stability(cases))
+        self.folder.write(STABILITY.path(), STABILITY.encode(cases))
 
     def build(self, *arguments: str) -> str:
         """What is wrong, which has to be nothing that keeps the site from being published."""

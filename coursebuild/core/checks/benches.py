@@ -23,7 +23,7 @@ def bench_findings(blocks: Iterable[Block], course: Course) -> tuple[Diagnostic,
 
 
 def _findings(bench: Bench, course: Course) -> Iterator[Diagnostic]:
-    from coursebuild.numerics.reports.records import bench_path  # which most courses do not need
+    from coursebuild.numerics.reports.records import BENCH  # which most courses do not need
 
     models = [model.name for model in course.models]
     if bench.model not in models:
@@ -33,7 +33,7 @@ def _findings(bench: Bench, course: Course) -> Iterator[Diagnostic]:
     declared = declared_scenarios(course, bench.model)
     if declared:
         yield from _scenario(bench, declared)
-    if bench_path(bench.model) not in course.files:
+    if BENCH.path(bench.model) not in course.files:
         message = f"nothing was recorded of the model `{bench.model}`, so the page says so"
         help = f"measure it with `coursebuild bench {bench.model} --record`"
         yield diagnose("bench-unrecorded", bench.model_span, message, help=help)

@@ -17,7 +17,7 @@ from coursebuild.core.pages.scenarios import ScenarioView, scenario_view
 from coursebuild.core.pages.strings import Strings
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
-from coursebuild.numerics.reports.records import bench_path, diet_path
+from coursebuild.numerics.reports.records import BENCH, DIET
 
 
 class FindingView(Struct, frozen=True):
@@ -83,7 +83,7 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
         ),
         where="" if scene is None else where(words, scene.machine),
         command=again("bench", name, "--record"),
-        file="" if scene is None else place.href(urls.file_path(bench_path(name))),
+        file="" if scene is None else place.href(urls.file_path(BENCH.path(name))),
         diet=None if diet is None else _diet(words, place, diet),
         diet_command=again("diet", name, "--record"),
     )
@@ -140,7 +140,7 @@ def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
         tuple(_finding(words, one) for one in diet.findings),
         where(words, diet.machine),
         again("diet", diet.model, "--record"),
-        place.href(urls.file_path(diet_path(diet.model))),
+        place.href(urls.file_path(DIET.path(diet.model))),
     )
 
 

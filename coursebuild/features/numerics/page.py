@@ -27,7 +27,7 @@ from coursebuild.core.pages.scenarios import ORDERS, largest, lost_runs
 from coursebuild.core.pages.strings import Strings
 from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
 from coursebuild.numerics.reports.points import FLOORS, integrator_rank, seconds_text, status_text
-from coursebuild.numerics.reports.records import STABILITY_PATH
+from coursebuild.numerics.reports.records import STABILITY
 
 _QUANTITIES = (
     ("position", "measured.position"),
@@ -78,7 +78,7 @@ def numerics_values(library: Library) -> dict[str, object]:
     return {
         "groups": groups,
         "engine": ", ".join(sorted({one.engine for one in cases})),
-        "file": place.href(urls.file_path(STABILITY_PATH)),
+        "file": place.href(urls.file_path(STABILITY.path())),
         "command": again("stability", "--record"),
     }
 

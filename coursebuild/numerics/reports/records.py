@@ -1,8 +1,7 @@
 """Reports as files of the course, `content/reports/…`: written by authors, committed, read again.
 
-Entry points: `bench_path(model)`, `diet_path(model)`, `STABILITY_PATH`; `encode_bench`,
-`encode_diet`, `encode_stability`; `decode_bench(data)`, `decode_diet(data)`,
-`decode_stability(data)`, which raise `RecordError`.
+Entry points: `BENCH`, `DIET` and `STABILITY`, each a `ReportKind` that encodes and decodes its
+files; `RecordError`, why a file is none.
 
 1. A file says first what it is and which form it has: `{"holds": …, "form": …, …}`.
 2. Keys are sorted, and every measured row is a line, so that a difference between two versions of a
@@ -15,21 +14,18 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
-from typing import Any, TypeVar
+import shlex
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
 
 import msgspec
 from msgspec import Struct
 
-from coursebuild.numerics.reports import Record
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.diet import DietReport
 
 FOLDER = "content/reports"
-STABILITY_PATH = f"{FOLDER}/stability.json"
-BENCH, STABILITY = "coursebuild bench", "coursebuild stability"
-DIET = "coursebuild diet"
 FORM = 1
 """Goes up when files that were written before cannot be read any more."""
 
@@ -51,93 +47,80 @@ class ReportFailure(Struct, frozen=True):
     help: str = ""
 
 
-class _BenchFile(Record, frozen=True):
-    """What a file of a model holds."""
+class ReportKind(Struct, Generic[_T], frozen=True):
+    """A kind of report that a course keeps."""
 
-    holds: str
-    form: int
-    scene: SceneReport
+    name: str
+    """Of the command that makes it."""
+    field: str
+    """Under which a file holds the report."""
+    type: type[_T]
+    suffix: str
+    flaw: Callable[[_T, str], str]
+    """What is wrong with a report that has every field, if anything; the second is the model that
+    it should be of."""
 
+    def path(self, model: str = "") -> str:
+        """The file, from the course's folder; of all hard cases there is one."""
+        return f"{FOLDER}/{model or self.name}{self.suffix}"
 
-class _StabilityFile(Record, frozen=True):
-    """What the file of the hard cases holds."""
+    def command(self, model: str = "") -> str:
+        """What to type to have it recorded."""
+        names = [shlex.quote(model)] if model else []
+        return " ".join(["coursebuild", self.name, *names, "--record"])
 
-    holds: str
-    form: int
-    cases: tuple[CaseReport, ...]
+    def encode(self, report: _T) -> bytes:
+        """The file."""
+        value = {"holds": f"coursebuild {self.name}", "form": FORM, self.field: report}
+        return (_text(msgspec.to_builtins(value, order="sorted"), 0, 0) + "\n").encode()
 
+    def decode(self, data: bytes, model: str = "") -> _T:
+        """What a file says; of this model, if one is named.
 
-class _DietFile(Record, frozen=True):
-    """What the file of a model's diet holds."""
-
-    holds: str
-    form: int
-    diet: DietReport
-
-
-def bench_path(model: str) -> str:
-    """Where the report on a model is, from the course's folder."""
-    return f"{FOLDER}/{model}.bench.json"
-
-
-def diet_path(model: str) -> str:
-    """Where the diet of a model is, from the course's folder."""
-    return f"{FOLDER}/{model}.diet.json"
-
-
-def encode_bench(scene: SceneReport) -> bytes:
-    """The file of a model."""
-    return _encoded(_BenchFile(BENCH, FORM, scene))
-
-
-def encode_stability(cases: Sequence[CaseReport]) -> bytes:
-    """The file of the hard cases, by name."""
-    ordered = tuple(sorted(cases, key=lambda case: (case.case, case.name)))
-    return _encoded(_StabilityFile(STABILITY, FORM, ordered))
+        Raises:
+            RecordError: it holds no such report.
+        """
+        fields = [("holds", str), ("form", int), (self.field, self.type)]
+        file = msgspec.defstruct("File", fields, forbid_unknown_fields=True)
+        report: _T = getattr(_decoded(data, f"coursebuild {self.name}", file), self.field)
+        flaw = self.flaw(report, model)
+        if flaw:
+            raise RecordError(flaw)
+        return report
 
 
-def encode_diet(diet: DietReport) -> bytes:
-    """The file of a model's diet."""
-    return _encoded(_DietFile(DIET, FORM, diet))
+def _other(kind: str, report: SceneReport | DietReport, model: str) -> str:
+    """Why a report is not the whole one of a model; empty where it is, or none is named."""
+    if model and report.model != model:
+        return f"holds a report of the model `{report.model}`"
+    if model and report.quick:
+        return f"holds a report of `coursebuild {kind} --quick`, which measures only a part"
+    return ""
 
 
-def decode_diet(data: bytes) -> DietReport:
-    """What the file of a model's diet says.
-
-    Raises:
-        RecordError: it is none.
-    """
-    return _decoded(data, DIET, _DietFile).diet
-
-
-def decode_bench(data: bytes) -> SceneReport:
-    """What the file of a model says.
-
-    Raises:
-        RecordError: it is none.
-    """
-    scene = _decoded(data, BENCH, _BenchFile).scene
-    names = [scenario.name for scenario in scene.scenarios]
+def _scene_flaw(report: SceneReport, model: str) -> str:
+    names = [scenario.name for scenario in report.scenarios]
     if len(set(names)) < len(names):
-        raise RecordError("holds two scenarios of one name")
-    for scenario in scene.scenarios:
-        count = len(scenario.rows)
+        return "holds two scenarios of one name"
+    for scenario in report.scenarios:
         pointed = [row.dominated_by for row in scenario.rows] + [scenario.verdict.better]
-        if not all(0 <= at < count for at in pointed if at is not None):
-            raise RecordError(f"points at a row that scenario `{scenario.name}` does not have")
-    return scene
+        if not all(0 <= at < len(scenario.rows) for at in pointed if at is not None):
+            return f"points at a row that scenario `{scenario.name}` does not have"
+    return _other("bench", report, model)
 
 
-def decode_stability(data: bytes) -> tuple[CaseReport, ...]:
-    """What the file of the hard cases says.
+def _case_flaw(cases: tuple[CaseReport, ...], _: str) -> str:
+    twice = len({case.name for case in cases}) < len(cases)
+    return "holds two cases of one name" if twice else ""
 
-    Raises:
-        RecordError: it is none.
-    """
-    cases = _decoded(data, STABILITY, _StabilityFile).cases
-    if len({case.name for case in cases}) < len(cases):
-        raise RecordError("holds two cases of one name")
-    return cases
+
+BENCH = ReportKind("bench", "scene", SceneReport, ".bench.json", _scene_flaw)
+DIET = ReportKind(
+    "diet", "diet", DietReport, ".diet.json", lambda report, model: _other("diet", report, model)
+)
+STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
+    "stability", "cases", tuple[CaseReport, ...], ".json", _case_flaw
+)
 
 
 # --- reading
@@ -178,11 +161,6 @@ def _json(data: bytes) -> Any:
 
 
 # --- writing
-
-
-def _encoded(file: _BenchFile | _StabilityFile | _DietFile) -> bytes:
-    value = msgspec.to_builtins(file, order="sorted")
-    return (_text(value, 0, 0) + "\n").encode()
 
 
 def _text(value: Any, indent: int, lists: int) -> str:

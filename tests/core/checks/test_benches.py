@@ -6,7 +6,7 @@ import pytest
 
 from coursebuild.core.checks.benches import bench_findings, check_keyframes
 from coursebuild.core.model import Bench, document_blocks
-from coursebuild.numerics.reports.records import bench_path
+from coursebuild.numerics.reports.records import BENCH
 from support.made_courses import BOX, facts, make_course, said, told
 
 
@@ -33,7 +33,7 @@ def test_a_model_of_which_nothing_was_recorded_is_told() -> None:
 
 
 def test_a_recorded_model_with_a_declared_scenario_is_good() -> None:
-    files = (bench_path("box"),)
+    files = (BENCH.path("box"),)
     declared = '[[scenario]]\nname = "swing"\n'
     assert findings("box", files=files) == []
     assert findings("box scenario=swing", declared, files) == []
