@@ -19,12 +19,13 @@ from coursebuild.core.features import FenceKind
 from coursebuild.core.model import Bench, BenchPart, Block, CodeBlock, FeatureBlock, Mjcf, Script
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import Fence, kind_doubts
-from coursebuild.core.syntax.info import Word, parse_info, read_keys
+from coursebuild.core.syntax.info import FenceKeys, Word, kind_of
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import stray_keys
 from coursebuild.core.syntax.script import parse_python
+from coursebuild.core.syntax.spans import trimmed
 from coursebuild.core.syntax.texts import TextParser
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Note, diagnose, did_you_mean
 
 _HEAD_RULES = frozenset(
     {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
@@ -40,12 +41,10 @@ def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block
         case "python":
             return _python(fence, session)
         case "text":
-            session.diagnostics += stray_keys(fence)
+            stray_keys(fence, session)
             return fence.code()
         case "mjcf":
-            mjcf = _parse_mjcf(fence)
-            session.diagnostics += mjcf.diagnostics
-            return mjcf.value
+            return _mjcf(fence, session)
         case "bench":
             return _bench(fence, session)
         case name if (kind := fence_kind(name)) is not None:
@@ -83,12 +82,6 @@ def _python(fence: Fence, session: ParsingState) -> Block:
     return parsed.value
 
 
-def _bench(fence: Fence, session: ParsingState) -> Block:
-    parsed = _parse_bench(fence)
-    session.diagnostics += parsed.diagnostics
-    return _nested(fence, session) if fence.nested else parsed.value
-
-
 def _of_feature(
     kind: FenceKind[FeatureBlock], fence: Fence, session: ParsingState, texts: TextParser
 ) -> Block:
@@ -108,84 +101,74 @@ def _nested(fence: Fence, session: ParsingState) -> CodeBlock:
 _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
-def _parse_mjcf(fence: Fence) -> Parsed[Mjcf | CodeBlock]:
+def _mjcf(fence: Fence, session: ParsingState) -> Mjcf | CodeBlock:
     """An `mjcf` fence; one that says in a wrong way what it is cannot be compiled, and is code."""
-    info = parse_info(fence.info)
-    keys = read_keys("mjcf", info.value.words, values=("fragment", "error"))
-    diagnostics = [*info.diagnostics, *keys.diagnostics]
-    fragment, error = keys.value.get("fragment"), keys.value.get("error")
-    if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
-        message = f"`{fragment.value}` is not the name of an element"
+    keys, wrong = _keys(fence, session, ("fragment", "error"))
+    fragment, place = keys.value("fragment"), keys.place("fragment")
+    if fragment is not None and place is not None and not _ELEMENTS.fullmatch(fragment):
+        message = f"`{fragment}` is not the name of an element"
         help = 'name the element that it goes into, for example `fragment="worldbody"`'
-        diagnostics.append(diagnose("fence-key-value", fragment.value_span, message, help=help))
-    if diagnostics:
-        return Parsed(fence.code(), tuple(diagnostics))
-    mjcf = Mjcf(
-        fence.span,
-        fence.body,
-        None if fragment is None else fragment.value,
-        None if error is None else error.value,
-        None if error is None else error.value_span,
-    )
-    return Parsed(mjcf)
+        session.report(diagnose("fence-key-value", place, message, help=help))
+        return fence.code()
+    if wrong:
+        return fence.code()
+    error, place = keys.value("error"), keys.place("error")
+    return Mjcf(fence.span, fence.body, fragment, error, place)
+
+
+def _keys(
+    fence: Fence, session: ParsingState, values: tuple[str, ...], *, named: bool = False
+) -> tuple[FenceKeys, bool]:
+    """The keys of a fence, and whether something is wrong with them."""
+    keys = fence.keys(values=values, named=named)
+    session.diagnostics += keys.diagnostics
+    return keys.value, bool(keys.diagnostics)
 
 
 SHOWN: tuple[BenchPart, ...] = ("plot", "stable", "orders", "table")
 """What of a report can be shown, in the order in which it is."""
 _DEFAULT: tuple[BenchPart, ...] = ("plot", "table")
-_PARTS = re.compile(r"[^\s,]+")
 
 
-def _parse_bench(fence: Fence) -> Parsed[Bench | CodeBlock]:
+def _bench(fence: Fence, session: ParsingState) -> Bench | CodeBlock:
     """A `bench` fence; one that says in a wrong way what to show is code."""
-    info = parse_info(fence.info)
-    words = list(info.value.words)
-    named = words.pop(0) if words and words[0].value is None else None
-    keys = read_keys("bench", words, values=("scenario", "show"))
-    diagnostics = [*info.diagnostics, *keys.diagnostics]
-    if named is None:
+    before = len(session.diagnostics)
+    keys, _ = _keys(fence, session, ("scenario", "show"), named=True)
+    if keys.name is None:
         message = "a bench needs the name of a model"
         help = "write `bench NAME`, with the name of a file in models/, without `.xml`"
-        diagnostics.append(diagnose("fence-info", info.value.kind_span, message, help=help))
-    shows = _shown(keys.value.get("show"), diagnostics)
-    if fence.body.text.strip():
+        place = kind_of(fence.info).span()
+        session.report(diagnose("fence-info", place, message, help=help))
+    show = keys.get("show")
+    shows = _DEFAULT if show is None else _shown(show, session)
+    body = trimmed(fence.body, " \t\n")
+    if body.text:
         message = "a bench shows what was recorded, and has no text of its own"
         help = "write the text before or after it"
-        place = fence.body.slice(*_stretch(fence.body.text)).span().first_line()
-        diagnostics.append(diagnose("bench-text", place, message, help=help))
-    if named is None or diagnostics:
-        return Parsed(fence.code(), tuple(diagnostics))
-    scenario = keys.value.get("scenario")
-    bench = Bench(
+        place = body.span().first_line()
+        session.report(diagnose("bench-text", place, message, help=help))
+    if fence.nested:
+        return _nested(fence, session)
+    if keys.name is None or len(session.diagnostics) > before:
+        return fence.code()
+    return Bench(
         fence.span,
-        unquote(named.key),
-        named.key_span,
-        None if scenario is None else scenario.value,
-        None if scenario is None else scenario.value_span,
+        unquote(keys.name.key),
+        keys.name.key_span,
+        keys.value("scenario"),
+        keys.place("scenario"),
         shows,
     )
-    return Parsed(bench)
 
 
-def _stretch(text: str) -> tuple[int, int]:
-    """Where the text without the white space around it begins and ends."""
-    return len(text) - len(text.lstrip()), len(text.rstrip())
-
-
-def _shown(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[BenchPart, ...]:
+def _shown(show: Word, session: ParsingState) -> tuple[BenchPart, ...]:
     """What to show, in the order of `SHOWN`."""
-    if word is None or word.value_text is None:
-        return _DEFAULT
-    wanted: set[str] = set()
-    for found in _PARTS.finditer(word.value_text.text):
-        name = found[0]
-        wanted.add(name)
+    wanted = {part.text: part for part in reversed(show.parts()) if part.text}
+    for name, part in wanted.items():
         if name not in SHOWN:
-            span = word.value_text.span(found.start(), found.end())
-            message = f"nothing of a report is called `{name}`"
-            help = did_you_mean(name, SHOWN)
-            diagnostics.append(diagnose("fence-key-value", span, message, help=help))
+            message, help = f"nothing of a report is called `{name}`", did_you_mean(name, SHOWN)
+            session.report(diagnose("fence-key-value", part.span(), message, help=help))
     if not wanted:
         message, help = "`show` names nothing", "for example `show=plot,table`"
-        diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
+        session.report(diagnose("fence-key-value", show.value_span, message, help=help))
     return tuple(name for name in SHOWN if name in wanted)

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
 from coursebuild.core.model import CodeBlock
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
-from coursebuild.core.syntax.info import first_word, kind_of, parse_info
+from coursebuild.core.syntax.info import FenceKeys, kind_of, read_keys, words_of
 from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.
@@ -52,7 +52,13 @@ class Fence(Struct, frozen=True):
     @property
     def kind(self) -> str:
         """The first word of the info string."""
-        return first_word(self.info.text)
+        return kind_of(self.info).text
+
+    def keys(
+        self, *, values: Sequence[str] = (), flags: Sequence[str] = (), named: bool = False
+    ) -> Parsed[FenceKeys]:
+        """What the info string says beside the kind; see `read_keys`."""
+        return read_keys(self.info, values=values, flags=flags, named=named)
 
     def code(self) -> CodeBlock:
         """It as a code block of no special kind."""
@@ -116,11 +122,11 @@ def kind_doubts(fence: Fence) -> Iterator[Diagnostic]:
         message = f"nothing that is installed reads a block of kind `{fence.kind}`"
         yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
     kind = kind_of(fence.info)
-    words = parse_info(fence.info).value.words
     name, known = kind.text.lower(), (*CORE_FENCES, *fence_names())
     near = "lab simlab" if name == "simlab" else nearest(name, known, cutoff=0.75)
     if not name:
         return
+    words = words_of(fence.info).value
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
         help = "a script is a block of kind `python`"

@@ -12,7 +12,7 @@ from decimal import Decimal
 
 from coursebuild.core.model import Comparison, Inline, Mode, Recording, Table, plain_text
 from coursebuild.core.syntax.fence import Fence, is_ours
-from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
+from coursebuild.core.syntax.info import FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
@@ -68,8 +68,9 @@ def record_fence(
             what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
             session.report(no_body(fence.head, what))
         return None
-    keys, wrong = _keys(fence)
-    comparison = _comparison(keys, wrong)
+    keys = fence.keys(values=_VALUES, flags=_FLAGS)
+    wrong = list(keys.diagnostics)
+    comparison = _comparison(keys.value, wrong)
     session.diagnostics += wrong
     return Recording(
         caption_span.to(fence.span),
@@ -139,21 +140,16 @@ def _comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | 
     return Comparison(ellipsis=ellipsis) if keys.get("exact") or ellipsis else None
 
 
-def stray_keys(fence: Fence) -> list[Diagnostic]:
-    """What is wrong with keys on a `text` fence that records no output."""
-    keys, diagnostics = _keys(fence)
-    if keys.words:
-        span = keys.words[0].span.to(keys.words[-1].span)
+def stray_keys(fence: Fence, session: ParsingState) -> None:
+    """Report keys on a `text` fence that records no output."""
+    keys = fence.keys(values=_VALUES, flags=_FLAGS)
+    session.diagnostics += keys.diagnostics
+    words = keys.value.words
+    if words:
+        span = words[0].span.to(words[-1].span)
         message = "this block is no recorded output, so it is not compared with anything"
         help = "put a paragraph that begins with `Output` and ends with a colon directly above it"
-        diagnostics.append(diagnose("recording-keys", span, message, help=help))
-    return diagnostics
-
-
-def _keys(fence: Fence) -> tuple[FenceKeys, list[Diagnostic]]:
-    info = parse_info(fence.info)
-    keys = read_keys("text", info.value.words, values=_VALUES, flags=_FLAGS)
-    return keys.value, [*info.diagnostics, *keys.diagnostics]
+        session.report(diagnose("recording-keys", span, message, help=help))
 
 
 def _tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 from coursebuild.core.model import PlainCode, Script
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.info import FenceKeys, Word, parse_info, read_keys
+from coursebuild.core.syntax.info import FenceKeys, Word, words_of
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -38,13 +38,10 @@ _ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     """A `python` fence: a `Script` where it has a proper `file=`, else `PlainCode`."""
-    info = parse_info(fence.info)
-    keys = read_keys(
-        "python", info.value.words, values=("file", *_VALUES), flags=(*_FLAGS, "fragment")
-    )
-    diagnostics = [*info.diagnostics, *keys.diagnostics]
+    keys = fence.keys(values=("file", *_VALUES), flags=(*_FLAGS, "fragment"))
+    diagnostics = list(keys.diagnostics)
     file, fragment = keys.value.get("file"), keys.value.get("fragment")
-    has_file = any(word.key == "file" for word in info.value.words)
+    has_file = any(word.key == "file" for word in words_of(fence.info).value)
     if file is None and not diagnostics:
         for word in (keys.value.get(key) for key in (*_VALUES, *_FLAGS)):
             if word is not None:
@@ -114,24 +111,20 @@ def _timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
 
 
 def _modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
-    if word is None or word.value_text is None:
+    if word is None:
         return ()
     modules: dict[str, None] = {}
-    text = word.value_text
-    at = 0
-    for part in text.text.split(","):
-        name = part.strip()
-        lead = at + len(part) - len(part.lstrip())
-        at += len(part) + 1
+    for part in word.parts():
+        name = part.text
         if name and all(piece.isidentifier() for piece in name.split(".")):
             modules[name] = None
-        else:
-            message = (
-                f"`{name}` is not the name of a module" if name else "a name of a module is missing"
-            )
-            span = text.span(lead, lead + len(name)) if name else word.value_span
-            help = "write names with commas between them, for example `requires=torch,mjx`"
-            diagnostics.append(diagnose("fence-key-value", span, message, help=help))
+            continue
+        message = (
+            f"`{name}` is not the name of a module" if name else "a name of a module is missing"
+        )
+        span = part.span() if name else word.value_span
+        help = "write names with commas between them, for example `requires=torch,mjx`"
+        diagnostics.append(diagnose("fence-key-value", span, message, help=help))
     return tuple(modules)
 
 

@@ -10,7 +10,6 @@ import re
 
 from coursebuild.core.model import Inline
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.info import parse_info, read_keys
 from coursebuild.core.syntax.spans import joined, trimmed
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
@@ -54,11 +53,9 @@ class _Parts:
 
 def parse_io(fence: Fence, texts: TextParser) -> Parsed[Io]:
     """An `io` fence."""
-    info = parse_info(fence.info)
-    keys = read_keys("io", info.value.words)
     parts = _Parts()
     parts.read(fence.body)
-    diagnostics = [*info.diagnostics, *keys.diagnostics, *parts.diagnostics]
+    diagnostics = [*fence.keys().diagnostics, *parts.diagnostics]
     diagnostics += _stray(parts) + _order(parts)
     contents: dict[str, tuple[Inline, ...]] = {}
     for label in LABELS:

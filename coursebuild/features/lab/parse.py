@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.info import parse_info, read_keys
+from coursebuild.core.syntax.info import kind_of
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
@@ -30,14 +30,11 @@ from coursebuild.features.lab.schema import CommonLab, SimLab
 
 def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
     """The lab of a fence; its kind may stand after the word `lab`."""
-    info = parse_info(fence.info)
-    words = list(info.value.words)
-    kind, kind_span = SIMLAB, info.value.kind_span
-    if words and words[0].value is None:
-        kind, kind_span = words[0].key, words.pop(0).key_span
-    keys = read_keys(fence.kind, words)
-    lab = parse_lab(fence.span, kind, kind_span, fence.body, texts)
-    return Parsed(lab.value, (*info.diagnostics, *keys.diagnostics, *lab.diagnostics))
+    keys = fence.keys(named=True)
+    name = keys.value.name
+    kind, place = (SIMLAB, kind_of(fence.info).span()) if name is None else (name.key, name.span)
+    lab = parse_lab(fence.span, kind, place, fence.body, texts)
+    return Parsed(lab.value, (*keys.diagnostics, *lab.diagnostics))
 
 
 def parse_lab(

@@ -20,7 +20,6 @@ from msgspec.structs import replace
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.fields import repeated
-from coursebuild.core.syntax.info import parse_info, read_keys
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
@@ -55,10 +54,8 @@ TOLERANCE = 0.02
 
 def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Quiz | None]:
     """A `quiz` fence, which has no keys."""
-    info = parse_info(fence.info)
-    keys = read_keys("quiz", info.value.words)
     quiz = parse_quiz(fence.span, fence.body, texts)
-    return Parsed(quiz.value, (*info.diagnostics, *keys.diagnostics, *quiz.diagnostics))
+    return Parsed(quiz.value, (*fence.keys().diagnostics, *quiz.diagnostics))
 
 
 def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | None]:

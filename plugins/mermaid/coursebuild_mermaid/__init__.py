@@ -18,7 +18,6 @@ from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.exports.marks import fence as code_block
 from coursebuild.core.pages.exports.plain import Plain
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.info import parse_info, read_keys
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.rules import Rule
@@ -37,11 +36,10 @@ class Diagram(FeatureBlock, frozen=True):
 
 def parse(fence: Fence, texts: TextParser) -> Parsed[Diagram | None]:
     """The diagram of a fence."""
-    info = parse_info(fence.info)
-    keys = read_keys("mermaid", info.value.words, values=("alt",))
-    wrong = [*info.diagnostics, *keys.diagnostics]
-    alt = keys.value.get("alt")
-    if alt is None or not (alt.value or "").strip():
+    keys = fence.keys(values=("alt",))
+    wrong = list(keys.diagnostics)
+    alt = keys.value.value("alt") or ""
+    if not alt.strip():
         help = 'write `mermaid alt="…"`, for readers who cannot see it'
         wrong.append(
             diagnose("mermaid-alt", fence.head, "this diagram is not described", help=help)
@@ -52,7 +50,7 @@ def parse(fence: Fence, texts: TextParser) -> Parsed[Diagram | None]:
         wrong.append(diagnose("mermaid-syntax", fence.body_span.first_line(), f"Mermaid: {error}"))
         return Parsed(None, tuple(wrong))
     text = fence.body.text.rstrip("\n")
-    return Parsed(Diagram(fence.span, text, (alt and alt.value) or "", svg), tuple(wrong))
+    return Parsed(Diagram(fence.span, text, alt, svg), tuple(wrong))
 
 
 def draw(page: PageContext, block: Diagram) -> Markup:
