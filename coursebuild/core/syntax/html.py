@@ -1,7 +1,6 @@
-"""Raw HTML: its tags, whether they balance, and HTML with formulas in quiz texts.
+"""Raw HTML: its tags, whether they balance, and the files that it shows.
 
-Entry points: `tags` (scan), `Balance` (what is open), `html_flow` (a piece of HTML into an
-`HtmlFlow`).
+Entry points: `tags` and `tag_at` (scan), `Balance` (what is open), `media_of`.
 
 Balance is judged with care: elements whose end tag may be left out, void elements, comments and raw
 text never give a false alarm. An element must be closed in the block, list item or emphasis that it
@@ -16,11 +15,10 @@ from collections.abc import Callable, Iterator
 from html import unescape
 from typing import NamedTuple
 
-from coursebuild.core.model import HtmlFlow, Inline, Math, MediaAddress, RawInline
-from coursebuild.core.syntax.links import TextPiece, check_raw_scheme, plain, with_mentions
-from coursebuild.core.syntax.math import find_formula
+from coursebuild.core.model import MediaAddress
+from coursebuild.core.syntax.links import check_raw_scheme
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Span
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 _IMPLIED = frozenset("body colgroup head html tbody tfoot thead".split())
@@ -28,7 +26,7 @@ _IMPLIED = frozenset("body colgroup head html tbody tfoot thead".split())
 _OPTIONAL = frozenset("caption dd dt li optgroup option p rp rt td th tr".split())
 """Elements whose end tag may be left out."""
 _RAW_TEXT = frozenset("script style textarea title".split())
-_LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
+LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
 
 _TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
@@ -42,8 +40,6 @@ _SHOWN = re.compile(
 )
 _CANDIDATE = re.compile(r"[\s,]*([^\s,]+)[^,]*")
 """An address of a `srcset`, with the size that follows it."""
-_PIECE = re.compile(r"\\\$|\$|<")
-_ENTITY = re.compile(r"&[^\s&;]{1,32};")
 
 
 class Tag(NamedTuple):
@@ -174,93 +170,3 @@ def _addresses(attribute: re.Match[str]) -> Iterator[tuple[int, int]]:
             yield candidate.span(1)
     elif start < end:
         yield start, end
-
-
-def html_flow(excerpt: Excerpt, balance: Balance) -> HtmlFlow:
-    """HTML of a quiz text: tags as they are, formulas and texts between them as inlines."""
-    return HtmlFlow(excerpt.span(), tuple(_Flow(excerpt, balance).read()))
-
-
-class _Flow:
-    """One pass over a piece of HTML."""
-
-    def __init__(self, excerpt: Excerpt, balance: Balance) -> None:
-        self.excerpt, self.text = excerpt, excerpt.text
-        self.balance = balance
-        self.literal: list[str] = []
-        """Open elements in which there are no formulas."""
-        self.links = 0
-        self.run: list[TextPiece] = []
-
-    def read(self) -> Iterator[Inline]:
-        at = 0
-        while found := _PIECE.search(self.text, at):
-            self._add(at, found.start())
-            start = found.start()
-            if found[0] == "<":
-                tag = tag_at(self.text, start)
-                if tag is not None:
-                    yield from self._flush()
-                    yield self._tag(tag)
-                at = start + 1 if tag is None else tag.end
-                if tag is None:
-                    self._add(start, at)
-            elif found[0] != "$" or self.literal:
-                at = found.end()
-                self.run.append(
-                    TextPiece(found[0] if self.literal else "$", start, at, bool(self.literal))
-                )
-            else:
-                formula = find_formula(self.text, start, len(self.text))
-                at = start + 1 if formula is None else formula.after
-                if formula is None:
-                    self._add(start, at)
-                else:
-                    yield from self._flush()
-                    tex = self.excerpt.slice(formula.start, formula.end)
-                    yield Math(self.excerpt.span(start, at), tex, formula.display)
-        self._add(at, len(self.text))
-        yield from self._flush()
-
-    def _add(self, start: int, end: int) -> None:
-        at = start
-        for entity in _ENTITY.finditer(self.text, start, end):
-            decoded = unescape(entity[0])
-            if decoded != entity[0]:
-                self._text(at, entity.start())
-                self.run.append(TextPiece(decoded, entity.start(), entity.end(), False))
-                at = entity.end()
-        self._text(at, end)
-
-    def _text(self, start: int, end: int) -> None:
-        """Text without entities; its line ends are items of their own."""
-        at = start
-        while at < end:
-            line_end = self.text.find("\n", at, end)
-            stop = end if line_end < 0 else line_end
-            if stop > at:
-                self.run.append(TextPiece(self.text[at:stop], at, stop))
-            if line_end >= 0:
-                self.run.append(TextPiece("\n", stop, stop + 1))
-            at = stop + 1
-
-    def _flush(self) -> list[Inline]:
-        run, self.run = self.run, []
-        make = plain if self.literal or self.links else with_mentions
-        return make(run, self.excerpt)
-
-    def _tag(self, tag: Tag) -> RawInline:
-        span = self.excerpt.span(tag.start, tag.end)
-        self.balance.add(tag, self.text, self.excerpt.span)
-        if tag.closes and tag.name in self.literal:
-            del self.literal[self.literal.index(tag.name) :]
-        elif tag.name in _LITERAL and not tag.closes and not tag.complete:
-            self.literal.append(tag.name)
-        if tag.name == "a":
-            self.links = max(0, self.links + (-1 if tag.closes else 1))
-        html = self.text[tag.start : tag.end]
-
-        def place(start: int, end: int) -> Span:
-            return self.excerpt.span(tag.start + start, tag.start + end)
-
-        return RawInline(span, html, media_of(html, place))

@@ -32,6 +32,7 @@ from markdown_it.token import Token
 from markdown_it.utils import EnvType
 
 from coursebuild.core.syntax.attributes import Braces
+from coursebuild.core.syntax.html import LITERAL, tag_at
 from coursebuild.core.syntax.math import math_inline
 from coursebuild.core.syntax.spans import InlineState, PositionedToken
 
@@ -43,9 +44,13 @@ MAX_RUN = 200
 InlineRule = Callable[[StateInline, bool], bool]
 
 
-def inline_tokens(src: str, env: EnvType) -> list[PositionedToken]:
-    """The inline tokens of a block's content; `env` comes from `Definitions.environment`."""
-    return cast(list[PositionedToken], _MARKDOWN.inline.parse(src, _MARKDOWN, env, []))
+def inline_tokens(src: str, env: EnvType, *, html: bool = False) -> list[PositionedToken]:
+    """The inline tokens of a block's content; `env` comes from `environment`.
+
+    In `html` only tags, entities and formulas are read.
+    """
+    parser = _HTML if html else _MARKDOWN
+    return cast(list[PositionedToken], parser.inline.parse(src, parser, env, []))
 
 
 def _emphasis(state: StateInline, silent: bool) -> bool:
@@ -146,7 +151,44 @@ def _link(state: StateInline, silent: bool) -> bool:
     return rule(state, silent)
 
 
-_RULES: dict[str, tuple[InlineRule, ...]] = {
+def _html(state: StateInline, silent: bool) -> bool:
+    """A tag or a comment in a text that is HTML."""
+    assert isinstance(state, InlineState)
+    tag = tag_at(state.src, state.pos)
+    if tag is None:
+        return False
+    if tag.name in LITERAL and not tag.complete and state.literal in ("", tag.name):
+        state.literal = "" if tag.closes else tag.name
+    state.push("html_inline", "", 0).content = state.src[tag.start : tag.end]
+    state.pos = tag.end
+    return True
+
+
+def _formula(state: StateInline, silent: bool) -> bool:
+    """A formula in a text that is HTML, or a dollar behind a backslash."""
+    assert isinstance(state, InlineState)
+    if state.literal:
+        return False
+    if state.src[state.pos] == "$":
+        return math_inline(state, silent)
+    if not state.src.startswith("$", state.pos + 1):
+        return False
+    state.push("text_special", "", 0).content = "$"
+    state.pos += 2
+    return True
+
+
+def _line_end(state: StateInline, silent: bool) -> bool:
+    """A line end in a text that is HTML."""
+    state.push("softbreak", "br", 0)
+    state.pos += 1
+    return True
+
+
+InlineRules = dict[str, tuple[InlineRule, ...]]
+"""By the first character of what they read."""
+
+_RULES: InlineRules = {
     "\n": (newline,),
     "\\": (escape,),
     "`": (_code_span,),
@@ -161,33 +203,43 @@ _RULES: dict[str, tuple[InlineRule, ...]] = {
 }
 _STOP = re.compile(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
 """Where text ends; a `!` is nothing without a bracket."""
-
-
-def _by_character(state: StateInline, silent: bool) -> bool:
-    """The first rule of the next character that takes it; its tokens get their places."""
-    at, before = state.pos, len(state.tokens)
-    for rule in _RULES.get(state.src[at], ()):
-        if rule(state, silent):
-            if len(state.tokens) > before:
-                _place(state, before, at)
-            return True
-    return False
+_HTML_RULES: InlineRules = {
+    "\n": (_line_end,),
+    "\\": (_formula,),
+    "<": (_html,),
+    "&": (entity,),
+    "$": (_formula,),
+}
+_HTML_STOP = re.compile(r"[\n\\<&$]")
 
 
 class _Inlines(ParserInline):
-    """markdown-it's inline parser with the rules above."""
+    """markdown-it's inline parser with rules of ours."""
 
-    def __init__(self) -> None:
+    def __init__(self, rules: InlineRules, stop: re.Pattern[str]) -> None:
         super().__init__()
+        self.rules = rules
         self.ruler = Ruler()
         self.ruler.push("text", text)
-        self.ruler.push("by character", _by_character)
+        self.ruler.push("by character", self.by_character)
         self.ruler2.disable("fragments_join")
-        self.terminator_re = _STOP
+        self.terminator_re = stop
+
+    def by_character(self, state: StateInline, silent: bool) -> bool:
+        """The first rule of the next character that takes it; its tokens get their places."""
+        at, before = state.pos, len(state.tokens)
+        for rule in self.rules.get(state.src[at], ()):
+            if rule(state, silent):
+                if len(state.tokens) > before:
+                    _place(state, before, at)
+                return True
+        return False
 
     def parse(self, src: str, md: MarkdownIt, env: EnvType, tokens: list[Token]) -> list[Token]:
         """Add the tokens of a whole text."""
         state = InlineState(src, md, env)
+        if "`" not in self.rules:  # backticks are text
+            state.last_runs = {}
         self.tokenize(state)
         if state.delimiters or any(state.tokens_meta):  # there are marks to be paired
             for rule in self.ruler2.getRules(""):
@@ -221,12 +273,13 @@ def _place(state: StateInline, before: int, at: int) -> None:
     state.mark = after
 
 
-def _configured() -> MarkdownIt:
+def _configured(rules: InlineRules, stop: re.Pattern[str]) -> MarkdownIt:
     md = MarkdownIt("zero", {"html": True, "maxNesting": MAX_NESTING})
-    md.inline = _Inlines()
+    md.inline = _Inlines(rules, stop)
     # Links with dangerous schemes stay links, so that they can be reported.
     md.validateLink = lambda url: True  # type: ignore[method-assign]
     return md
 
 
-_MARKDOWN = _configured()
+_MARKDOWN = _configured(_RULES, _STOP)
+_HTML = _configured(_HTML_RULES, _HTML_STOP)

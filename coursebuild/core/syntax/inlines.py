@@ -40,7 +40,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
 from coursebuild.core.syntax.headings import term_id
-from coursebuild.core.syntax.html import Balance, media_of, tags
+from coursebuild.core.syntax.html import LITERAL, Balance, media_of, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
 from coursebuild.core.syntax.links import (
     TextPiece,
@@ -50,7 +50,7 @@ from coursebuild.core.syntax.links import (
     plain,
     with_mentions,
 )
-from coursebuild.core.syntax.markdown import Definitions
+from coursebuild.core.syntax.markdown import Definitions, environment
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken, locate
 from coursebuild.core.syntax.unread_markup import unread_markup
@@ -81,11 +81,24 @@ class InlineReader:
         self.report = session.report
         self._environment: EnvType | None = None
 
-    def read(self, content: Excerpt, *, mentions: bool = True) -> tuple[Inline, ...]:
-        """The inlines of a block's content; `mentions` says whether "Lesson 2.2" becomes a link."""
+    def read(
+        self, content: Excerpt, *, mentions: bool = True, html: bool = False
+    ) -> tuple[Inline, ...]:
+        """The inlines of a block's content.
+
+        `mentions` says whether "Lesson 2.2" becomes a link. In `html` only tags, entities and
+        formulas are read, and its elements may be closed in another block.
+        """
         if self._environment is None:  # all link definitions are known by now
-            self._environment = self.definitions.environment()
-        return _Pass(self, content, mentions).read(inline_tokens(content.text, self._environment))
+            self._environment = environment(self.definitions)
+        tokens = inline_tokens(content.text, self._environment, html=html)
+        one = _Pass(self, content, mentions)
+        if html:
+            return one.read(tokens)
+        self.balance.enter()
+        inlines = one.read(tokens)
+        self.balance.leave()
+        return inlines
 
 
 class _Pass:
@@ -99,9 +112,10 @@ class _Pass:
         self.texts: list[tuple[int, str]] = []
         self.links = 0 if mentions and may_mention(content.text) else 1
         """Open links, of Markdown and of HTML; one more where mentions are not wanted."""
+        self.code = 0
+        """Open elements of HTML in which every character stands for itself."""
 
     def read(self, tokens: Iterable[PositionedToken]) -> tuple[Inline, ...]:
-        self.reader.balance.enter()
         for token in tokens:
             kind = token.type
             if kind == "text" or kind == "text_special":
@@ -109,7 +123,7 @@ class _Pass:
                 if text:
                     literal = kind == "text" or text == token.markup
                     self.run.append(TextPiece(text, token.start, token.end, literal))
-                    if literal:
+                    if literal and not self.code:
                         self.texts.append((token.start, text))
             elif kind == "softbreak":
                 self.run.append(TextPiece("\n", token.start, token.end, False))
@@ -122,7 +136,6 @@ class _Pass:
             else:
                 self._leaf(token)
         self._flush()
-        self.reader.balance.leave()
         for unread in unread_markup(self.content, self.texts):
             self.reader.report(unread)
         return tuple(self.stack[0].nodes)
@@ -135,7 +148,7 @@ class _Pass:
             return
         self.run = []
         nodes = self.stack[-1].nodes
-        if not self.links:
+        if not self.links and not self.code:
             nodes += with_mentions(run, self.content)
         else:
             nodes += plain(run, self.content)
@@ -227,7 +240,7 @@ class _Pass:
         label = text[start + 1 : label_end]
         if end > label_end + 3:
             label = text[label_end + 2 : end - 1]
-        definition = self.reader.definitions.links.get(normalizeReference(label))
+        definition = self.reader.definitions.get(normalizeReference(label))
         if definition is None or not definition.rows:
             return self.content.span(start, end)
         rows = locate(definition.base, definition.rows)
@@ -298,8 +311,11 @@ class _Pass:
 
         for tag in tags(token.content):
             self.reader.balance.add(tag, token.content, place)
-            if tag.name == "a" and not tag.complete:
-                self.links = max(0, self.links + (-1 if tag.closes else 1))
+            step = 0 if tag.complete else -1 if tag.closes else 1
+            if tag.name == "a":
+                self.links = max(0, self.links + step)
+            elif tag.name in LITERAL:
+                self.code = max(0, self.code + step)
         return RawInline(span, token.content, media_of(token.content, place))
 
     def _image(self, token: PositionedToken, span: Span) -> Image:

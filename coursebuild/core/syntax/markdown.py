@@ -11,7 +11,7 @@ what markdown-it does:
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import cast
+from typing import TypeAlias, cast
 
 from markdown_it import MarkdownIt
 from markdown_it.common.utils import MD_TRIM_CHARS
@@ -20,7 +20,7 @@ from markdown_it.ruler import Ruler
 from markdown_it.rules_block import StateBlock, paragraph, reference
 from markdown_it.utils import EnvType
 from mdit_py_plugins.footnote.index import footnote_def
-from msgspec import Struct, field
+from msgspec import Struct
 
 from coursebuild.core.syntax.math import math_block
 from coursebuild.core.syntax.spans import BlockState, PositionedToken, SourceSlice
@@ -41,16 +41,14 @@ class Definition(Struct):
     rows: list[SourceSlice]
 
 
-class Definitions(Struct):
-    """The link definitions of a text, by normalised label."""
+Definitions: TypeAlias = dict[str, Definition]
+"""The link definitions of a text, by normalised label."""
 
-    links: dict[str, Definition] = field(default_factory=dict)
 
-    def environment(self) -> EnvType:
-        """The environment that markdown-it's rules read."""
-        return {
-            "references": {k: {"href": d.href, "title": d.title} for k, d in self.links.items()}
-        }
+def environment(definitions: Definitions) -> EnvType:
+    """The environment in which markdown-it's rules find the definitions."""
+    known = {label: {"href": d.href, "title": d.title} for label, d in definitions.items()}
+    return {"references": known}
 
 
 def block_tokens(base: Excerpt, definitions: Definitions) -> list[PositionedToken]:
@@ -58,7 +56,7 @@ def block_tokens(base: Excerpt, definitions: Definitions) -> list[PositionedToke
 
     Its link definitions are added to `definitions`.
     """
-    env: EnvType = {**definitions.environment(), "definitions": definitions, "base": base}
+    env: EnvType = {**environment(definitions), "definitions": definitions, "base": base}
     state = BlockState(base.text, _MARKDOWN, env)
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
     return cast(list[PositionedToken], state.tokens)
@@ -91,7 +89,7 @@ def _located_reference(state: StateBlock, start: int, end: int, silent: bool) ->
             at = state.bMarks[line] + state.tShift[line]
             rows.append(SourceSlice(state.src[at : state.eMarks[line]] + "\n", at))
         definitions: Definitions = state.env["definitions"]
-        definitions.links[label] = Definition(
+        definitions[label] = Definition(
             known[label]["href"], known[label]["title"], state.env["base"], rows
         )
     return True

@@ -28,7 +28,7 @@ class ParsingState:
         self.source = source
         self.callouts = callouts
         self.lesson = lesson
-        self.definitions = Definitions()
+        self.definitions: Definitions = {}
         """The link definitions of the document, which its inner texts may use."""
         self.diagnostics: list[Diagnostic] = []
         self.script: str | None = None

@@ -106,6 +106,8 @@ class InlineState(StateInline):
         """Where the last `]{` stands, once somebody asked."""
         self.last_runs: dict[int, int] | None = None
         """Where the last run of each number of backticks begins, once somebody asked."""
+        self.literal = ""
+        """In a text that is HTML: the open element in which a dollar is a dollar."""
 
     def pushPending(self) -> Token:  # noqa: N802
         """Make the pending text a token."""
@@ -202,19 +204,6 @@ def whole(source: Source) -> Excerpt:
 
 
 def normalized(excerpt: Excerpt) -> Excerpt:
-    """An excerpt with CommonMark's line ends and without NUL."""
-    if "\r" in excerpt.text:
-        excerpt = _unix(excerpt)
-    if "\0" in excerpt.text:
-        return Excerpt(excerpt.source, excerpt.text.replace("\0", "\ufffd"), excerpt.pieces)
-    return excerpt
-
-
-def _unix(excerpt: Excerpt) -> Excerpt:
-    rows: list[SourceSlice] = []
-    at = 0
-    for line in excerpt.text.replace("\r\n", "\r").replace("\n", "\r").split("\r"):
-        rows.append(SourceSlice(line + "\n", at))
-        at += len(line) + (2 if excerpt.text.startswith("\r\n", at + len(line)) else 1)
-    rows[-1] = SourceSlice(rows[-1].text[:-1], rows[-1].at)
-    return locate(excerpt, rows)
+    """An excerpt with CommonMark's line ends and without NUL, each character where it was."""
+    text = excerpt.text.replace("\r\n", " \n").replace("\r", "\n").replace("\0", "\ufffd")
+    return excerpt if text == excerpt.text else Excerpt(excerpt.source, text, excerpt.pieces)

@@ -7,7 +7,7 @@ Entry points: `TextParser`, `Prose.read`. The parser of a document hands itself 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol
+from typing import Any, Protocol
 
 from msgspec import Struct
 
@@ -32,45 +32,29 @@ class TextParser(Protocol):
 class Prose(Struct, frozen=True):
     """The Markdown strings inside a quiz or a lab, each parsed once."""
 
-    _blocks: dict[Node, tuple[Block, ...]]
-    _inlines: dict[Node, tuple[Inline, ...]]
+    _read: dict[Node, tuple[Any, ...]]
     diagnostics: tuple[Diagnostic, ...]
 
     @classmethod
     def read(cls, texts: Iterable[tuple[StringNode, str]], parser: TextParser) -> Prose:
         """Parse each text, `blocks` or `inlines`; a blank one says nothing."""
-        blocks: dict[Node, tuple[Block, ...]] = {}
-        inlines: dict[Node, tuple[Inline, ...]] = {}
-        found: list[Diagnostic] = []
-        for node, kind in texts:
-            if not node.value.strip():
-                continue
-            if kind == "blocks":
-                whole = parser.blocks(node.excerpt)
-                blocks[node] = whole.value
-                found += whole.diagnostics
-            else:
-                line = parser.inlines(node.excerpt)
-                inlines[node] = line.value
-                found += line.diagnostics
-        return cls(blocks, inlines, tuple(found))
+        parsed = {
+            node: parser.blocks(node.excerpt) if kind == "blocks" else parser.inlines(node.excerpt)
+            for node, kind in texts
+            if node.value.strip()
+        }
+        found = tuple(wrong for one in parsed.values() for wrong in one.diagnostics)
+        return cls({node: one.value for node, one in parsed.items()}, found)
 
     def blocks(self, node: Node | None) -> tuple[Block, ...]:
         """The blocks of a string; none for a field that is not given."""
-        return self._blocks.get(node, ()) if node is not None else ()
+        return () if node is None else self._read.get(node, ())
 
     def inlines(self, node: Node | None) -> tuple[Inline, ...]:
         """The inlines of a string; none for a field that is not given."""
-        return self._inlines.get(node, ()) if node is not None else ()
+        return () if node is None else self._read.get(node, ())
 
-    def each_blocks(self, node: Node | None) -> tuple[tuple[Block, ...], ...]:
-        """The blocks of each string of an array."""
-        return tuple(self.blocks(item) for item in _items(node))
-
-    def each_inlines(self, node: Node | None) -> tuple[tuple[Inline, ...], ...]:
-        """The inlines of each string of an array."""
-        return tuple(self.inlines(item) for item in _items(node))
-
-
-def _items(node: Node | None) -> tuple[Node, ...]:
-    return node.items if isinstance(node, ArrayNode) else ()
+    def each(self, node: Node | None) -> tuple[tuple[Any, ...], ...]:
+        """What the strings of an array hold, blocks or inlines, one after the other."""
+        items = node.items if isinstance(node, ArrayNode) else ()
+        return tuple(self._read.get(item, ()) for item in items)

@@ -41,7 +41,7 @@ from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_ours, read_fence
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
-from coursebuild.core.syntax.html import Balance, html_flow, media_of, tags
+from coursebuild.core.syntax.html import Balance, media_of, tags
 from coursebuild.core.syntax.inlines import InlineReader
 from coursebuild.core.syntax.markdown import Definitions, block_tokens
 from coursebuild.core.syntax.parsing_state import ParsingState, Written
@@ -205,14 +205,10 @@ class TextReader:
         """Raw HTML, kept as it is unless it holds formulas."""
         html = locate(self.base, token.rows)
         if self.nested or "$" in html.text:
-            flow = html_flow(trimmed(html, " \t\n"), self.balance)
-            formulas = [child for child in flow.children if isinstance(child, Math)]
-            for formula in formulas:
-                if not formula.tex.text.strip():
-                    wrong = diagnose("math-syntax", formula.span, "the formula is empty")
-                    self.session.report(wrong)
-            if self.nested or formulas:
-                return flow
+            content = trimmed(html, " \t\n")
+            children = self.inlines.read(content, html=True)
+            if self.nested or any(isinstance(child, Math) for child in children):
+                return HtmlFlow(content.span(), children)
         else:
             for tag in tags(html.text):
                 self.balance.add(tag, html.text, html.span)
@@ -365,4 +361,4 @@ class Texts:
 
     def _definitions(self) -> Definitions:
         """The document's link definitions; those that a text adds are its own."""
-        return Definitions(dict(self._session.definitions.links))
+        return dict(self._session.definitions)

@@ -191,7 +191,7 @@ def _question(
     if not isinstance(fields, AnyFields):
         return None
     text, explain = prose.blocks(node.get("q")), prose.blocks(node.get("explain"))
-    common = (node.span, key, fields.label, text, explain, prose.each_blocks(node.get("hints")))
+    common = (node.span, key, fields.label, text, explain, prose.each(node.get("hints")))
     match fields:
         case MultipleChoice() | Predict():
             several = isinstance(fields.answer, tuple)
@@ -217,7 +217,7 @@ def _question(
             return OutputQuestion(*common, fields.of, script, fields.line, line)
         case OrderFields():
             keys = QuestionKeys().each("item", fields.items)
-            return OrderQuestion(*common, prose.each_inlines(node.get("items")), keys)
+            return OrderQuestion(*common, prose.each(node.get("items")), keys)
         case _:
             assert_never(fields)
 
@@ -225,7 +225,7 @@ def _question(
 def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[Choice, ...]:
     options = node.get("options")
     items = options.items if isinstance(options, ArrayNode) else ()
-    feedback = prose.each_blocks(node.get("feedback"))
+    feedback = prose.each(node.get("feedback"))
     padded = feedback + ((),) * (len(items) - len(feedback))
     keys = QuestionKeys().each("option", texts)
     return tuple(

@@ -9,7 +9,7 @@ from markdown_it.rules_block import StateBlock
 
 from coursebuild.core.model import Table
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.markdown import Definitions, block_tokens
+from coursebuild.core.syntax.markdown import block_tokens
 from coursebuild.core.syntax.spans import BlockState, locate
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.text.source import Excerpt, Source
@@ -40,7 +40,7 @@ def test_lines_are_cut_out_as_by_markdown_it(text: str, data: st.DataObject) -> 
 @given(tables)
 def test_cells_are_those_of_markdown_it(text: str) -> None:
     base = Excerpt(Source("a.md", text), text, ((0, 0),))
-    tokens = block_tokens(base, Definitions())
+    tokens = block_tokens(base, {})
     for i, token in enumerate(tokens):
         if token.type == "table_open":
             table, after = read_table(tokens, i, base, lambda _: (), lambda _: None)
