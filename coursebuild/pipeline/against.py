@@ -121,7 +121,7 @@ class _Work(Struct):
             status,
             why,
             there.changes,
-            there.diffs,
+            there.diff,
             failure(extraction, there.run, everything),
         )
 

@@ -31,7 +31,7 @@ from coursebuild.core.run.runner import RunAll, ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import apply_edits, updated_body
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.findings import binding_history, script_findings
+from coursebuild.core.scripts.findings import held_lines, script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.judge import judge
@@ -251,7 +251,7 @@ def _afterwards(
 
     # What was written above a script moved it, so that its place is another than before.
     placed = [extraction for extraction in extract(now).value if extraction.path in ran]
-    held = binding_history(before, runs, verdicts(before)) if now is not before else None
+    held = held_lines(before, runs, verdicts(before)) if now is not before else None
     found = script_findings(now, placed, runs, verdicts(now), held)
     # What update just refused is told by the refusal; a dry run leaves the drift as it is.
     return [d for d in found if d.rule != "output-drift"]

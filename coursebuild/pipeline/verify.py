@@ -20,15 +20,12 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
-from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Trial, TrialContext, Trials
 from coursebuild.core.model import Course, FeatureBlock, document_blocks
 from coursebuild.core.model.results import CompileResult, Results, ScriptRun, TrialLine, TrialResult
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.versions import engine_version, python_version
-from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
-from coursebuild.core.scripts.bindings import document_bindings
+from coursebuild.core.scripts.bindings import HeldLines, document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.findings import script_findings
@@ -63,15 +60,15 @@ def verify(
     static: bool = False,
     shard: Shard | None = None,
     run_all: RunAll | None = None,
-    bindings: BindingMemory | None = None,
+    held: HeldLines | None = None,
     known: Mapping[str, ScriptRun] | None = None,
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`. `bindings`: bound
-    numbers that held before, where it is not what the store has. `known`: what scripts do, by path,
-    that need not be looked at.
+    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`. `held`: the lines
+    by which bound numbers held before. `known`: what scripts do, by path, that need not be looked
+    at.
     """
     options.store.listen(progress.say)
     extracted = extract_scripts(course, options)
@@ -91,10 +88,7 @@ def verify(
     else:
         runs = scripts()
     verdicts = compare_all(course, runs)
-    kept = KeptBindings(options.store) if bindings is None else None
-    found += script_findings(course, chosen, runs, verdicts, kept or bindings, extracted.all)
-    if kept is not None:
-        kept.save()
+    found += script_findings(course, chosen, runs, verdicts, held, extracted.all)
     if memory.differing:
         from coursebuild.core.scripts.repeat import repeat_findings
 
@@ -136,40 +130,6 @@ def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
                 if isinstance(block, FeatureBlock):
                     paths |= {script for script, _ in block.quoted_lines()}
     return paths
-
-
-class KeptBindings:
-    """Bound numbers in which nothing is wrong, by a hash of all that this depends on.
-
-    Those of the last run are kept, and no others.
-    """
-
-    def __init__(self, store: Memo) -> None:
-        self._store = store
-        self._key = step_key("bindings")
-        known = store.get_value("bindings", self._key, list[str], local=True)
-        self._before = frozenset(known or ())
-        self._now: set[str] = set()
-
-    def holds(self, key: str, inputs: BindingInputs) -> bool:
-        """Whether nothing was wrong in the last run."""
-        if key in self._before:
-            self._now.add(key)
-            return True
-        return False
-
-    def add(self, key: str, inputs: BindingInputs, evidence: BindingEvidence) -> None:
-        """That nothing is wrong."""
-        self._now.add(key)
-
-    def before(self, inputs: BindingInputs) -> BindingEvidence:
-        """Not kept: what is said of a course does not depend on what was said of it before."""
-        return BindingEvidence()
-
-    def save(self) -> None:
-        """Keep what was found."""
-        if self._now != self._before:
-            self._store.put_value("bindings", self._key, sorted(self._now), local=True)
 
 
 # --- models

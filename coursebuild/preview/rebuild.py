@@ -25,7 +25,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.run.runner import RunStoppedError, ScriptServer
-from coursebuild.core.scripts.binding_memory import BindingHistory
+from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.pipeline.check import no_lessons
 from coursebuild.pipeline.options import Options
@@ -43,8 +43,6 @@ LONGEST = 2.0
 """Seconds after which it begins all the same."""
 RETRY = 2.0
 """Seconds after which what could not be done is tried again, though nothing was saved."""
-_REMEMBERED = 100_000
-"""Bindings that held that are remembered, each with the lines by which it did."""
 
 
 class SupersededError(Exception):
@@ -62,8 +60,8 @@ class BackgroundRebuild:
         self._progress = progress if progress.live else Progress(quiet=True)
         self._seen = -1
         """The number of the state that was looked at last."""
-        self._bindings = BindingHistory()
-        """Bindings that held, also before an output was accepted; see `check_bindings`."""
+        self._held: HeldLines = {}
+        """The lines by which bound numbers held, also before an output was accepted."""
         self._server = ScriptServer()
         self._printed: str | None = None
         self._failure: BaseException | None = None
@@ -158,8 +156,6 @@ class BackgroundRebuild:
 
     def _verify(self, course: Course) -> None:
         session = self._session
-        if len(self._bindings) > _REMEMBERED:
-            self._bindings.clear()
         scripts = extract(course).value
         with session.changed:
             everything, session.all_due = session.all_due, False
@@ -171,7 +167,7 @@ class BackgroundRebuild:
                 self._progress,
                 static=True,
                 run_all=self._run_all(scripts),
-                bindings=self._bindings,
+                held=self._held,
                 known=known,
             )
         except BaseException as error:

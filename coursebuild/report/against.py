@@ -41,7 +41,7 @@ class ScriptAgainst(Struct, frozen=True):
     why: str = ""
     """For the last three, a clause."""
     changes: tuple[Change, ...] = ()
-    diffs: tuple[str, ...] = ()
+    diff: str = ""
     failure: Diagnostic | None = None
     """How it failed with the other version."""
 
@@ -96,7 +96,7 @@ def against_text(report: AgainstReport, style: Style, *, quiet: bool = False) ->
 
     `quiet`: without the scripts that do the same.
     """
-    told = [s for s in report.scripts if s.changes or s.diffs or s.failure is not None]
+    told = [s for s in report.scripts if s.changes or s.diff or s.failure is not None]
     parts = ["\n".join(_script(s, report.other, style)) + "\n" for s in told]
     lines = [
         f"{_verdict(s, style)} {visible(s.path)}{_because(s)}"
@@ -137,11 +137,9 @@ def _script(script: ScriptAgainst, other: str, style: Style) -> list[str]:
         lines.append(visible(f"  {location(change.span)}: {_change(change, who)}"))
     if len(named) > _NAMED:
         lines.append(f"  and {plural(len(named) - _NAMED, 'more difference')}")
-    before = "--- recorded" if script.changes else "--- here"
-    for diff in script.diffs:
-        rest = diff.split("\n")[2:]
-        shown = visible_lines("\n".join((before, f"+++ {who}", *rest)))
-        lines += [style.paint(f"  {line}", FAINT) for line in shown.split("\n")]
+    if script.diff:
+        diff = visible_lines(f"--- here\n+++ {who}\n{script.diff}")
+        lines += [style.paint(f"  {line}", FAINT) for line in diff.split("\n")]
     return lines
 
 

@@ -105,12 +105,6 @@ def test_changed_outputs_are_told_number_by_number(
 changed    examples/number.py  by MuJoCo {OTHER}
   content/lessons/1.1-one.md:22:8: recorded {REAL_NUMBER}; MuJoCo {OTHER} printed 9001000 \
 (relative error {error:.1e}, no digit agrees)
-  --- recorded
-  +++ MuJoCo {OTHER}
-  @@ -1,2 +1,2 @@
-  -header {REAL_NUMBER}
-  +header 9001000
-   and 1
 
 fails      examples/failing.py  by MuJoCo {OTHER}
   content/lessons/1.1-one.md:28: `examples/failing.py` exited with status 1: AttributeError: \

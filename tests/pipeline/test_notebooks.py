@@ -91,7 +91,7 @@ def test_notebooks_of_course_run_in_an_empty_folder(
             if isinstance(recording, Recording) and recording.script in printed:
                 how = recording.comparison or course.comparison
                 verdict = compare(recording, how, course.filters, printed[recording.script])
-                assert verdict.status in ("verified", "volatile"), verdict.diff
+                assert verdict.status in ("verified", "volatile"), verdict.changes
                 compared += 1
     assert compared >= (2 if name != "other letters" else 1)
 

@@ -85,7 +85,7 @@ def known_of(course: Course) -> Iterator[object]:
     ]
     yield extracted.diagnostics
     yield [(e.path, e.text, e.owner, e.script) for e in extracted.value]
-    yield [(v.recording.span, v.recording.body, v.status, v.changes, v.diff) for v in verdicts]
+    yield [(v.recording.span, v.recording.body, v.status, v.changes) for v in verdicts]
     yield script_findings(course, extracted.value, runs, verdicts)
     yield list(check_output_lines(course, runs))
     yield [(n, [(u.owner.id, u.by_lab, u.by_script) for u in us]) for n, us in library.uses.items()]

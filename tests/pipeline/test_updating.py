@@ -231,7 +231,6 @@ def test_what_is_printed_in_the_place_of_a_number_is_told(make: Make) -> None:
         "2.95 is printed where 2.006 was",
         "= help: write `2.95`",
         "the nearest printed value is 2.95",
-        "= help: write `3.0`, if that is what is meant",
     ]
 
 

@@ -168,8 +168,6 @@ class Verdict(Struct, frozen=True):
     status: Literal["verified", "drift", "volatile", "unchecked"]
     """`unchecked`: the script did not run to its end."""
     changes: tuple[Change, ...] = ()
-    diff: str = ""
-    """Unified diff of recorded against ran, empty where nothing differs."""
 
 
 class Formula(Struct, frozen=True):

@@ -17,10 +17,9 @@ from msgspec import Struct
 
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Change, Outcome, ScriptRun, Verdict
-from coursebuild.core.scripts.align import StepKind, align
+from coursebuild.core.scripts.align import same_lines
 from coursebuild.core.scripts.compare import verify
-from coursebuild.core.scripts.diff import diff_text
-from coursebuild.core.scripts.lines import LineMatcher
+from coursebuild.core.scripts.diff import text_diff
 from coursebuild.core.scripts.mapped_text import Side
 
 Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
@@ -34,13 +33,13 @@ class RunStanding(Struct, frozen=True):
     compared: bool
     """Whether there is anything that it could be held against."""
     changes: tuple[Change, ...] = ()
-    diffs: tuple[str, ...] = ()
-    """Unified diffs, one for each output that differs."""
+    diff: str = ""
+    """Of what is printed, where nothing is recorded."""
 
     @property
     def holds(self) -> bool:
         """Whether it ran to its end and printed what it should."""
-        return self.run.outcome is Outcome.OK and not self.diffs
+        return self.run.outcome is Outcome.OK and not (self.changes or self.diff)
 
 
 class Judgement(Struct, frozen=True):
@@ -69,16 +68,13 @@ def run_standings(
 
 def _of_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> RunStanding:
     told = [verdict for verdict in verdicts if verdict.status != "volatile"]
-    changes = tuple(change for verdict in told for change in verdict.changes)
-    diffs = tuple(verdict.diff for verdict in told if verdict.status == "drift")
-    return RunStanding(run, bool(told), changes, diffs)
+    return RunStanding(run, bool(told), tuple(c for verdict in told for c in verdict.changes))
 
 
 def _of_print(course: Course, here: ScriptRun, run: ScriptRun) -> RunStanding:
     one, two = (Side.of(each.stdout, course.filters) for each in (here, run))
-    steps = align(one, two, LineMatcher(course.comparison))
-    same = all(step.kind is StepKind.SAME for step in steps)
-    return RunStanding(run, True, (), () if same else (diff_text(steps, one, two),))
+    same = same_lines(one, two, course.comparison)
+    return RunStanding(run, True, diff="" if same else text_diff(here.stdout, run.stdout))
 
 
 def is_comparable(here: RunStanding) -> Judgement | None:

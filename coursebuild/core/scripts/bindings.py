@@ -15,15 +15,14 @@ Entry points: `check_bindings` (a document), `leaning_on` (who leans on what has
 
 from __future__ import annotations
 
-import hashlib
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TypeAlias
 
 from msgspec import Struct
 
 from coursebuild.core.model import Document, Mode, NumberBinding, Table, document_inlines
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
-from coursebuild.core.scripts.binding_memory import BindingEvidence, BindingInputs, BindingMemory
 from coursebuild.core.scripts.bound_numbers import (
     PrintedLine,
     Shown,
@@ -42,6 +41,23 @@ _FAILED = (
     Outcome.OUTPUT_LIMIT,
     Outcome.ENCODING,
 )
+
+
+class BindingPlace(Struct, frozen=True):
+    """What a binding shows, and on which outputs it leans, whatever they say now."""
+
+    text: str
+    script: str
+    document: str
+    """Empty where the binding names the script."""
+    nth: int
+    """Of the recorded outputs of the script in the document."""
+    count: int
+    """Of these outputs: with another one, it is not known any more which is which."""
+
+
+HeldLines: TypeAlias = dict[BindingPlace, tuple[str, ...]]
+"""The lines by which bindings held when that was last looked at."""
 
 
 class Leaning(Struct, frozen=True):
@@ -83,15 +99,15 @@ class Printed:
         after = bisect_left(found, binding.span.start + 1, key=_end_of_body)
         return found[after - 1 : after] if after else []
 
-    def inputs(self, binding: NumberBinding) -> BindingInputs:
+    def place(self, binding: NumberBinding) -> BindingPlace:
         """What a binding shows, and on which outputs it leans."""
         recorded = self.recorded(binding)
         if binding.script is not None or not recorded:
-            return BindingInputs(binding.text, binding.script or "", "", 0, len(recorded))
+            return BindingPlace(binding.text, binding.script or "", "", 0, len(recorded))
         (verdict,) = recorded
         path, script = binding.span.path, verdict.recording.script or ""
         same = [_key(v) for v in self._by_document[path] if v.recording.script == script]
-        return BindingInputs(binding.text, script, path, same.index(_key(verdict)), len(same))
+        return BindingPlace(binding.text, script, path, same.index(_key(verdict)), len(same))
 
     def lines(self, verdict: Verdict) -> tuple[PrintedLine, ...]:
         """The lines of a recorded output."""
@@ -116,42 +132,23 @@ def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
 
 
 def check_bindings(
-    document: Document, printed: Printed, memory: BindingMemory | None = None
+    document: Document, printed: Printed, held: HeldLines | None = None
 ) -> tuple[Diagnostic, ...]:
     """What is wrong with the bindings of a document.
 
-    Nothing is said of bindings that lean on a script that failed: its failure is reported. `memory`
-    remembers what was looked at before.
+    Nothing is said of bindings that lean on a script that failed: its failure is reported. `held`
+    takes the lines by which bindings hold, and tells them of those that do not any more.
     """
+    held = {} if held is None else held
     found: list[Diagnostic] = []
     for binding in document_bindings(document):
-        before = BindingEvidence()
-        if memory is not None:
-            key, inputs = _fingerprint(binding, printed), printed.inputs(binding)
-            if memory.holds(key, inputs):
-                continue
-            before = memory.before(inputs)
-        checked = _check(binding, printed, before)
+        place = printed.place(binding)
+        checked = _check(binding, printed, held.get(place, ()))
         if isinstance(checked, Diagnostic):
             found.append(checked)
-        elif memory is not None:
-            memory.add(key, inputs, checked)
+        elif checked:
+            held[place] = tuple(line.text for line in checked)
     return tuple(found)
-
-
-def _fingerprint(binding: NumberBinding, printed: Printed) -> str:
-    """A hash of everything that decides whether a binding holds."""
-    path, run, verdicts = _leans_on(binding, printed)
-    parts = [binding.text, binding.script or "", str(path in printed.scripts)]
-    parts += ["-"] if run is None else [run.outcome.value, run.stdout]
-    for verdict in verdicts:
-        recording, how = verdict.recording, verdict.comparison
-        if isinstance(recording.body, Table):
-            parts += ["table", recording.prefix, recording.body_span.text]
-        else:
-            parts += ["text", recording.body.text]
-        parts += [how.mode.value, str(how.rtol), str(how.atol), str(how.ellipsis), verdict.status]
-    return hashlib.sha256(repr(parts).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _leans_on(
@@ -164,8 +161,8 @@ def _leans_on(
 
 
 def _check(
-    binding: NumberBinding, printed: Printed, before: BindingEvidence
-) -> Diagnostic | BindingEvidence:
+    binding: NumberBinding, printed: Printed, before: Sequence[str]
+) -> Diagnostic | Sequence[PrintedLine]:
     """What is wrong with a binding, or the lines by which it holds, as far as it was looked at.
 
     `before` are those by which it held before, if that is known.
@@ -177,7 +174,7 @@ def _check(
     if run is not None and (
         run.outcome in _FAILED or (verdicts and ran_well and not run.stdout.strip())
     ):
-        return BindingEvidence()
+        return ()
     if not verdicts and not ran_well:
         return _never_run(binding, path, run)
     steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
@@ -191,21 +188,14 @@ def _check(
     shown = Shown.of(binding.text)
     lines = [line for verdict in steady for line in printed.lines(verdict)]
     if _holds(shown, lines):
-        return _evidence(lines)
+        return lines
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
     drifted = any(v.status == "drift" for v in steady)
-    if not ((partial or drifted or not steady) and run is not None and ran_well):
-        return mismatch(binding, path, lines, before.lines, lines)
-    ran = lines_of_run(run.stdout)
-    counted = ran if drifted else (*lines, *ran)
-    if _holds(shown, counted):
-        return _evidence(ran, ran=True)
-    now = ran if drifted or before.ran or not steady else lines
-    return mismatch(binding, path, counted, before.lines, now)
-
-
-def _evidence(lines: Sequence[PrintedLine], *, ran: bool = False) -> BindingEvidence:
-    return BindingEvidence(tuple(line.text for line in lines), ran)
+    if (partial or drifted or not steady) and run is not None and ran_well:
+        lines = list(lines_of_run(run.stdout))
+        if _holds(shown, lines):
+            return lines
+    return mismatch(binding, path, lines, before)
 
 
 def _holds(shown: Shown, lines: Sequence[PrintedLine]) -> bool:
@@ -216,10 +206,10 @@ def _holds(shown: Shown, lines: Sequence[PrintedLine]) -> bool:
 
 def _never_run(
     binding: NumberBinding, path: str, run: ScriptRun | None
-) -> Diagnostic | BindingEvidence:
+) -> Diagnostic | Sequence[PrintedLine]:
     """A binding to a script without a recorded output and without a run that could count."""
     if run is None or run.outcome is not Outcome.NORUN:
-        return BindingEvidence()
+        return ()
     return diagnose(
         "binding-orphan",
         binding.text_span,

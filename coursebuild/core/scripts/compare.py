@@ -32,7 +32,6 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.changes import differences, number_change
-from coursebuild.core.scripts.diff import diff_text
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.tables import compare_table
@@ -85,12 +84,9 @@ def compare(
     if same_lines(recorded, ran, comparison):
         return Verdict(recording, comparison, "verified")
     matcher = LineMatcher(comparison)
-    steps = align(recorded, ran, matcher)
     changes = _Changes(recording, body, recorded, ran, matcher, ran.line_starts())
-    found = tuple(changes.of(steps))
-    if not found:
-        return Verdict(recording, comparison, "verified")
-    return Verdict(recording, comparison, "drift", found, diff_text(steps, recorded, ran))
+    found = tuple(changes.of(align(recorded, ran, matcher)))
+    return Verdict(recording, comparison, "drift" if found else "verified", found)
 
 
 class _Changes(Struct, frozen=True):

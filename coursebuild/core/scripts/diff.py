@@ -1,16 +1,15 @@
-"""A recorded output beside what its script prints now: a unified diff for messages, rows for pages.
+"""A recorded output beside what its script prints now, line by line.
 
-Entry points: `diff_text`, `diff_rows(recording, verdict, filters, stdout)`; `shortened`.
+Entry points: `diff_rows(recording, verdict, filters, stdout)`; `text_diff`, `shortened`.
 
-1. Lines that match under the comparison's mode are as recorded, even where their characters differ;
-   lines that a `...` stands for are left out.
-2. The text is kept to a readable size. The rows are all lines, and say which part of a line is
-   another.
+Lines that match under the comparison's mode are as recorded, even where their characters differ;
+lines that a `...` stands for are left out. A row says which part of its line is another.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import difflib
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Literal, TypeAlias
 
@@ -24,10 +23,7 @@ from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 
 Mark: TypeAlias = Literal[" ", "-", "+"]
-_CONTEXT = 2
-_LINES = 40
-_WIDTH = 160
-_CHANGED = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
+_LINES, _WIDTH = 12, 120
 
 
 class DiffPiece(Struct, frozen=True):
@@ -49,65 +45,16 @@ def shortened(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
-def diff_text(steps: Sequence[Step], recorded: Side, ran: Side) -> str:
-    """The diff with two lines of context, at most 40 lines of at most 160 characters."""
-    lines: list[str] = []
-    for hunk in _hunks(steps):
-        rows = _gone_first(row for step in hunk for row in _rows(step, recorded, ran))
-        lines.append(_header(hunk))
-        lines += (row.mark + shortened(row.pieces[0].text, _WIDTH) for row in rows)
+def text_diff(before: str, now: str) -> str:
+    """The lines that two texts do not share, at most twelve of them."""
+    lines = [
+        shortened(line, _WIDTH)
+        for line in difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
+        if not line.startswith(("---", "+++", "@@"))
+    ]
     if len(lines) > _LINES:
         lines[_LINES:] = [f"… and {len(lines) - _LINES} more lines"]
-    return "\n".join(("--- recorded", "+++ this run", *lines)) if lines else ""
-
-
-def _hunks(steps: Sequence[Step]) -> list[list[Step]]:
-    """Stretches of steps around changes, with their context."""
-    shown: set[int] = set()
-    for index, step in enumerate(steps):
-        if step.kind in _CHANGED:
-            shown.add(index)
-            for way in (-1, 1):
-                for near in range(index + way, index + way * (_CONTEXT + 1), way):
-                    if not 0 <= near < len(steps) or steps[near].kind is not StepKind.SAME:
-                        break
-                    shown.add(near)
-    hunks: list[list[Step]] = []
-    for index in sorted(shown):
-        if index - 1 not in shown:
-            hunks.append([])
-        hunks[-1].append(steps[index])
-    return hunks
-
-
-def _rows(step: Step, recorded: Side, ran: Side) -> Iterator[DiffRow]:
-    """The rows of a step: one for a line on either side, none for what an ellipsis stands for."""
-    if step.kind is StepKind.SAME:
-        yield _row(" ", recorded.lines[step.recorded])
-    if step.kind in (StepKind.DIFFERS, StepKind.MISSING):
-        yield _row("-", recorded.lines[step.recorded])
-    if step.kind in (StepKind.DIFFERS, StepKind.EXTRA):
-        yield _row("+", ran.lines[step.ran])
-
-
-def _row(mark: Mark, text: str) -> DiffRow:
-    return DiffRow(mark, (DiffPiece(text, mark != " "),))
-
-
-def _gone_first(rows: Iterable[DiffRow]) -> list[DiffRow]:
-    """All that goes before all that comes, as far as no common line lies between."""
-    done: list[DiffRow] = []
-    for _, group in groupby(rows, key=lambda row: row.mark == " "):
-        done += sorted(group, key=lambda row: row.mark, reverse=True)
-    return done
-
-
-def _header(hunk: Sequence[Step]) -> str:
-    """Where a hunk begins on both sides, and how many lines of each it has."""
-    recorded = sum(step.kind is not StepKind.EXTRA for step in hunk)
-    ran = sum(step.kind is not StepKind.MISSING for step in hunk)
-    first = hunk[0].recorded + (recorded > 0), hunk[0].ran + (ran > 0)
-    return f"@@ -{first[0]},{recorded} +{first[1]},{ran} @@"
+    return "\n".join(lines)
 
 
 def diff_rows(
@@ -124,9 +71,10 @@ def diff_rows(
     matcher = LineMatcher(verdict.comparison)
     recorded, ran = Side.of(recording.body.text, filters), Side.of(stdout, filters)
     steps = align(recorded, ran, matcher)
-    return tuple(
-        _gone_first(row for step in steps for row in _page_rows(step, recorded, ran, matcher))
-    )
+    rows = (row for step in steps for row in _rows(step, recorded, ran, matcher))
+    # All that goes before all that comes, as far as no common line lies between.
+    hunks = (list(group) for _, group in groupby(rows, key=lambda row: row.mark == " "))
+    return tuple(row for hunk in hunks for row in sorted(hunk, key=lambda r: r.mark, reverse=True))
 
 
 def _whole(recorded: str, ran: str) -> Iterator[DiffRow]:
@@ -134,16 +82,26 @@ def _whole(recorded: str, ran: str) -> Iterator[DiffRow]:
     yield from (_row("+", text) for text in ran.split("\n") if ran)
 
 
-def _page_rows(step: Step, recorded: Side, ran: Side, matcher: LineMatcher) -> Iterator[DiffRow]:
-    if step.kind in (StepKind.SAME, StepKind.ELLIPSIS):
-        yield from (_row(" ", text) for text in recorded.raw_lines(step.recorded))
-    elif step.kind is StepKind.DIFFERS:
-        one, two = recorded.lines[step.recorded], ran.lines[step.ran]
-        found = differences(one, two, matcher)
-        yield DiffRow("-", _pieces(one, [(d.start, d.end) for d in found]))
-        yield DiffRow("+", _pieces(two, [(d.ran_start, d.ran_end) for d in found]))
-    else:
-        yield from _rows(step, recorded, ran)
+def _rows(step: Step, recorded: Side, ran: Side, matcher: LineMatcher) -> Iterator[DiffRow]:
+    """The rows of a step: one for a line on either side, none for what an ellipsis stands for."""
+    match step.kind:
+        case StepKind.SAME | StepKind.ELLIPSIS:
+            yield from (_row(" ", text) for text in recorded.raw_lines(step.recorded))
+        case StepKind.DIFFERS:
+            one, two = recorded.lines[step.recorded], ran.lines[step.ran]
+            found = differences(one, two, matcher)
+            yield DiffRow("-", _pieces(one, [(d.start, d.end) for d in found]))
+            yield DiffRow("+", _pieces(two, [(d.ran_start, d.ran_end) for d in found]))
+        case StepKind.MISSING:
+            yield _row("-", recorded.lines[step.recorded])
+        case StepKind.EXTRA:
+            yield _row("+", ran.lines[step.ran])
+        case StepKind.ELIDED:
+            pass
+
+
+def _row(mark: Mark, text: str) -> DiffRow:
+    return DiffRow(mark, (DiffPiece(text, mark != " "),))
 
 
 def _pieces(text: str, changed: Sequence[tuple[int, int]]) -> tuple[DiffPiece, ...]:

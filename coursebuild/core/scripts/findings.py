@@ -1,7 +1,7 @@
 """Everything that running the scripts of a course shows to be wrong.
 
 Entry points: `script_findings`: each script that failed, each recorded output that is not what was
-printed, each bound number that no output bears out; `binding_history`, by what those hold that do;
+printed, each bound number that no output bears out; `held_lines`, by which those hold that do;
 `drift_diagnostic`.
 """
 
@@ -11,8 +11,13 @@ from collections.abc import Sequence
 
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
-from coursebuild.core.scripts.binding_memory import BindingHistory, BindingMemory
-from coursebuild.core.scripts.bindings import Leaning, Printed, check_bindings, leaning_on
+from coursebuild.core.scripts.bindings import (
+    HeldLines,
+    Leaning,
+    Printed,
+    check_bindings,
+    leaning_on,
+)
 from coursebuild.core.scripts.bound_numbers import Shown, shows
 from coursebuild.core.scripts.compare import is_silent
 from coursebuild.core.scripts.diff import shortened
@@ -21,7 +26,7 @@ from coursebuild.core.scripts.failures import divergence, failure, silence
 from coursebuild.core.scripts.numbers import scan
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 
-_NAMED = 20
+_NAMED = 3
 _WIDTH = 60
 
 
@@ -30,13 +35,13 @@ def script_findings(
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
-    memory: BindingMemory | None = None,
+    held: HeldLines | None = None,
     everything: Sequence[Extraction] | None = None,
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that leans on them.
 
     `extractions` are those that were run, maybe not all of the course; `everything` is what
-    `extract` gives for it, where that is known. `memory` are bindings that were looked at before.
+    `extract` gives for it, where that is known. `held`: see `check_bindings`.
     """
     by_path = {run.path: run for run in runs}
     everything = extract(course).value if everything is None else everything
@@ -58,19 +63,17 @@ def script_findings(
             leaning = leaning_on(verdict, course.documents, printed)
             found.append(drift_diagnostic(verdict, owner_of[recording.span.path], leaning))
     for document in course.documents:
-        found += check_bindings(document, printed, memory)
+        found += check_bindings(document, printed, held)
     return tuple(found)
 
 
-def binding_history(
-    course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
-) -> BindingHistory:
+def held_lines(course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]) -> HeldLines:
     """By which lines the bindings of a course hold."""
-    memory = BindingHistory()
+    held: HeldLines = {}
     printed = Printed(verdicts, runs)
     for document in course.documents:
-        check_bindings(document, printed, memory)
-    return memory
+        check_bindings(document, printed, held)
+    return held
 
 
 # --- drift
@@ -79,22 +82,19 @@ def binding_history(
 def drift_diagnostic(verdict: Verdict, owner: str, leaning: Sequence[Leaning] = ()) -> Diagnostic:
     """A recorded output that differs from this run; `owner` is the id of the lesson or page.
 
-    The first differing place is pointed at; a note names each further one, then come the classes,
-    the diff, and every bound number in the prose that leans on a value that changed.
+    The first differing place is pointed at; notes name the next ones, and every bound number in the
+    prose that leans on a value that changed.
     """
     first, *others = sorted(verdict.changes, key=lambda change: change.span.start)
     notes = [Note(_further(change), change.span) for change in others[:_NAMED]]
     if len(others) > _NAMED:
         more = len(others) - _NAMED
         notes.append(Note(f"and {more} more {'difference' if more == 1 else 'differences'}"))
-    notes.append(Note(classes(verdict.changes)))
-    if verdict.diff:
-        notes.append(Note(f"recorded against this run:\n{verdict.diff}"))
     notes += (Note(_leans(leans), leans.binding.text_span) for leans in leaning)
     return diagnose(
         "output-drift",
         first.span,
-        "recorded output differs from this run",
+        f"recorded output differs from this run ({classes(verdict.changes)})",
         label=_label(first),
         help=f"if the change is intended, run `coursebuild update {owner}`",
         notes=notes,

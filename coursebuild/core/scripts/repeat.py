@@ -9,21 +9,18 @@ both times.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Sequence
 
 from coursebuild.core.model import Comparison, Course, Recording, Table, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.align import Step, StepKind, align
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.diff import shortened
+from coursebuild.core.scripts.diff import shortened, text_diff
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 
-_LINES = 12
-_WIDTH = 120
 _NAMED, _QUOTED = 10, 80
 
 
@@ -61,7 +58,7 @@ def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> 
     notes = []
     if (before.outcome, before.status) != (now.outcome, now.status):
         notes.append(Note(f"it ended otherwise: before {_end(before)}, now {_end(now)}"))
-    diff = _diff(before.stdout, now.stdout)
+    diff = text_diff(before.stdout, now.stdout)
     if diff:
         notes.append(Note("its output:\n" + diff))
     return diagnose(
@@ -77,18 +74,6 @@ def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> 
 
 def _end(run: ScriptRun) -> str:
     return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
-
-
-def _diff(before: str, now: str) -> str:
-    lines = [
-        line
-        for line in difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
-        if not line.startswith(("---", "+++", "@@"))
-    ]
-    shown = [shortened(line, _WIDTH) for line in lines[:_LINES]]
-    if len(lines) > _LINES:
-        shown.append(f"… and {len(lines) - _LINES} more lines")
-    return "\n".join(shown)
 
 
 def unstable(recording: Recording, first: Side, second: Side, comparison: Comparison) -> Diagnostic:

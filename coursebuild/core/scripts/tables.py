@@ -44,7 +44,6 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.changes import number_change
-from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.lines import (
     Canon,
     SameNumber,
@@ -59,8 +58,6 @@ from coursebuild.core.text.source import Span
 
 _ALIKE = 6
 _PLACES = 64
-_LINES = 40
-_WIDTH = 160
 
 
 class RowCell(Struct, frozen=True):
@@ -106,22 +103,13 @@ def compare_table(
     ran: Side,
 ) -> Verdict:
     """The verdict on a recorded table."""
-    changes: list[Change] = []
-    lines: list[str] = []
     line_starts = ran.line_starts()
-    for found in TableMatcher(table_rows(table, filters), ran, comparison).match():
-        differing = _row_changes(found, ran, comparison, line_starts)
-        changes += differing
-        if differing:
-            lines.append("-" + shortened(_row_text(found.row), _WIDTH))
-            if found.line >= 0:
-                lines.append("+" + shortened(plain(ran.lines[found.line]), _WIDTH))
-    if not changes:
-        return Verdict(recording, comparison, "verified")
-    if len(lines) > _LINES:
-        lines[_LINES:] = [f"… and {len(lines) - _LINES} more lines"]
-    diff = "\n".join(("--- recorded", "+++ this run", *lines))
-    return Verdict(recording, comparison, "drift", tuple(changes), diff)
+    changes = tuple(
+        change
+        for found in TableMatcher(table_rows(table, filters), ran, comparison).match()
+        for change in _row_changes(found, ran, comparison, line_starts)
+    )
+    return Verdict(recording, comparison, "drift" if changes else "verified", changes)
 
 
 def _row_text(row: Sequence[RowCell]) -> str:
