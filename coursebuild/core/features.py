@@ -1,7 +1,7 @@
 """The interface of features: how kinds of fences and pages, files of a site and exports enter.
 
-Entry point: `Feature`, with `FenceKind`, `PageKind`, `PagePart`, `Trials` and `Exporter`, which say
-what a feature has.
+Entry point: `Feature`, with `FenceKind`, `PageKind`, `PagePart`, `PageCopy`, `Trials` and
+`Exporter`, which say what a feature has.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeAlias, Ty
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline
+from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline, Target
 from coursebuild.core.model.results import (
     CompileResult,
     ModelFacts,
@@ -35,11 +35,9 @@ from coursebuild.core.text.rules import Rule
 
 if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
     from coursebuild.core.model.results import FileList, SiteFile
-    from coursebuild.core.pages.added_files import SiteContext
+    from coursebuild.core.pages.added_files import ExportContext, SiteContext
     from coursebuild.core.pages.assets import Assets
     from coursebuild.core.pages.context import PageContext
-    from coursebuild.core.pages.exports.context import ExportContext
-    from coursebuild.core.pages.exports.plain import Plain
     from coursebuild.core.pages.library import Library
     from coursebuild.core.pages.page_inputs import PageInputs
     from coursebuild.core.pages.tools import Tools
@@ -67,6 +65,36 @@ class IndexReader(Protocol):
         """A line of Markdown as text."""
 
 
+class MarkdownWriter(Protocol):
+    """Writes a document as Markdown that every reader understands."""
+
+    @property
+    def page(self) -> PageContext:
+        """The document on its page."""
+
+    @property
+    def live(self) -> str:
+        """The address of that page, where what moves can be seen."""
+
+    def blocks(self, blocks: tuple[Block, ...]) -> str:
+        """Blocks as Markdown."""
+
+    def inlines(self, inlines: tuple[Inline, ...]) -> str:
+        """Inlines as Markdown in one line."""
+
+    def words(self, key: str, **values: str | int | float) -> str:
+        """A text of the interface, as Markdown."""
+
+    def href(self, target: Target) -> str:
+        """The address of a link."""
+
+    def locate(self, href: str) -> str:
+        """An address as the page has it, as the Markdown has it."""
+
+    def folded(self, label: str, text: str) -> str:
+        """A text behind its label, which is shown on demand where that can be."""
+
+
 class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """A kind of fence, from its text to a page."""
 
@@ -80,7 +108,7 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """Whether it may stand in a text of another block, where no lines can be updated."""
     draw: Callable[[PageContext, B], Markup]
     """The block in a page."""
-    markdown: Callable[[Plain, B], str]
+    markdown: Callable[[MarkdownWriter, B], str]
     """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
     wide: bool = True
     """Whether it takes the whole width of the text, so that no docked block can stand beside it."""
@@ -112,6 +140,21 @@ class PageKind(Struct, frozen=True, kw_only=True):
     def path(self) -> str:
         """Its site path."""
         return f"{self.name}/index.html"
+
+
+class PageCopy(Struct, frozen=True, kw_only=True):
+    """A file beside a page that says the same in another form."""
+
+    ending: str
+    """In the place of `.html`: `.md`."""
+    type: str
+    """Its media type."""
+    text: str
+    """Key of the interface text by which a lesson links to it."""
+    lessons: bool = False
+    """Whether only written lessons have it; if not, all pages but those that scripts fill in."""
+    download: bool = False
+    """Whether a browser saves it, and does not show it."""
 
 
 class PagePart(Struct, frozen=True, kw_only=True):
@@ -237,9 +280,11 @@ class Feature(Struct, frozen=True, kw_only=True):
     style: str = ""
     """CSS that every page of the site gets."""
     parts: tuple[PagePart, ...] = ()
-    note: Callable[[PageInputs, Document | None, str], bytes] | None = None
-    """What `files` has to know of a page, from its inputs, its document and its HTML; it is kept
-    with the page. Nothing where that says nothing."""
+    copies: tuple[PageCopy, ...] = ()
+    """Those that `files` gives of pages."""
+    note: Callable[[PageInputs, PageContext | None, str], bytes] | None = None
+    """What `files` has to know of a page, from its inputs, the document on it and its HTML; it is
+    kept with the page. Nothing where that says nothing."""
     files: Callable[[SiteContext], Iterable[SiteFile | FileList]] | None = None
     """Further files of the site."""
     exporters: tuple[Exporter, ...] = ()

@@ -21,6 +21,7 @@ from coursebuild.core.features import (
     Exporter,
     Feature,
     FenceKind,
+    PageCopy,
     PageKind,
     PublishedTrials,
     Trial,
@@ -148,6 +149,12 @@ def page_kinds() -> tuple[PageKind, ...]:
 def page_kind(name: str) -> PageKind | None:
     """The page of a name that a feature adds."""
     return next((kind for kind in page_kinds() if kind.name == name), None)
+
+
+def page_copies() -> tuple[PageCopy, ...]:
+    """The kinds of copies that features make of pages, those to be downloaded first."""
+    copies = (copy for feature in features() for copy in feature.copies)
+    return tuple(sorted(copies, key=lambda copy: not copy.download))
 
 
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:

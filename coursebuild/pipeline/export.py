@@ -22,9 +22,9 @@ from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course, Document
 from coursebuild.core.model.results import Results, SiteFile
+from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.context import ExportContext
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.registry import find_exporter

@@ -19,7 +19,6 @@ import functools
 import itertools
 import operator
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
@@ -39,10 +38,7 @@ from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
 from coursebuild.pipeline.page_index import Facts, PageKeys
-from coursebuild.pipeline.tasks import BYPRODUCTS, PAGES, Draw, KeptPage, Later, Task
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.exports.files import PageByproducts
+from coursebuild.pipeline.tasks import PAGES, Draw, KeptPage, Later, Task
 
 
 class _Wanted(Struct, frozen=True):
@@ -88,8 +84,6 @@ class Pages:
         self._store = store
         self._facts = Facts()
         self._by_path: dict[str, _Wanted] = {}
-        self._byproducts: tuple[str, PageByproducts] | None = None
-        """What the page that was asked for last gives: two files are made of it."""
         self._inputs: dict[str, bytes] = {}
         """Of the pages without a known key, by site path, until these are drawn."""
         keys = PageKeys(store, self._around())
@@ -144,31 +138,9 @@ class Pages:
             yield CachedFile(page.wanted.path, key, make)
 
     @property
-    def paths(self) -> tuple[str, ...]:
-        """The site paths of all pages."""
-        return tuple(page.wanted.path for page in self._pages)
-
-    @property
     def keys(self) -> dict[str, str]:
         """The keys of all pages, by site path."""
         return {page.wanted.path: page.wanted.key for page in self._pages}
-
-    def key(self, path: str) -> str:
-        """The key of a page."""
-        return self._at(path).key
-
-    def byproducts(self, path: str) -> PageByproducts:
-        """What a page gives to the files beside it, which are made one after the other."""
-        if self._byproducts is None or self._byproducts[0] != path:
-            self._byproducts = path, self._byproducts_of(path)
-        return self._byproducts[1]
-
-    def _byproducts_of(self, path: str) -> PageByproducts:
-        from coursebuild.core.pages.exports.files import PageByproducts
-
-        page = self._at(path)
-        found = decode(self._store.peek(BYPRODUCTS, page.key), PageByproducts)
-        return found or self._documents.drawn(self._request(page)).byproducts
 
     def _at(self, path: str) -> _Wanted:
         if not self._by_path:

@@ -45,7 +45,6 @@ from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import document_fingerprint
 from coursebuild.pipeline.tasks import (
-    BYPRODUCTS,
     PAGES,
     SUMMARIES,
     Answer,
@@ -79,12 +78,10 @@ class _Whole(Struct, frozen=True):
 _HEAVY = (
     "coursebuild.core.run.v8",
     "coursebuild.core.pages.draw",
-    "coursebuild.core.pages.exports.files",
     "coursebuild.core.pages.highlight",
     "coursebuild.core.pages.lesson",
     "coursebuild.core.pages.pages",
     "coursebuild.core.syntax.document",
-    "coursebuild.features.search.page",
 )
 
 
@@ -227,7 +224,6 @@ class PageReader:
     def _drawn(self, request: Draw) -> Drawn:
         from coursebuild.core.pages.added_files import page_notes
         from coursebuild.core.pages.draw import draw_whole
-        from coursebuild.core.pages.exports.files import page_byproducts
 
         whole = self._whole(request.task) if request.task is not None else None
         tools = self._tools_for(request.language)
@@ -237,17 +233,14 @@ class PageReader:
         inputs = request.inputs
         draft, page = draw_whole(inputs, document, tools)
         found, body = record(draft, request.base_url)
-        notes = page_notes(inputs, document, str(draft.body))
+        notes = page_notes(inputs, page, body)
         digests = tuple((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
         found = replace(found, notes=digests)
-        made = page_byproducts(inputs, page, request.base_url, body)
-        return Drawn(found, body, notes, made)
+        return Drawn(found, body, notes)
 
     def _draw(self, request: Draw) -> bytes:
         drawn = self._drawn(request)
         page = KeptPage.of(drawn)
-        self._store.put(BYPRODUCTS, request.key, encode(drawn.byproducts), local=True)
-        # At last, since a page that is there is not drawn again.
         self._store.put(PAGES, request.key, msgspec.msgpack.encode(page), local=True)
         return page.packed_record
 

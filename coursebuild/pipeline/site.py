@@ -108,7 +108,7 @@ class SiteMaker:
         self.options = options
         self.store = options.store
         self.documents = documents
-        self._packed: dict[str, tuple[str, Callable[[], zips.Archive | None]]] = {}
+        self._packed: dict[str, tuple[str, zips.MakeArchive]] = {}
         """The archives, with their keys."""
         self._imports: Callable[[str], frozenset[str]] = zips.imports
         self._files: dict[str, tuple[str, Callable[[], bytes]]] = {}
@@ -135,7 +135,6 @@ class SiteMaker:
         if self.course.base_url:
             sitemap = meta.sitemap(self.course, pages.indexed)
             files.append(OutputFile(urls.SITEMAP, sitemap))
-        files += self._page_copies(pages, frozenset(file.path for file in files))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
         if entries is None and not pages.are_sound({file.path for file in files}):
@@ -200,6 +199,8 @@ class SiteMaker:
             pages.noted(feature),
             functools.partial(pages.note, feature),
             functools.partial(self.store.get_or_create, _PARTS, local=True),
+            self._packed,
+            self._imports,
         )
 
     # --- downloads
@@ -260,13 +261,6 @@ class SiteMaker:
             if path.startswith("models/")
         )
         return zips.Surroundings(packages, library, meshes, imports, imports.of)
-
-    # --- Markdown and notebooks
-
-    def _page_copies(self, pages: Pages, taken: frozenset[str]) -> Iterator[SiteFile]:
-        from coursebuild.core.pages.exports.files import page_copies
-
-        return page_copies(self.library, pages, self._packed, self._imports, taken)
 
 
 def _cut_font(store: Memo, job: FontJob) -> bytes:
@@ -346,7 +340,7 @@ class _Imports:
         return self._known[digest]
 
 
-def _packed(make: Callable[[], zips.Archive | None]) -> bytes:
+def _packed(make: zips.MakeArchive) -> bytes:
     archive = make()
     assert archive is not None
     return archive.packed()

@@ -8,7 +8,7 @@ same in the memo.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import msgspec
 from msgspec import Struct
@@ -21,10 +21,7 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode
 
-if TYPE_CHECKING:
-    from coursebuild.core.pages.exports.files import PageByproducts
-
-SUMMARIES, PAGES, BYPRODUCTS = "summaries", "pages", "byproducts"
+SUMMARIES, PAGES = "summaries", "pages"
 """Kinds of entries in the store. They stay on this machine, where they are made soon enough."""
 
 
@@ -122,8 +119,6 @@ class Drawn(Struct, frozen=True):
     body: str
     notes: dict[str, bytes]
     """See `page_notes`."""
-    byproducts: PageByproducts
-    """What it gives to the files beside it."""
 
 
 Request: TypeAlias = Task | Draw | Later

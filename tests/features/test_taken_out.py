@@ -29,13 +29,14 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 def environments(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
     """Those of installations of the tool that lack the folder of a feature, by its name."""
     made = {}
-    for feature in ("quiz", "search"):
+    for feature, others in (("quiz", ()), ("search", ()), ("markdown", ("notebook",))):
         installed = tmp_path_factory.mktemp("installed")
         for name in ("coursebuild", "mjcourse", "templates"):
             shutil.copytree(ROOT / name, installed / name)
         (installed / "site").mkdir()
         (installed / "site" / "dist").symlink_to(ROOT / "site" / "dist")
-        shutil.rmtree(installed / "coursebuild" / "features" / feature)
+        for name in (feature, *others):
+            shutil.rmtree(installed / "coursebuild" / "features" / name)
         made[feature] = {"PYTHONPATH": str(installed)}
     return made
 
@@ -53,6 +54,17 @@ def test_a_course_is_built_without_a_feature(
         said = done.status, done.out.splitlines()[-1].partition(": ")[2]
         assert said == (0, "everything holds"), feature
         assert "<h2" in course.text("public/lessons/1.1-one.html")
+
+
+def test_without_copies_no_page_offers_them(
+    course: Folder, environments: dict[str, dict[str, str]]
+) -> None:
+    assert course.run("build", env=environments["markdown"]).status == 0
+    site = course.tree("public")
+    assert not [path for path in site if path.endswith((".md", ".ipynb")) or path == "llms.txt"]
+    for path, data in site.items():
+        if path.endswith(".html"):
+            assert b"markdown" not in data.lower() and b"Jupyter" not in data, path
 
 
 def test_without_the_search_no_page_offers_it(

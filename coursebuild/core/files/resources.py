@@ -86,7 +86,7 @@ def template_texts() -> tuple[tuple[str, str], ...]:
     return tuple(
         (path, (folder / path).read_text(encoding="utf-8"))
         for path in _paths(folder)
-        if path.endswith((".html", ".toml", ".svg", ".css"))
+        if path.endswith((".html", ".toml", ".svg", ".css", ".py"))
     )
 
 

@@ -25,7 +25,7 @@ from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.draft import Draft as Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import own_pages, page_title
-from coursebuild.core.registry import features, page_kind
+from coursebuild.core.registry import features, page_copies, page_kind
 
 PAGE_WORDS = (
     "theme.label",
@@ -147,8 +147,15 @@ def _own_values(library: Library, draft: Draft) -> dict[str, object]:
         "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
         "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
         "json_ld": draft.json_ld,
-        "markdown": urls.encode((urls.markdown_path(draft.path) or "").rpartition("/")[2]),
+        "copies": _copies(draft.path),
     }
+
+
+def _copies(page: str) -> tuple[tuple[str, str], ...]:
+    """Media types and addresses of the copies that every page has."""
+    every = (copy for copy in page_copies() if not copy.lessons and urls.has_copies(page))
+    place = urls.Place(page)
+    return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in every)
 
 
 def _shared_values(

@@ -14,6 +14,7 @@ from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library, document_scripts
 from coursebuild.core.pages.owners import owner_links
 from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.registry import page_copies
 
 
 class LessonLink(Struct, frozen=True):
@@ -76,8 +77,10 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         **_common(library, place, lesson),
         "scripts": scripts,
         "scripts_zip": place.href(urls.lesson_zip_path(lesson)) if scripts else None,
-        "notebook": place.href(urls.notebook_path(lesson)),
-        "markdown": place.href(urls.markdown_path(place.path) or place.path),
+        "copies": tuple(
+            (copy.text, place.href(urls.copy_path(place.path, copy.ending)), copy.download)
+            for copy in page_copies()
+        ),
         "edit": edit_address(library, lesson.path),
     }
     return PageInputs(

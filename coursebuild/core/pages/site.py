@@ -12,7 +12,7 @@ Entry point: `render_site(course, results, assets, options)`.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from hashlib import sha256
 
 from msgspec import Struct, field
@@ -23,9 +23,8 @@ from coursebuild.core.pages import fonts, meta, urls, zips
 from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files, page_notes
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.draw import draw_whole
-from coursebuild.core.pages.exports.files import PageByproducts, page_byproducts, page_copies
-from coursebuild.core.pages.exports.markdown_copy import html_copy
 from coursebuild.core.pages.frame import Draft, Names, frame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
@@ -61,9 +60,12 @@ def render_site(
     library = Library.of(course, results, assets, reports=options.reports)
     drafts, facts = [], []
     entries = tuple(page_list(library))
-    drawn = tuple(entry.draft(library) for entry in entries)
-    for draft, declarations in map(settled, drawn):
+    drawn = []
+    for entry in entries:
+        draft, page = draw_whole(entry.inputs(library), entry.document(library), library.tools)
+        draft, declarations = settled(draft)
         drafts.append(draft)
+        drawn.append((draft, page))
         facts.append(page_facts(draft, declarations))
     shared, names = shared_files(assets, options.subset, all_facts(library, facts))
     files = [OutputFile(draft.path, frame(library, draft, names).encode()) for draft in drafts]
@@ -71,9 +73,9 @@ def render_site(
     files += library.feature_files
     files += _downloads(library, options)
     files += _machine_files(course, drafts)
-    added, listed = added_files(functools.partial(_context, library, assets, names, entries, drawn))
+    contexts = functools.partial(_context, library, assets, options, names, entries, drawn)
+    added, listed = added_files(contexts)
     files += [f if isinstance(f, OutputFile) else OutputFile(f.path, f.make()) for f in added]
-    files += _exports(library, options, drafts)
     if listed is not None:
         files.append(OutputFile(listed.path, listed.make(map(_facts, sorted(files, key=_path)))))
     return tuple(sorted(files, key=_path))
@@ -90,22 +92,30 @@ def _facts(file: OutputFile) -> FileFacts:
 def _context(
     library: Library,
     assets: Assets,
+    options: SiteOptions,
     names: Names,
     entries: Sequence[PageEntry],
-    drawn: Sequence[Draft],
+    drawn: Sequence[tuple[Draft, PageContext | None]],
     feature: str,
 ) -> SiteContext:
     """What a feature makes further files from; nothing is kept."""
     notes: dict[str, bytes] = {}
     pages: list[NotedPage] = []
-    for entry, draft in zip(entries, drawn, strict=True):
-        found = page_notes(entry.inputs(library), entry.document(library), str(draft.body))
+    for entry, (draft, page) in zip(entries, drawn, strict=True):
+        found = page_notes(entry.inputs(library), page, visible(str(draft.body)))
         if feature in found:
             notes[draft.path] = found[feature]
             digest = sha256(found[feature]).hexdigest()
             pages.append(NotedPage(draft.path, draft.kind, entry.id, draft.title, digest))
     return SiteContext(
-        library, assets, names, tuple(pages), notes.__getitem__, lambda key, make: make()
+        library,
+        assets,
+        names,
+        tuple(pages),
+        notes.__getitem__,
+        lambda key, make: make(),
+        zips.lesson_archives(library, options.around),
+        options.around.imports,
     )
 
 
@@ -138,43 +148,6 @@ def _downloads(library: Library, options: SiteOptions) -> Iterator[OutputFile]:
             yield archive
     for file in options.files:
         yield OutputFile(urls.file_path(file.path), file.data)
-
-
-def _exports(
-    library: Library, options: SiteOptions, drafts: Sequence[Draft]
-) -> Iterator[OutputFile]:
-    """What the site gives away besides its pages."""
-    bodies = {draft.path: visible(str(draft.body)) for draft in drafts}
-    archives = zips.lesson_archives(library, options.around)
-    taken = frozenset(urls.file_path(file.path) for file in options.files)
-    source = _Pages(library, bodies)
-    for file in page_copies(library, source, archives, options.around.imports, taken):
-        yield OutputFile(file.path, file.make())
-
-
-class _Pages:
-    """The pages of a site, of which each is drawn again when its copies are made."""
-
-    def __init__(self, library: Library, bodies: Mapping[str, str]) -> None:
-        """`bodies` are the pages as published, by path."""
-        self._library = library
-        self._bodies = bodies
-        self._entries = {entry.path: entry for entry in page_list(library)}
-        self.paths = tuple(self._entries)
-
-    def key(self, path: str) -> str:
-        """Its path: nothing is kept."""
-        return path
-
-    def byproducts(self, path: str) -> PageByproducts:
-        """What a page gives to the files beside it."""
-        entry, body = self._entries[path], self._bodies[path]
-        document = entry.document(self._library)
-        if document is None:
-            return PageByproducts(html_copy(path, body), None)
-        inputs = entry.inputs(self._library)
-        _, page = draw_whole(inputs, document, self._library.tools)
-        return page_byproducts(inputs, page, self._library.course.base_url, body)
 
 
 def _machine_files(course: Course, drafts: Iterable[Draft]) -> Iterator[OutputFile]:

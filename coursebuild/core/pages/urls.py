@@ -45,16 +45,15 @@ def lesson_zip_path(lesson: Lesson) -> str:
     return f"lessons/{lesson.id}-{lesson.slug}.zip"
 
 
-def notebook_path(lesson: Lesson) -> str:
-    """`lessons/4.2-mass-and-inertia.ipynb`: the lesson as a Jupyter notebook."""
-    return f"lessons/{lesson.id}-{lesson.slug}.ipynb"
+def copy_path(page: str, ending: str) -> str:
+    """`lessons/4.2-mass-and-inertia.md`: a copy of a page, by the ending of its name."""
+    return page.removesuffix(".html") + ending
 
 
-def markdown_path(page: str) -> str | None:
-    """`lessons/4.2-mass-and-inertia.md`: a page as Markdown; `None` where there is no such file."""
-    if page == NOT_FOUND or any(page == kind.path for kind in page_kinds() if not kind.indexed):
-        return None  # which say nothing but what a script fills in
-    return f"{page.removesuffix('.html')}.md"
+def has_copies(page: str) -> bool:
+    """Whether there are copies of a page: of one that scripts fill in there are none."""
+    filled = (kind.path for kind in page_kinds() if not kind.indexed)
+    return page != NOT_FOUND and page not in filled
 
 
 def level_path(level: Level) -> str:

@@ -14,6 +14,7 @@ import hashlib
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TypeAlias
 
 from msgspec import Struct
 
@@ -97,8 +98,12 @@ class Archive(Struct, frozen=True):
         return pack(self.files)
 
 
-def archives(library: Library, around: Surroundings) -> Iterator[Callable[[], Archive | None]]:
-    """What makes that of the course and those of its lessons, or `None` for one without scripts."""
+MakeArchive: TypeAlias = Callable[[], Archive | None]
+"""Makes an archive; `None` for one without scripts."""
+
+
+def archives(library: Library, around: Surroundings) -> Iterator[MakeArchive]:
+    """Those of the course and of its lessons."""
     if library.scripts:
         yield functools.partial(course_archive, library, around)
     by_module = _by_module(library)
@@ -133,9 +138,7 @@ def lesson_archive(
     return Archive(urls.lesson_zip_path(lesson), files)
 
 
-def lesson_archives(
-    library: Library, around: Surroundings
-) -> dict[str, tuple[str, Callable[[], Archive | None]]]:
+def lesson_archives(library: Library, around: Surroundings) -> dict[str, tuple[str, MakeArchive]]:
     """Those of the lessons that have scripts, by site path, each with an empty key."""
     by_module = _by_module(library)
     return {

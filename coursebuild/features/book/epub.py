@@ -24,9 +24,9 @@ from msgspec import Struct
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
-from coursebuild.core.pages.exports.context import ExportContext
 from coursebuild.core.pages.html_tree import to_xml
 from coursebuild.features.book.cover import cover
 from coursebuild.features.book.lessons import (

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from coursebuild.core.model import Lesson, Level, Status
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.exports.context import ExportContext
+from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
 from coursebuild.features.book.rewrite import Rules, rewritten
 

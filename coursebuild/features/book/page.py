@@ -16,9 +16,9 @@ from markupsafe import Markup
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
-from coursebuild.core.pages.exports.context import ExportContext
 from coursebuild.core.pages.html_tree import to_html
 from coursebuild.features.book.lessons import (
     PICTURES,

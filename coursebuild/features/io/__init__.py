@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from coursebuild.core.features import Feature, FenceKind, IndexReader
+from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
 from coursebuild.features.io.model import Io
 from coursebuild.features.io.parse import parse_io
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
-    from coursebuild.core.pages.exports.plain import Plain
 
 
 def draw(page: PageContext, card: Io) -> Markup:
@@ -21,7 +20,7 @@ def draw(page: PageContext, card: Io) -> Markup:
     return page.template("io/io.html", rows=rows)
 
 
-def markdown(writer: Plain, card: Io) -> str:
+def markdown(writer: MarkdownWriter, card: Io) -> str:
     """The card as a list."""
     rows = ((writer.words(name), writer.inlines(text)) for name, text in card.parts())
     return "\n".join(f"- **{label}:** {text}" for label, text in rows)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from coursebuild.core.model import ModelTarget
-from coursebuild.core.pages.exports.marks import code_span, escaped, link, picture, table
+from coursebuild.core.pages.marks import code_span, escaped, link, picture, table
 from coursebuild.core.pages.quantities import number
 from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import Lab
@@ -24,10 +24,10 @@ from coursebuild.features.lab.page import (
 )
 
 if TYPE_CHECKING:
-    from coursebuild.core.pages.exports.plain import Plain
+    from coursebuild.core.features import MarkdownWriter
 
 
-def lab_markdown(writer: Plain, lab: Lab) -> str:
+def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     """A lab as it was recorded, with a link to where it runs."""
     words, texts = writer.words, writer.page.tools.words
     title = title_of(writer.page, lab)
@@ -47,7 +47,7 @@ def lab_markdown(writer: Plain, lab: Lab) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def _recorded(writer: Plain, title: str, image: str, record: LabRecord) -> Iterator[str]:
+def _recorded(writer: MarkdownWriter, title: str, image: str, record: LabRecord) -> Iterator[str]:
     """The picture, and the readouts at the end."""
     words, page = writer.words, writer.page
     alt = page.tools.words("lab.picture", title=title, t=number(record.time, 4))
@@ -58,7 +58,7 @@ def _recorded(writer: Plain, title: str, image: str, record: LabRecord) -> Itera
         yield table((words("lab.readouts"), ""), rows)
 
 
-def _about(writer: Plain, lab: Lab) -> str:
+def _about(writer: MarkdownWriter, lab: Lab) -> str:
     """What is simulated, and from where to where."""
     words = writer.words
     about = f"{words('lab.static_xml')}."
@@ -73,7 +73,9 @@ def _about(writer: Plain, lab: Lab) -> str:
     return about
 
 
-def _shows(writer: Plain, lab: Lab, *, recorded: bool) -> Iterator[tuple[str, tuple[str, ...]]]:
+def _shows(
+    writer: MarkdownWriter, lab: Lab, *, recorded: bool
+) -> Iterator[tuple[str, tuple[str, ...]]]:
     """What the lab shows while it runs: what it is called, and its parts."""
     texts, fields = writer.page.tools.words, lab.fields
     if fields.readouts and not recorded:

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeGuard
 from urllib.parse import urlsplit
 
-from coursebuild.core.pages.exports.xml import Element, add, element
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
+from coursebuild.core.pages.xml import Element, add, element
 from coursebuild.features.qti.mathml import mathml
 
 STRUCK = "struck"

@@ -22,7 +22,7 @@ from msgspec import Struct
 from coursebuild.core.model import Block, Course, Inline
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.xml import XSI, Element, add, document, element, identifier
+from coursebuild.core.pages.xml import XSI, Element, add, document, element, identifier
 from coursebuild.core.text.source import Span
 from coursebuild.features.qti.flow import Flow
 from coursebuild.features.qti.mathml import NAMESPACE as MATHML

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.core.pages.exports.xml import Element, add, element
 from coursebuild.core.pages.html_tree import HtmlElement
+from coursebuild.core.pages.xml import Element, add, element
 
 NAMESPACE = "http://www.w3.org/1998/Math/MathML"
 

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from coursebuild.core.model import Course, document_blocks
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.exports.context import ExportContext
-from coursebuild.core.pages.exports.xml import XSI, Element, add, document, element, identifier
+from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.library import owners
+from coursebuild.core.pages.xml import XSI, Element, add, document, element, identifier
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.qti.flow import STRUCK
 from coursebuild.features.qti.items import NAMESPACE, SCHEMA, STYLE, QuizItems, quiz_items

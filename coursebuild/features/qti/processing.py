@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from coursebuild.core.pages.exports.xml import Element, add, element
+from coursebuild.core.pages.xml import Element, add, element
 
 RESPONSE, _SCORE, _FEEDBACK, EXPLANATION = "RESPONSE", "SCORE", "FEEDBACK", "EXPLANATION"
 """Names of the variables, and of the feedback that everyone gets."""

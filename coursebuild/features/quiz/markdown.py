@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, assert_never
 
 from coursebuild.core.model import Heading, plain_text
-from coursebuild.core.pages.exports.marks import escaped, fence, hang
+from coursebuild.core.pages.marks import escaped, fence, hang
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
@@ -21,10 +21,10 @@ from coursebuild.features.quiz.model import (
 from coursebuild.features.quiz.page import letter, output_line
 
 if TYPE_CHECKING:
-    from coursebuild.core.pages.exports.plain import Plain
+    from coursebuild.core.features import MarkdownWriter
 
 
-def quiz_markdown(writer: Plain, block: Quiz) -> str:
+def quiz_markdown(writer: MarkdownWriter, block: Quiz) -> str:
     """A quiz as a list of its questions, each with its answer."""
     questions = (
         hang(f"{at}. ", _question(writer, question))
@@ -36,7 +36,7 @@ def quiz_markdown(writer: Plain, block: Quiz) -> str:
     return "\n\n".join(filter(None, (title, *questions)))
 
 
-def _question(writer: Plain, question: AnyQuestion) -> str:
+def _question(writer: MarkdownWriter, question: AnyQuestion) -> str:
     parts = [f"*{escaped(question.label)}*"] if question.label else []
     parts.append(writer.blocks(question.text))
     parts += _asked(writer, question)
@@ -47,7 +47,7 @@ def _question(writer: Plain, question: AnyQuestion) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def _asked(writer: Plain, question: AnyQuestion) -> list[str]:
+def _asked(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
     """What is said of how to answer, and what there is to choose from."""
     match question:
         case ChoiceQuestion():
@@ -78,7 +78,7 @@ def _asked(writer: Plain, question: AnyQuestion) -> list[str]:
             assert_never(question)
 
 
-def _answer(writer: Plain, question: AnyQuestion) -> list[str]:
+def _answer(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
     explain = writer.blocks(question.explain)
     match question:
         case ChoiceQuestion():
@@ -89,7 +89,7 @@ def _answer(writer: Plain, question: AnyQuestion) -> list[str]:
                 for at, option in enumerate(question.options)
                 if option.feedback
             ]
-            sim = writer.own(question.sim) if question.sim is not None else ""
+            sim = writer.blocks((question.sim,)) if question.sim is not None else ""
             return [f"{right}.", explain, "\n".join(said), sim]
         case NumericQuestion():
             unit = f" {escaped(question.unit)}" if question.unit else ""

@@ -16,11 +16,11 @@ from collections.abc import Iterable, Iterator
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.model.results import OutputFile, SiteFile
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.assets import page_script
 from coursebuild.core.pages.direction import direction
-from coursebuild.core.pages.exports.context import ExportContext
-from coursebuild.core.pages.exports.xml import XSI, Element, add, document, element, identifier
 from coursebuild.core.pages.frame import policy
+from coursebuild.core.pages.xml import XSI, Element, add, document, element, identifier
 
 _CP = "http://www.imsproject.org/xsd/imscp_rootv1p1p2"
 _ADL = "http://www.adlnet.org/xsd/adlcp_rootv1p2"

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from coursebuild.core.model import Document
 from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.lesson import LessonHead
 from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, ShownDocument
 from coursebuild.features.search.sections import (
@@ -35,19 +36,19 @@ _WEIGHTS = tuple(
 _FIELDS = {"text": _TEXT, "formula": _TEXT, "code": _CODE, "output": _CODE}
 
 
-def note_page(inputs: PageInputs, document: Document | None, body: str) -> bytes:
+def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
     """What a page gives to the search; nothing where it is not searched.
 
     Args:
         inputs: what is drawn.
-        document: of the page, with its prose, where it has one.
-        body: as it was drawn.
+        page: the document on it, where it has one.
+        body: its HTML.
     """
     if inputs.kind in _LEFT_OUT or not (inputs.indexed or inputs.kind in _LEADS):
         return b""
     head = inputs.values.get("lesson")
     name = head.id if isinstance(head, LessonHead) else ""
-    sections = page_sections(inputs, document, body)
+    sections = page_sections(inputs, None if page is None else page.document, body)
     return call("page", "", packed(sections)) + b"\0" + terms([name, inputs.title], sections)
 
 

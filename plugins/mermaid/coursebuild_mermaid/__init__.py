@@ -12,11 +12,10 @@ from pathlib import Path
 import mmdr
 from markupsafe import Markup
 
-from coursebuild.core.features import Feature, FenceKind, IndexReader
+from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
 from coursebuild.core.model import FeatureBlock
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.marks import fence as code_block
-from coursebuild.core.pages.exports.plain import Plain
+from coursebuild.core.pages.marks import fence as code_block
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
@@ -65,7 +64,7 @@ def draw(page: PageContext, block: Diagram) -> Markup:
     return Markup('<figure class="mermaid">{}\n{}</figure>').format(image, text)
 
 
-def markdown(writer: Plain, block: Diagram) -> str:
+def markdown(writer: MarkdownWriter, block: Diagram) -> str:
     """The text itself, which many readers of Markdown draw."""
     return code_block("mermaid", block.text)
 

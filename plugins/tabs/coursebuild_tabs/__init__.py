@@ -12,10 +12,9 @@ from pathlib import Path
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, FenceKind, IndexReader, PagePart
+from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter, PagePart
 from coursebuild.core.model import Block, FeatureBlock
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.plain import Plain
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
@@ -74,7 +73,7 @@ def draw(page: PageContext, block: Tabs) -> Markup:
     return Markup('<div class="tabs" data-tabs>\n{}</div>').format(Markup().join(parts))
 
 
-def markdown(writer: Plain, block: Tabs) -> str:
+def markdown(writer: MarkdownWriter, block: Tabs) -> str:
     """The versions below each other."""
     return "\n\n".join(f"**{tab.title}**\n\n{writer.blocks(tab.blocks)}" for tab in block.tabs)
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from coursebuild.core.pages.exports.xml import document, element
+from coursebuild.core.pages.xml import document, element
 from coursebuild.features.qti.flow import Flow
 from support.archives import formula_mistakes
 from support.hostile_html import HOSTILE

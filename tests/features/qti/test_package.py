@@ -9,7 +9,7 @@ from urllib.parse import unquote
 import pytest
 from lxml import etree
 
-from coursebuild.core.pages.exports.xml import identifier
+from coursebuild.core.pages.xml import identifier
 from support.archives import (
     Package,
     entries,

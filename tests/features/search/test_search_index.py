@@ -57,7 +57,8 @@ def made(
         for path, note in notes.items()
     )
     shelf = Shelf() if shelf is None else shelf
-    site = SiteContext(library, None, None, pages, notes.__getitem__, shelf.get_or_create)  # type: ignore[arg-type]
+    keep = shelf.get_or_create
+    site = SiteContext(library, None, None, pages, notes.__getitem__, keep, {}, None)  # type: ignore[arg-type]
     return {file.path: file for file in search_files(site)}
 
 

@@ -153,8 +153,7 @@ def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
 def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make) -> None:
     made = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 \x07.\n')
     library = Library.of(made.course, made.results, made.assets)
-    document = library.lessons["0.1"].document
-    note = note_page(inputs_of(library, "lesson", "0.1"), document, "")
+    note = note_page(inputs_of(library, "lesson", "0.1"), made.page(), "")
     text = text_and_terms(note)[0].decode()
     assert text.startswith('coursebuildSearch.take("page","",') and text.endswith(")\n")
     sections = json.loads(text.removeprefix('coursebuildSearch.take("page","",')[:-2])

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Callout, Document, PlainCode, Target
-from coursebuild.core.pages.exports.markdown import write_blocks, write_footnotes, write_inlines
-from coursebuild.core.pages.exports.marks import (
+from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.marks import (
     code_span,
     escaped,
     fence,
@@ -19,12 +19,12 @@ from coursebuild.core.pages.exports.marks import (
     picture,
     quoted,
 )
-from coursebuild.core.pages.look import OwnBlock
 from coursebuild.core.pages.plain import PlainContext, plain_html
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
+from coursebuild.features.markdown.blocks import write_blocks, write_footnotes, write_inlines
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[3]
 SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
 EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | re.DOTALL)
 DIFFERENT = {39: "a line's end that is written as a character reference becomes one"}

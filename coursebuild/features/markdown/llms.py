@@ -12,8 +12,8 @@ from __future__ import annotations
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.exports.marks import escaped, link
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.marks import escaped, link
 
 PATH = "llms.txt"
 
@@ -55,7 +55,7 @@ def _others(library: Library) -> list[str]:
 
 
 def _row(library: Library, path: str, title: str, text: str) -> str:
-    copy = urls.markdown_path(path) or path
+    copy = urls.copy_path(path, ".md")
     address = urls.absolute(library.course, copy) or urls.encode(copy)
     return f"- {link(_line(title), address)}" + (f": {_line(text)}" if text else "")
 

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import SiteOptions
-from coursebuild.core.pages.exports.markdown_copy import markdown_href
 from coursebuild.core.pages.urls import Place
+from coursebuild.features.markdown.copies import markdown_href
 from support.rendered_course import Make
 
 LESSON = """## Part {#part}

@@ -1,7 +1,7 @@
 """A page as plain Markdown: for people, feeds and language models.
 
-Entry points: `markdown_copy(inputs, page, …)`, the text; `html_copy`, that of a page without a
-document; `markdown_href`, an address in it.
+Entry points: `note_markdown`, the text of a page; `markdown_files`, the files of all pages; `head`
+and `markdown_href`, parts of them.
 
 A lesson or page of the course is written from its document. Every other page (the map, levels,
 models, measured figures) is written from its HTML, so that it says what the page says.
@@ -9,21 +9,51 @@ models, measured figures) is written from its HTML, so that it says what the pag
 
 from __future__ import annotations
 
+import functools
 import posixpath
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TypeAlias
 from urllib.parse import unquote, urlsplit
 
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.added_files import SiteContext
+from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.markdown import write_blocks, write_footnotes
-from coursebuild.core.pages.exports.marks import code_span, escaped, guarded, link
-from coursebuild.core.pages.exports.plain import Plain
 from coursebuild.core.pages.lesson import LessonHead, LessonLink, LevelName
+from coursebuild.core.pages.marks import code_span, escaped, guarded, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
+from coursebuild.features.markdown.blocks import write_blocks, write_footnotes
+from coursebuild.features.markdown.from_html import markdown_of
+from coursebuild.features.markdown.llms import PATH as LLMS
+from coursebuild.features.markdown.llms import llms
+from coursebuild.features.markdown.writer import DocumentWriter
 
 Locate: TypeAlias = Callable[[str], str]
+_ENDING = ".md"
+
+
+def markdown_files(site: SiteContext) -> Iterator[SiteFile]:
+    """The copies of all pages, and the list of them; an author's file of that name stays."""
+    taken = {urls.file_path(path) for path in site.library.course.files}
+    for page in site.pages:
+        path = urls.copy_path(page.path, _ENDING)
+        if path not in taken:
+            yield CachedFile(path, page.digest, functools.partial(site.note, page.path))
+    yield OutputFile(LLMS, llms(site.library))
+
+
+def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
+    """The text of a page; nothing where it has no copy."""
+    if not urls.has_copies(inputs.path):
+        return b""
+    if page is not None:
+        text = _document_copy(inputs, page)
+    else:
+        place = urls.Place(inputs.path)
+        text = markdown_of(body, lambda href: markdown_href(place, href))
+    return visible(f"{text}\n").encode()
 
 
 def markdown_href(place: urls.Place, href: str) -> str:
@@ -36,34 +66,22 @@ def markdown_href(place: urls.Place, href: str) -> str:
         return href
     folder = posixpath.dirname(place.path)
     target = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
-    if target.startswith(("files/", "../")) or urls.markdown_path(target) is None:
+    if target.startswith(("files/", "../")) or not urls.has_copies(target):
         return href
-    return parts._replace(path=f"{parts.path.removesuffix('.html')}.md").geturl()
+    return parts._replace(path=urls.copy_path(parts.path, _ENDING)).geturl()
 
 
-def markdown_copy(inputs: PageInputs, page: PageContext | None, body: str) -> str:
-    """The text of a page; `body` is its HTML, as published."""
-    if page is None:
-        return html_copy(inputs.path, body)
+def _document_copy(inputs: PageInputs, page: PageContext) -> str:
     place, words, document = page.place, page.tools.words, page.document
     here = place.href(place.path)
-    context = Plain(page, lambda href: markdown_href(place, href), here)
+    context = DocumentWriter(page, lambda href: markdown_href(place, href), here)
     parts = (
         *head(inputs, words, context.locate),
         write_blocks(document.blocks, context),
         write_footnotes(document.footnotes, context),
         *_foot(inputs, words, context.locate),
     )
-    return "\n\n".join(filter(None, parts)) + "\n"
-
-
-def html_copy(path: str, body: str) -> str:
-    """The text of a page without a document, from its HTML."""
-    if urls.markdown_path(path) is None:
-        return ""
-    from coursebuild.core.pages.exports.fromhtml import markdown_of
-
-    return f"{markdown_of(body, lambda href: markdown_href(urls.Place(path), href))}\n"
+    return "\n\n".join(filter(None, parts))
 
 
 def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:

@@ -1,6 +1,6 @@
 """The blocks that are ours as plain Markdown: scripts, outputs, labs, quizzes, callouts.
 
-Entry point: `Plain`, the writer's context for one document on one page.
+Entry point: `DocumentWriter`, for one document on one page.
 
 What a page shows with templates is said here in Markdown: a script is a fence under its name, a lab
 is its recorded picture and what it showed, a quiz is a list with its answers.
@@ -29,8 +29,8 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.exports.markdown import write_blocks, write_inlines
-from coursebuild.core.pages.exports.marks import (
+from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.marks import (
     code_span,
     escaped,
     fence,
@@ -38,11 +38,11 @@ from coursebuild.core.pages.exports.marks import (
     link,
     quoted,
 )
-from coursebuild.core.pages.look import OwnBlock
 from coursebuild.core.registry import kind_of_block
+from coursebuild.features.markdown.blocks import write_blocks, write_inlines
 
 
-class Plain(Struct, frozen=True):
+class DocumentWriter(Struct, frozen=True):
     """A document as plain Markdown."""
 
     page: PageContext
@@ -132,7 +132,7 @@ class Plain(Struct, frozen=True):
 
     def _bench(self, block: Bench) -> str:
         from coursebuild.core.pages.benches import bench_text  # few lessons show a report
-        from coursebuild.core.pages.exports.fromhtml import markdown_of
+        from coursebuild.features.markdown.from_html import markdown_of
 
         html, said = bench_text(self.page, block)
         parts = [guarded(escaped(said))] if said else []

@@ -56,25 +56,27 @@ from coursebuild.core.model import (
     ThematicBreak,
     plain_text,
 )
-from coursebuild.core.pages.exports.marks import (
+from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.marks import (
     code_span,
-    delimiter,
     escaped,
     fence,
-    formula,
     guarded,
     hang,
     link,
-    no_empty_lines,
-    number_text,
     picture,
-    piped,
     quoted,
     table,
+)
+from coursebuild.core.pages.markup import escape, is_tight, raw_html
+from coursebuild.features.markdown.texts import (
+    delimiter,
+    formula,
+    no_empty_lines,
+    number_text,
+    piped,
     text_source,
 )
-from coursebuild.core.pages.look import OwnBlock
-from coursebuild.core.pages.markup import escape, is_tight, raw_html
 
 
 class MarkdownContext(Protocol):

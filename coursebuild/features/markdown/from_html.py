@@ -13,7 +13,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from coursebuild.core.pages.exports.marks import (
+from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
+from coursebuild.core.pages.marks import (
     code_span,
     escaped,
     fence,
@@ -24,7 +25,6 @@ from coursebuild.core.pages.exports.marks import (
     quoted,
     table,
 )
-from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
 
 _SKIPPED = frozenset("nav script style svg template button form input select label dialog".split())
 _BLOCKS = frozenset(

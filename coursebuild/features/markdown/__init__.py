@@ -1,0 +1,17 @@
+"""Every page as Markdown, and a list of them for language models.
+
+1. `blocks` writes a document as Markdown that needs no course; `writer` adds the blocks that are
+   ours, and says where links lead.
+2. `copies` is a page as Markdown: from its document, or from its HTML where it has none
+   (`from_html`). `llms` lists these copies.
+"""
+
+from coursebuild.core.features import Feature, PageCopy
+from coursebuild.features.markdown.copies import markdown_files, note_markdown
+
+FEATURE = Feature(
+    name="markdown",
+    copies=(PageCopy(ending=".md", type="text/markdown", text="exports.markdown"),),
+    note=note_markdown,
+    files=markdown_files,
+)

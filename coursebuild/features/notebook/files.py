@@ -1,0 +1,125 @@
+"""The notebooks of a site: the cells of each lesson, and what its scripts need around them.
+
+Entry point: `notebook_files`. A cell at the start carries the files that scripts need (models,
+`mjcourse`, other scripts), packed, and writes those that are not there.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import json
+import re
+from collections.abc import Iterator, Mapping
+
+from coursebuild.core.engine.tool import step_key
+from coursebuild.core.model import Lesson, document_scripts
+from coursebuild.core.model.results import CachedFile
+from coursebuild.core.pages import urls, zips
+from coursebuild.core.pages.added_files import SiteContext
+from coursebuild.core.pages.marks import code_span, escaped
+from coursebuild.features.notebook.cells import Cell, code_cell, markdown_cell
+
+_MOST = 4 << 20
+"""Bytes of files that a notebook carries at most."""
+_SLOT = "\ue000"
+"""Stands for a name in a text."""
+
+
+def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
+    """The notebooks of all written lessons."""
+    for page in site.pages:
+        lesson = site.library.lessons[page.id]
+        archive, make = site.archives.get(urls.lesson_zip_path(lesson), ("", lambda: None))
+        key = step_key("notebook", page.digest, archive)
+        path = urls.copy_path(page.path, ".ipynb")
+        yield CachedFile(path, key, functools.partial(_notebook, site, lesson, page.path, make))
+
+
+def _notebook(site: SiteContext, lesson: Lesson, page: str, make: zips.MakeArchive) -> bytes:
+    head, *cells = json.loads(site.note(page))
+    archive = make()
+    setup = () if archive is None else _setup(site, lesson, archive)
+    document = {
+        "cells": [head, *setup, *cells],
+        "metadata": {
+            "kernelspec": {
+                "display_name": "Python 3 (ipykernel)",
+                "language": "python",
+                "name": "python3",
+            },
+            "language_info": {
+                "name": "python",
+                "file_extension": ".py",
+                "mimetype": "text/x-python",
+            },
+        },
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    # As Jupyter writes it.
+    text = json.dumps(document, ensure_ascii=False, indent=1, sort_keys=True)
+    return f"{text}\n".encode("utf-8", "replace")
+
+
+def _setup(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> Iterator[Cell]:
+    assert lesson.document is not None, "a notebook is of a written lesson"
+    files = {path.partition("/")[2]: data for path, data in archive.files.items()}
+    needed = sorted(files.pop("requirements.txt", b"").decode().split())
+    files.pop("README.md", None)
+    own = [script.path for script in document_scripts(lesson.document)]
+    early = _needed_early(site, own, files)
+    files = {path: data for path, data in files.items() if path not in own or path in early}
+    small = _small(files)
+    words = site.library.words
+    title = f"## {escaped(words('exports.before'))}"
+    text = escaped(words("exports.setup" if files else "exports.setup_none"))
+    if small.keys() != files.keys():
+        name = code_span(archive.path.rpartition("/")[2])
+        text += f" {escaped(words('exports.left_out', zip=_SLOT))}".replace(_SLOT, name)
+    if needed:
+        yield markdown_cell("before", f"{title}\n\n{escaped(words('exports.install'))}")
+        yield code_cell("install", f"# %pip install {' '.join(needed)}")
+        title = ""
+    yield markdown_cell("before-setup", f"{title}\n\n{text}".strip())
+    template = site.assets.template("notebook/setup.py")
+    code = _setup_code(template, small, sorted(files.keys() - small.keys()))
+    yield code_cell("setup", code, hidden=True)
+
+
+def _small(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The files that a notebook can carry, the smallest first."""
+    room, found = _MOST, {}
+    for path, data in sorted(files.items(), key=lambda item: (len(item[1]), item[0])):
+        room -= len(data)
+        if room >= 0:
+            found[path] = data
+    return found
+
+
+def _needed_early(site: SiteContext, own: list[str], files: Mapping[str, bytes]) -> set[str]:
+    """The scripts of the lesson that one above them imports, maybe through others."""
+    modules = {
+        path.removeprefix("examples/").removesuffix(".py"): path
+        for path in files
+        if re.fullmatch(r"examples/[^/]+\.py", path)
+    }
+    early: set[str] = set()
+    for at, path in enumerate(own):
+        seen, waiting = set[str](), [path]
+        while waiting:
+            one = waiting.pop()
+            if one in files and one not in seen:
+                seen.add(one)
+                named = site.imports(files[one].decode("utf-8", "replace"))
+                waiting += [modules[name] for name in named if name in modules]
+        early |= seen.intersection(own[at + 1 :])
+    return early
+
+
+def _setup_code(template: str, files: Mapping[str, bytes], missing: list[str]) -> str:
+    """The cell that writes the files and makes the magic."""
+    packed = base64.b64encode(zips.pack(files)).decode() if files else ""
+    lines = "\n".join(packed[at : at + 100] for at in range(0, len(packed), 100))
+    code = template.replace("ELSEWHERE = ()", f"ELSEWHERE = {tuple(missing)!r}")
+    return code.replace('FILES = ""', f'FILES = """\n{lines}\n"""' if packed else 'FILES = ""')
