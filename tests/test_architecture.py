@@ -28,7 +28,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"core.run"}),
     frozenset({"features"}),
     frozenset({"pipeline"}),
-    frozenset({"preview"}),
+    frozenset({"preview", "importer"}),
     frozenset({"cli"}),
     frozenset({"__main__"}),
 )

@@ -16,6 +16,7 @@ from coursebuild.cli.commands import (
     explain_command,
     export_command,
     extract_command,
+    import_command,
     schema_command,
     serve_command,
     stability_command,
@@ -138,6 +139,21 @@ def _export(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _import(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Write a course of another tool as one of coursebuild: a course.json with Markdown, "
+        "Jupyter notebooks, MyST or Quarto. Its folder is only read."
+    )
+    _running(parser)
+    parser.add_argument("folder", metavar="FOLDER", help="what to import")
+    parser.add_argument(
+        "--out",
+        default=None,
+        metavar="FOLDER",
+        help="where the new course goes (default: a folder of the same name here)",
+    )
+
+
 def _explain(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Say whether a script or lab would run again and why, and what depends on it."
@@ -214,6 +230,7 @@ _COMMANDS = (
         export_command,
         _export,
     ),
+    ("import", "make a course of one that was written for another tool", import_command, _import),
     (
         "explain",
         "say why something would run again, and what depends on it",

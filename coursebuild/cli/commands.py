@@ -168,6 +168,25 @@ def serve_command(arguments: argparse.Namespace) -> int:
     return CLEAN
 
 
+def import_command(arguments: argparse.Namespace) -> int:
+    """Make a course of one that was written for another tool."""
+    from pathlib import Path
+
+    from coursebuild.core.files.errors import UsageError
+    from coursebuild.importer.command import import_course
+    from coursebuild.pipeline.options import Options, open_store
+
+    if arguments.root is not None:
+        raise UsageError("import takes no -C: the new course's folder is named by --out")
+    source = Path(arguments.folder)
+    out = Path(arguments.out or source.resolve().name).absolute()
+    store = open_store(
+        out, arguments.cache, arguments.cache_size, os.environ, fresh=arguments.no_cache
+    )
+    options = Options(out, arguments.jobs or available_cores(), arguments.quiet, store)
+    return print_report(import_course(source, options), "text", options)
+
+
 def explain_command(arguments: argparse.Namespace) -> int:
     """Say why something would run again, and what depends on it."""
     from coursebuild.pipeline.explain import explain

@@ -257,7 +257,7 @@ def test_every_rule_on_the_page_exists() -> None:
 
 
 COMMANDS = [
-    *("build", "check", "update", "extract", "serve", "export", "explain"),
+    *("build", "check", "update", "extract", "serve", "export", "import", "explain"),
     *("bench", "stability", "diet", "schema"),
 ]
 

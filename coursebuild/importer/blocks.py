@@ -1,0 +1,199 @@
+"""Fences, directives and callouts of other tools as Markdown of coursebuild.
+
+Entry points: `block_text`, `plain_fence`.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+from collections.abc import Mapping
+
+from coursebuild.importer.cells import shown_text
+from coursebuild.importer.context import LessonContext
+from coursebuild.importer.prose import displayed, rewrite
+from coursebuild.importer.segments import read_markdown
+from coursebuild.importer.values import Segment, read_yaml
+
+_CALLOUTS = {
+    **{kind: kind for kind in ("note", "tip", "important", "warning", "caution", "try")},
+    **{kind: kind for kind in ("established", "derivation", "implementation", "version")},
+    **{kind: kind for kind in ("recommendation", "research", "unverified", "solution")},
+    **dict.fromkeys(("hint",), "tip"),
+    **dict.fromkeys(("attention", "failure", "bug"), "caution"),
+    **dict.fromkeys(("danger", "error"), "warning"),
+    **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),
+    **dict.fromkeys(("admonition", "margin", "sidebar", "dropdown", "example"), "note"),
+    **dict.fromkeys(("exercise", "question"), "try"),
+    **dict.fromkeys(("answer", "success"), "solution"),
+}
+_TITLED = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
+"""Directives whose argument is a title, and not the first line."""
+_KNOWN_FENCES = ("python", "text", "io", "lab", "quiz", "mjcf", "bench")
+_DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
+_ATTRIBUTES = re.compile(r"\{?(?P<all>[^{}]*)\}?.*")
+_TITLE = re.compile(r"title=(?:\"([^\"]*)\"|'([^']*)')")
+_OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
+_CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
+_QUOTED_KIND = re.compile(r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(\])", re.MULTILINE)
+
+
+def block_text(segment: Segment, context: LessonContext) -> str:
+    """A segment that is no cell, as Markdown."""
+    match segment.kind:
+        case "prose":
+            text = rewrite(segment.text, context, segment.place)
+            return _QUOTED_KIND.sub(lambda m: m[1] + _kind(m[2], context) + m[3], text)
+        case "admonition":
+            name, _, title = segment.head.partition(" ")
+            return _callout(name, title.strip().strip('"'), segment.text, segment, context)
+        case "div":
+            return _div(segment, context)
+        case "cell":
+            context.leave(segment.place, "a cell inside another block is shown and not run")
+            return plain_fence("python fragment", shown_text(segment))
+        case _:
+            directive = _DIRECTIVE.fullmatch(segment.head)
+            if directive is not None:
+                return _directive(directive["name"], directive["argument"], segment, context)
+            return _fence(segment, context)
+
+
+def _inside(text: str, segment: Segment, context: LessonContext) -> str:
+    parts = read_markdown(text, place=segment.place)
+    return "\n\n".join(block_text(part, context).strip("\n") for part in parts)
+
+
+def _kind(kind: str, context: LessonContext) -> str:
+    known = _CALLOUTS.get(kind.lower())
+    if known is None:
+        context.callouts[kind.lower()] = kind.replace("-", " ").capitalize()
+    return known or kind.lower()
+
+
+def _callout(
+    kind: str, title: str, text: str, segment: Segment, context: LessonContext, *, folded: str = ""
+) -> str:
+    title = rewrite(title, context, segment.place)
+    head = f"[!{_kind(kind, context)}]{folded} {title}".rstrip()
+    lines = [head, *_inside(text, segment, context).strip("\n").split("\n")]
+    return "\n".join(f"> {line}".rstrip() for line in lines)
+
+
+def _div(segment: Segment, context: LessonContext) -> str:
+    """What stands between lines of colons."""
+    directive = _DIRECTIVE.fullmatch(segment.head)
+    if directive is not None:
+        return _directive(directive["name"], directive["argument"], segment, context)
+    attributes = _ATTRIBUTES.fullmatch(segment.head)
+    words = attributes["all"] if attributes is not None else segment.head
+    kind = re.search(r"callout-(\w+)", words)
+    text = segment.text
+    if kind is None:
+        return _inside(text, segment, context)
+    titled = _TITLE.search(segment.head)
+    title = (titled[1] or titled[2] or "") if titled else ""
+    heading = re.match(r"\s*#{1,6}[ \t]+(.*)\n?", text)
+    if not title and heading is not None:
+        title, text = heading[1].strip(), text[heading.end() :]
+    folded = "-" if re.search(r"collapse=\"?true", segment.head) else ""
+    return _callout(kind[1], title, text, segment, context, folded=folded)
+
+
+def _options_of(text: str) -> tuple[Mapping[str, str], str]:
+    """The options at the beginning of a directive (`:name: value`, or YAML), and the rest."""
+    if text.startswith("---\n") and "\n---" in text[4:]:
+        head, _, rest = text[4:].partition("\n---")
+        found = read_yaml(head)
+        options = found if isinstance(found, dict) else {}
+        return {str(key): str(value) for key, value in options.items()}, rest.lstrip("-\n")
+    options, lines = {}, text.split("\n")
+    while lines and (option := _OPTION.fullmatch(lines[0].strip())) is not None:
+        options[option[1]] = option[2]
+        del lines[0]
+    return options, "\n".join(lines)
+
+
+def _directive(name: str, argument: str, segment: Segment, context: LessonContext) -> str:
+    options, text = _options_of(segment.text)
+    place = segment.place
+    match name:
+        case "math":
+            tex = "\n".join(part for part in (argument, text) if part.strip())
+            return displayed(tex, options.get("label", options.get("name", "")))
+        case "figure" | "image":
+            caption = "\n\n" + _inside(text, segment, context) if text.strip() else ""
+            alt = options.get("alt", "")
+            return rewrite(f"![{alt}]({argument.strip()})", context, place) + caption
+        case "code" | "code-block" | "sourcecode":
+            return plain_fence(argument or "text", text)
+        case "tableofcontents" | "toctree" | "contents":
+            return ""  # the map says it
+        case "epigraph" | "pull-quote" | "blockquote":
+            return "\n".join(f"> {line}" for line in _inside(text, segment, context).split("\n"))
+        case "div" | "container" | "card" | "grid" | "grid-item" | "tab-set" | "tab-item":
+            return _inside(text, segment, context)
+        case _ if name in _CALLOUTS:
+            folded = "-" if "dropdown" in options.get("class", name) else ""
+            title = argument if name in _TITLED else ""
+            text = text if title else f"{argument}\n{text}"
+            return _callout(name, title, text, segment, context, folded=folded)
+        case _ if name in _languages():
+            context.leave(place, f"a block of `{name}` is shown and not run")
+            return plain_fence(name, text)
+        case _:
+            what = f"the directive `{{{name}}}`, whose text is shown as it was written"
+            context.leave(place, what)
+            return plain_fence("text", f"{argument}\n{text}".strip("\n"))
+
+
+@functools.cache
+def _languages() -> frozenset[str]:
+    """Names of languages that are highlighted."""
+    from pygments.lexers import get_all_lexers
+
+    return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)
+
+
+def _fence(segment: Segment, context: LessonContext) -> str:
+    if not segment.fence:  # of a quotation
+        return segment.text
+    kind = segment.head.partition(" ")[0]
+    text = segment.text
+    if kind == "lab" and context.camera_is_position:
+        text = _CAMERA.sub(_directed, text)
+    if kind in _KNOWN_FENCES:
+        return f"{segment.fence}{segment.head}\n{text}\n{segment.fence}"
+    name = segment.head.strip("{}. ").partition(" ")[0].rstrip(",}")
+    if _is_json(text) and name != "json":
+        context.leave(segment.place, f"a block `{name}`, which is shown as JSON")
+        name = "json"
+    return plain_fence(name, text)
+
+
+def plain_fence(head: str, text: str) -> str:
+    """A fence that is longer than any in its text."""
+    mark = "`" * max(3, *(len(ticks) + 1 for ticks in re.findall("`{3,}", text)), 3)
+    return f"{mark}{head}\n{text}\n{mark}"
+
+
+def _is_json(text: str) -> bool:
+    try:
+        return isinstance(json.loads(text), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+def _directed(match: re.Match[str]) -> str:
+    """A camera by its direction: the other way round."""
+
+    def other(name: str, turn: float, found: re.Match[str]) -> str:
+        angle = float(found[2])
+        value = (angle + turn + 180) % 360 - 180 if turn else -angle
+        return f"{found[1]}{value:g}"
+
+    text = match[0]
+    number = r"(-?\d+(?:\.\d+)?)"
+    text = re.sub(rf'("azimuth"\s*:\s*){number}', lambda m: other("azimuth", 180, m), text)
+    return re.sub(rf'("elevation"\s*:\s*){number}', lambda m: other("elevation", 0, m), text)

@@ -1,0 +1,113 @@
+"""What is known of the whole course where one of its lessons is written.
+
+Entry point: `LessonContext`.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Mapping
+from urllib.parse import unquote, urlsplit
+
+from coursebuild.importer.values import Leftover, stem_of
+
+
+class LessonContext:
+    """A lesson under way: resolves what it names, and collects files and leftovers.
+
+    Args:
+        path: its file, relative to the folder that is imported.
+        targets: what is linked to instead of a file, by its path without extension.
+        ids: ids of lessons as coursebuild has them, by those of the course.
+        labels: the lesson or page that sets an anchor, as `targets` has it.
+        files: paths of all files of the folder.
+        folder: where the text will stand, as `content/lessons`.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        targets: Mapping[str, str],
+        ids: Mapping[str, str],
+        labels: Mapping[str, str],
+        files: frozenset[str],
+        folder: str,
+        *,
+        camera_is_position: bool,
+    ) -> None:
+        self.path = path
+        self.ids = ids
+        self.folder = folder
+        self.camera_is_position = camera_is_position
+        self.left: list[Leftover] = []
+        self.copied: dict[str, str] = {}
+        """Where files of the folder go, by their path there."""
+        self.pictures: dict[str, str] = {}
+        """Where pictures go that its file holds itself, by their names."""
+        self.callouts: dict[str, str] = {}
+        """Labels of kinds of callouts that coursebuild does not have."""
+        self._targets = targets
+        self._labels = labels
+        self._files = files
+
+    def leave(self, place: str, what: str) -> None:
+        """Note that something has no counterpart."""
+        self.left.append(Leftover(self.path, place, what))
+
+    def link(self, address: str, place: str) -> str:
+        """Where a link leads now."""
+        route = re.fullmatch(r"#?/lessons?/([^#?/]+)/?(#.*)?", address)
+        if route is not None:
+            return self._lesson(route[1], route[2] or "", address, place)
+        parts = urlsplit(address)
+        if parts.scheme or parts.netloc or not parts.path:
+            return address
+        path = self.resolve(parts.path)
+        anchor = f"#{parts.fragment.lower()}" if parts.fragment else ""
+        target = self._targets.get(stem_of(path)) or self._targets.get(path)
+        if target is not None:
+            return target + anchor
+        if path in self._files:
+            return self.file(path)
+        self.leave(place, f"a link to `{address}`, which is not in the folder")
+        return ""
+
+    def _lesson(self, name: str, anchor: str, address: str, place: str) -> str:
+        known = self.ids.get(unquote(name))
+        if known is None:
+            self.leave(place, f"a link to `{address}`, a lesson that the map does not have")
+            return ""
+        return f"lesson:{known}{anchor}"
+
+    def labelled(self, anchor: str) -> str:
+        """The address of an anchor that a text of the course sets; empty where none does."""
+        target = self._labels.get(anchor)
+        if target is None:
+            return ""
+        here = target == self._targets.get(stem_of(self.path))
+        return f"#{anchor}" if here else f"{target}#{anchor}"
+
+    def resolve(self, path: str) -> str:
+        """A path that the lesson names, relative to the folder that is imported."""
+        path = unquote(path)
+        beside = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path))
+        if path.startswith("/"):
+            beside = posixpath.normpath(path.lstrip("/"))
+        if beside in self._files or stem_of(beside) in self._targets:
+            return beside
+        return next((f for f in sorted(self._files) if f.endswith("/" + path.lstrip("./"))), beside)
+
+    def has(self, path: str) -> bool:
+        """Whether the folder has a file."""
+        return path in self._files
+
+    def picture(self, name: str) -> str:
+        """The address of a picture that the file of the lesson holds itself."""
+        self.pictures[name] = f"content/files/{stem_of(self.path)}/{name}"
+        return posixpath.relpath(self.pictures[name], self.folder).replace(" ", "%20")
+
+    def file(self, path: str) -> str:
+        """The address of a file that goes with the course."""
+        self.copied[path] = f"content/files/{path}"
+        return posixpath.relpath(self.copied[path], self.folder).replace(" ", "%20")

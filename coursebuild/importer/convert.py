@@ -1,0 +1,142 @@
+"""The course of another tool → the files of one of coursebuild.
+
+Entry points: `convert`, `write_course`.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from msgspec import Struct
+
+from coursebuild.core.files.errors import UsageError
+from coursebuild.core.files.write import write_atomic
+from coursebuild.importer.contents import read_contents
+from coursebuild.importer.context import LessonContext
+from coursebuild.importer.course_json import read_course_json
+from coursebuild.importer.course_map import Text, map_text, texts_of
+from coursebuild.importer.lesson import lesson_text
+from coursebuild.importer.prose import labels
+from coursebuild.importer.values import TEXTS, Files, Leftover, SourceCourse, files_of, stem_of
+
+_IGNORED = b"public/\nexamples/\n.coursebuild/\n"
+
+
+class Converted(Struct, frozen=True):
+    """A course as coursebuild has it."""
+
+    files: Mapping[str, bytes]
+    left: tuple[Leftover, ...]
+
+
+def convert(folder: Path) -> Converted:
+    """Read a course of another tool; nothing is written.
+
+    Raises:
+        UsageError: there is nothing to import, or a file cannot be read.
+    """
+    files = files_of(folder)
+    maps = [path for path in files if posixpath.basename(path) == "course.json"]
+    described = min(maps, key=lambda path: (path.count("/"), path), default=None)
+    if described is None:
+        course = read_contents(files, folder.resolve().name)
+    else:
+        course = read_course_json(described, files)
+    texts = texts_of(course, files)
+    out, left, callouts = _lessons(course, texts, files)
+    ids = _ids(texts)
+    if described is not None:
+        read = {text.source.path for text in texts}
+        lost = (path for path in files if path.endswith(TEXTS) and path not in read)
+        left += [Leftover(path, "", "a text that the map does not name") for path in lost]
+        left += [
+            Leftover(described, "", f"the prerequisite {name} of {text.id}, which is no lesson")
+            for text in texts
+            for name in text.source.prerequisites
+            if name not in ids
+        ]
+    out |= dict(_models(files))
+    out["content/course.toml"] = map_text(course, texts, ids, callouts).encode()
+    out[".gitignore"] = _IGNORED
+    return Converted(dict(sorted(out.items())), (*course.left, *left))
+
+
+def write_course(course: Converted, folder: Path, source: Path) -> None:
+    """Write the files of a new course.
+
+    Raises:
+        UsageError: the folder is the one that is imported, or in it, or has one of the files.
+        EffectError: a file cannot be written.
+    """
+    target = folder.resolve()
+    if target.is_relative_to(source.resolve()):
+        raise UsageError(f"{folder} is in the folder that is imported, which is only read")
+    for path in course.files:
+        if (target / path).exists():
+            raise UsageError(f"{folder} has {path} already; name an empty folder with --out")
+    for path, data in course.files.items():
+        (target / path).parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(target, path, data, expected=None)
+
+
+def _ids(texts: Sequence[Text]) -> dict[str, str]:
+    """Ids of lessons, by those that they had and by those that they have."""
+    lessons = [text for text in texts if text.link.startswith("lesson:")]
+    slugs = {text.source.slug: text.id for text in lessons if text.source.slug}
+    named = {text.source.id: text.id for text in lessons if text.source.id}
+    return slugs | {text.id: text.id for text in lessons} | named
+
+
+def _lessons(
+    course: SourceCourse, texts: Sequence[Text], files: Files
+) -> tuple[dict[str, bytes], list[Leftover], dict[str, str]]:
+    """The files of lessons and pages, what was left, and kinds of callouts of the course's own."""
+    written = [text for text in texts if text.path]
+    targets = {stem_of(text.source.path): text.link for text in written}
+    anchors = {
+        anchor: text.link
+        for text in reversed(written)
+        for segment in text.segments
+        for anchor in labels(segment.text)
+    }
+    out: dict[str, bytes] = {}
+    left: list[Leftover] = []
+    callouts: dict[str, str] = {}
+    for text in written:
+        context = LessonContext(
+            text.source.path,
+            targets,
+            _ids(texts),
+            anchors,
+            frozenset(files),
+            posixpath.dirname(text.path),
+            camera_is_position=course.camera_is_position,
+        )
+        out[text.path] = lesson_text(
+            text.segments, text.title, _script_path(text), context
+        ).encode()
+        out |= {place: files[path].read_bytes() for path, place in context.copied.items()}
+        out |= {place: text.pictures[name] for name, place in context.pictures.items()}
+        left += context.left
+        callouts |= context.callouts
+    return out, left, callouts
+
+
+def _script_path(text: Text) -> str:
+    words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
+    return f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
+
+
+def _models(files: Files) -> Iterator[tuple[str, bytes]]:
+    """Models, with the meshes and textures beside them."""
+    for path, file in files.items():
+        folders = posixpath.dirname(path).split("/")
+        if "models" in folders:
+            at = folders.index("models")
+            name = "/".join(("models", *folders[at + 1 :], posixpath.basename(path)))
+            yield name, file.read_bytes()
+        elif path.endswith(".xml") and b"<mujoco" in (data := file.read_bytes()):
+            yield f"models/{posixpath.basename(path)}", data
