@@ -87,6 +87,11 @@ def _check(parser: argparse.ArgumentParser) -> None:
         help="move initial states by 1e-12, and say which printed digits hold",
     )
     parser.add_argument(
+        "--truth",
+        action="store_true",
+        help="list the numbers and the arithmetic that nothing proves",
+    )
+    parser.add_argument(
         "--against",
         metavar="VERSION",
         default=None,

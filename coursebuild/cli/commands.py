@@ -58,11 +58,12 @@ def check_command(arguments: argparse.Namespace) -> int:
             shard=part,
             timings=arguments.write_timings,
             sensitivity=arguments.sensitivity,
+            truth=arguments.truth,
         )
 
     # Machines are told how long it took.
     parts = arguments.shard or arguments.timings or arguments.write_timings
-    if arguments.format != "text" or parts or arguments.sensitivity:
+    if arguments.format != "text" or parts or arguments.sensitivity or arguments.truth:
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
     return _once_while_unchanged(arguments, "check", ("examples",), work)
@@ -79,6 +80,7 @@ def _against(arguments: argparse.Namespace) -> int:
     forbid(bool(arguments.timings), "--timings")
     forbid(arguments.write_timings is not None, "--write-timings")
     forbid(arguments.sensitivity, "--sensitivity")
+    forbid(arguments.truth, "--truth")
     options = options_of(arguments)
     try:
         report = against(options, tuple(arguments.lessons), arguments.against)

@@ -262,10 +262,15 @@ class Feature(Struct, frozen=True, kw_only=True):
     pages: tuple[PageKind, ...] = ()
     rules: tuple[Rule, ...] = ()
     """Mistakes that it can name, in addition to the catalogue (`coursebuild.core.text.rules`)."""
+    summary: Callable[[Document], Struct] | None = None
+    """What its functions have to know of the text of a document, of which they see no prose; see
+    `registry.note_of`."""
     check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
     """What is wrong in some documents of the course, beside what parsing found."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
     """What is wrong once the scripts have run."""
+    unproven: Callable[[Course], Iterable[Diagnostic]] | None = None
+    """What nothing in the course proves: `coursebuild check --truth` lists it."""
     check_models: (
         Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
     ) = None

@@ -12,10 +12,12 @@ import importlib
 import importlib.util
 import pkgutil
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from msgspec import Struct
 
 from coursebuild.core.features import (
     Exporter,
@@ -27,13 +29,15 @@ from coursebuild.core.features import (
     Trial,
     Trials,
 )
-from coursebuild.core.model import Course, FeatureBlock
+from coursebuild.core.model import Course, Document, FeatureBlock
 from coursebuild.core.model.results import Results, ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import RULES
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.assets import Assets
+
+Note = TypeVar("Note", bound=Struct)
 
 GROUP = "coursebuild.features"
 """The group of entry points under which packages offer features."""
@@ -155,6 +159,29 @@ def page_copies() -> tuple[PageCopy, ...]:
     """The kinds of copies that features make of pages, those to be downloaded first."""
     copies = (copy for feature in features() for copy in feature.copies)
     return tuple(sorted(copies, key=lambda copy: not copy.download))
+
+
+def document_notes(document: Document) -> dict[str, Struct]:
+    """What features have to know of the text of a document, by their names."""
+    return {
+        feature.name: feature.summary(document)
+        for feature in features()
+        if feature.summary is not None
+    }
+
+
+def note_of(
+    document: Document, name: str, kind: type[Note], summary: Callable[[Document], Note]
+) -> Note:
+    """What a feature's `summary` said of a document, whose text may be left out."""
+    known = document.notes.get(name)
+    return known if isinstance(known, kind) else summary(document)
+
+
+def unproven(course: Course) -> tuple[Diagnostic, ...]:
+    """What nothing in the course proves."""
+    lists = (feature.unproven for feature in features() if feature.unproven is not None)
+    return tuple(found for one in lists for found in one(course))
 
 
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:

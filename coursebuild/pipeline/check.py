@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course, Status
-from coursebuild.core.registry import feature_trials
+from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, diagnose
 from coursebuild.pipeline.documents import Documents
@@ -38,16 +38,17 @@ def check(
     shard: Shard | None = None,
     timings: str | None = None,
     sensitivity: bool = False,
+    truth: bool = False,
 ) -> Report:
     """Verify the lessons that the names mean; all, and the pages, where there are none.
 
     `shard` is the part of the scripts and labs that this run takes; `timings` the file into which
     it writes how long each took. `sensitivity`: say which printed digits hold when initial states
-    are moved a little.
+    are moved a little. `truth`: list what nothing in the course proves.
     """
     progress = Progress(quiet=options.quiet)
     with project_lock(options.root, progress.say):
-        return _check(options, names, progress, shard, timings, sensitivity)
+        return _check(options, names, progress, shard, timings, sensitivity, truth)
 
 
 def _check(
@@ -57,6 +58,7 @@ def _check(
     shard: Shard | None,
     timings: str | None,
     sensitivity: bool,
+    truth: bool,
 ) -> Report:
     began = time.monotonic()
     with Documents(options.store, options.jobs, progress.stage) as documents:
@@ -76,6 +78,8 @@ def _check(
     if sensitivity:
         sensitive, warnings = _sensitivity(course, options, progress, verified, chosen)
         found += warnings
+    if truth:
+        found += unproven(course)
     found += shown_reports(options.root, course).diagnostics
     if shard is None or not any(True for _ in extract(course).value):
         found += _no_scripts(course, chosen, verified.scripts, found)

@@ -41,7 +41,9 @@ _SHOWN: dict[type, Callable[[Any], object]] = {
 def document_fingerprint(document: Document) -> str:
     """That of a document, by its summary."""
     raw = tuple(_raw(document))
-    return fingerprint((document.blocks, document.footnotes, document.lexicon, raw), _SHOWN)
+    return fingerprint(
+        (document.blocks, document.footnotes, document.lexicon, document.notes, raw), _SHOWN
+    )
 
 
 def _raw(document: Document) -> Iterator[str]:

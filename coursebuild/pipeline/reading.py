@@ -39,6 +39,7 @@ from coursebuild.core.pages.templates import templates_of
 from coursebuild.core.pages.tools import Tools, mark_now
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.pages.zips import imports
+from coursebuild.core.registry import document_notes
 from coursebuild.core.run.versions import package_version
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import key_of
@@ -143,6 +144,7 @@ class PageReader:
         scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
         bare = without_prose(whole.document)
         bare = replace(bare, lexicon=lexicon(whole.document, whole.formulas))
+        bare = replace(bare, notes=document_notes(whole.document))
         return DocumentSummary(
             document=bare,
             diagnostics=(*whole.diagnostics, *found, *told),

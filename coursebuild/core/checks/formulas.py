@@ -1,7 +1,7 @@
 """Formulas: which ones a course has, and where those that do not parse stand.
 
-Entry points: `course_formulas(course)`, `check_formulas(course, typeset)`; `document_formulas` and
-`formula_findings` for one document.
+Entry points: `course_formulas(course)`, `check_formulas(course, typeset)`; `document_formulas`,
+`formula_texts` and `formula_findings` for one document.
 """
 
 from __future__ import annotations
@@ -32,6 +32,11 @@ def _uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, Math) and inline.tex.text.strip():
                 yield Formula(inline.tex.text, inline.display), inline.tex
+
+
+def formula_texts(document: Document) -> Iterator[Excerpt]:
+    """The TeX of every formula of a document, in order."""
+    return (tex for _, tex in _uses(document))
 
 
 def course_formulas(course: Course) -> tuple[Formula, ...]:

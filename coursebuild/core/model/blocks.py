@@ -6,6 +6,7 @@ Entry points: the union `Block`, and `Document`.
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from decimal import Decimal
 from typing import Literal, TypeAlias
 
@@ -332,3 +333,5 @@ class Document(Struct, frozen=True, dict=True):
     footnotes: tuple[Footnote, ...]
     lexicon: Lexicon | None = None
     """Only of a summary, which does not have what it was taken from."""
+    notes: Mapping[str, Struct] = {}
+    """The same: what features know of it, by their names."""

@@ -110,6 +110,8 @@ def found_in(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ..
     match command(case):
         case "check":
             return check(options).diagnostics
+        case "check --truth":
+            return check(options, truth=True).diagnostics
         case "check --no-cache":
             return check(workshop.options(root, fresh=True)).diagnostics
         case "update":

@@ -1,0 +1,205 @@
+"""Expressions → quantities: the value, in base units, and the dimension.
+
+Entry points: `evaluate(expression, arithmetic, symbols)`; `EXACT`, the arithmetic of fractions,
+which become floating-point numbers where they must.
+
+What would be too large, or is no number, is not understood. Sums of different dimensions, and
+functions of what has one, are `WrongDimensions`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from msgspec import Struct
+
+from coursebuild.core.text.units import Dimension, find_unit
+from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+
+_MOST_BITS = 4_000
+_LONGEST = 300
+
+
+class WrongDimensions(NotUnderstood):
+    """That quantities of different dimensions meet."""
+
+
+class Quantity(Struct, frozen=True):
+    """A value in base units of the SI."""
+
+    value: Any
+    dimension: Dimension = ()
+
+
+class Arithmetic(Struct, frozen=True):
+    """Numbers of some kind."""
+
+    number: Callable[[str], Any]
+    power: Callable[[Any, Any], Any]
+    functions: Mapping[str, Callable[[Any], Any]]
+    constants: Mapping[str, Any]
+    calculus: Callable[..., Any] | None = None
+    """The derivative of a function at a place, or its integral between two."""
+
+
+def _exact_power(base: Any, exponent: Any) -> Any:
+    if isinstance(base, Fraction) and isinstance(exponent, Fraction) and exponent.denominator == 1:
+        bits = base.numerator.bit_length() + base.denominator.bit_length()
+        if abs(exponent) * bits > _MOST_BITS:
+            raise OverflowError
+        return base ** int(exponent)
+    if base < 0:
+        raise ValueError
+    return float(base) ** float(exponent)
+
+
+EXACT = Arithmetic(
+    Fraction,
+    _exact_power,
+    {
+        **{n: getattr(math, n) for n in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp")},
+        **{"ln": math.log, "arcsin": math.asin, "arccos": math.acos, "arctan": math.atan},
+        **{"cot": lambda x: 1 / math.tan(x), "sec": lambda x: 1 / math.cos(x)},
+        "csc": lambda x: 1 / math.sin(x),
+    },
+    {r"\pi": math.pi, r"\mathrm{e}": math.e},
+)
+
+
+def evaluate(
+    expression: Expression, arithmetic: Arithmetic, symbols: Mapping[str, Quantity] | None = None
+) -> Quantity:
+    """What an expression comes to.
+
+    Raises:
+        NotUnderstood: it cannot be computed.
+    """
+    try:
+        return _Evaluator(arithmetic, symbols or {}).of(expression)
+    except (OverflowError, MemoryError):
+        raise expression.not_understood("the numbers become too large") from None
+
+
+class _Evaluator:
+    def __init__(self, arithmetic: Arithmetic, symbols: Mapping[str, Quantity]) -> None:
+        self.arithmetic, self.symbols = arithmetic, symbols
+
+    def of(self, one: Expression) -> Quantity:
+        """What an expression comes to."""
+        try:
+            return self._of(one)
+        except ZeroDivisionError:
+            raise one.not_understood("it divides by zero") from None
+        except (ValueError, TypeError):
+            raise one.not_understood("it is no real number") from None
+
+    def _of(self, one: Expression) -> Quantity:
+        match one.kind:
+            case "number":
+                if len(one.text) > _LONGEST:
+                    raise OverflowError
+                return Quantity(self.arithmetic.number(one.text))
+            case "symbol":
+                return self._symbol(one)
+            case "unit":
+                return self._unit(one)
+            case "+" | "-":
+                return self._sum(one)
+            case "*":
+                left, right = map(self.of, one.parts)
+                dimension = multiply(left.dimension, right.dimension)
+                return Quantity(left.value * right.value, dimension)
+            case "/":
+                left, right = map(self.of, one.parts)
+                dimension = multiply(left.dimension, right.dimension, -1)
+                return Quantity(left.value / right.value, dimension)
+            case "^":
+                return self._power(one)
+            case "abs":
+                (inner,) = map(self.of, one.parts)
+                return Quantity(abs(inner.value), inner.dimension)
+            case "derivative" | "integral":
+                return self._calculus(one)
+            case name:
+                (inner,) = map(self.of, one.parts)
+                if inner.dimension:
+                    reason = f"`\\{name}` is of {say(inner.dimension)}, and not of a number"
+                    raise WrongDimensions(reason, one.start, one.end)
+                return Quantity(self.arithmetic.functions[name](inner.value))
+
+    def _symbol(self, one: Expression) -> Quantity:
+        known = self.symbols.get(one.text)
+        if known is not None:
+            return known
+        if one.text not in self.arithmetic.constants:
+            raise one.not_understood(f"`{one.text}` has no meaning in the index of symbols")
+        return Quantity(self.arithmetic.constants[one.text])
+
+    def _unit(self, one: Expression) -> Quantity:
+        if one.text == "%":
+            return Quantity(self.arithmetic.number("0.01"))
+        if one.text == "deg":
+            return Quantity(self.arithmetic.constants[r"\pi"] / 180)
+        unit = find_unit(one.text)
+        if unit is None:
+            raise one.not_understood(f"`{one.text}` is no unit that is known")
+        return Quantity(self.arithmetic.number(repr(unit.size)), unit.dimension)
+
+    def _sum(self, one: Expression) -> Quantity:
+        first, *rest = map(self.of, one.parts)
+        if not rest:
+            return Quantity(-first.value, first.dimension)
+        (second,) = rest
+        if first.dimension != second.dimension and 0 not in (first.value, second.value):
+            reason = f"{say(first.dimension)} and {say(second.dimension)} are added"
+            raise WrongDimensions(reason, one.start, one.end)
+        sign = 1 if one.kind == "+" else -1
+        return Quantity(first.value + sign * second.value, first.dimension or second.dimension)
+
+    def _power(self, one: Expression) -> Quantity:
+        base, exponent = map(self.of, one.parts)
+        if exponent.dimension:
+            reason = f"an exponent is {say(exponent.dimension)}, and no number"
+            raise WrongDimensions(reason, one.parts[1].start, one.parts[1].end)
+        dimension: Dimension = ()
+        if base.dimension:
+            power = _Evaluator(EXACT, {}).of(one.parts[1]).value
+            dimension = multiply((), base.dimension, Fraction(power).limit_denominator(1000))
+        return Quantity(self.arithmetic.power(base.value, exponent.value), dimension)
+
+    def _calculus(self, one: Expression) -> Quantity:
+        what, by, *ends = one.parts
+        if self.arithmetic.calculus is None or (one.kind == "integral" and not ends):
+            raise one.not_understood("it is no number")
+        at = self._symbol(by)
+        dimension: list[Dimension] = []
+
+        def function(value: Any) -> Any:
+            inner = {**self.symbols, by.text: Quantity(value, at.dimension)}
+            found = _Evaluator(self.arithmetic, inner).of(what)
+            dimension[:] = [found.dimension]
+            return found.value
+
+        places = [self.of(end).value for end in ends] or [at.value]
+        value = self.arithmetic.calculus(function, *places)
+        sign = 1 if ends else -1
+        return Quantity(value, multiply(dimension[0], at.dimension, sign))
+
+
+def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Dimension:
+    """The dimension of a product, whose second factor is raised to a power."""
+    powers = dict(left)
+    for name, exponent in right:
+        powers[name] = powers.get(name, Fraction(0)) + exponent * power
+    return tuple(sorted((name, found) for name, found in powers.items() if found))
+
+
+def say(dimension: Dimension) -> str:
+    """A dimension in words: `length/time^2`."""
+    if not dimension:
+        return "a number"
+    parts = (name.strip("[]") + ("" if power == 1 else f"^{power}") for name, power in dimension)
+    return "`" + " ".join(parts) + "`"

@@ -1,0 +1,71 @@
+"""Arithmetic in formulas: what holds is passed, a wrong digit is told, and no text is too odd."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coursebuild.features.arithmetic.chains import check_arithmetic
+
+HOLDS = r"""
+I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168\ \mathrm{kg\,m^2}.
+1\,000 + 2{,}500 = 3\,500
+45^\circ = \pi/4
+\left(1 + \tfrac12\right)^2 = 2.25
+0.25 \approx 0.2
+0.25 \approx 0.3
+2^{53} = 9\,007\,199\,254\,740\,992
+10\ \mathrm{mm}/2\ \mathrm{ms} = 5\ \mathrm{m/s}
+\pi/\sqrt{40000\ \mathrm s^{-2}} = \pi/200\ \mathrm s = 15.7\ \mathrm{ms}
+0.5/9.81\ \mathrm m = 5.1\ \mathrm{cm}
+\begin{aligned} a &= 1 + 2 \\ &= 3 \end{aligned}
+\mathrm e^{-2} \approx 0.135, \quad \sin^2 30^\circ = 0.25
+-2^2 = -4
+\sqrt[3]{8} = 2
+\lvert -3\rvert = 3 < \pi < 4
+"""
+SILENT = r"""
+e = 1
+x \in [0, 1]
+\ddot\theta = -\frac g\ell \sin\theta
+\delta(0) = 0
+\exp\tfrac12\boldsymbol\Omega = 1
+"""
+TOKENS = (
+    r"0 1 2.5 , . + - * / ^ _ { } ( ) [ ] | = < & \\ \frac \sqrt \sin \pi \cdot \mathrm{kg} \int"
+).split()
+
+
+def test_what_holds_is_passed_and_symbols_are_left_alone() -> None:
+    wrong = [
+        (tex, found)
+        for texts, passed in ((HOLDS, True), (SILENT, False))
+        for tex in texts.strip().splitlines()
+        for found in (check_arithmetic(tex),)
+        if bool(found) is not passed or any(one.kind != "holds" for one in found)
+    ]
+    assert wrong == []
+
+
+@given(st.lists(st.decimals(-1000, 1000, places=4), min_size=1, max_size=6), st.integers(-9, 9))
+def test_a_sum_is_told_just_where_its_last_digit_is_wrong(terms: list[Decimal], off: int) -> None:
+    result = sum(terms) + Decimal(off).scaleb(-4)
+    tex = " + ".join(f"({term:f})" for term in terms) + f" = {result:f}"
+    (found,) = check_arithmetic(tex)
+    assert found.kind == ("wrong" if off else "holds")
+    if off:
+        assert tex[found.start : found.end].strip("-") == f"{abs(result):f}"
+
+
+@given(st.lists(st.sampled_from(TOKENS), max_size=40).map(" ".join) | st.text(max_size=60))
+def test_no_text_is_too_odd(tex: str) -> None:
+    for found in check_arithmetic(tex):
+        assert 0 <= found.start <= found.end <= len(tex)
+
+
+def test_what_nests_too_deep_is_not_understood() -> None:
+    for tex in ("(" * 2400 + "1" + ")" * 2400, r"\sqrt" * 900 + "1", "1 + " * 1200 + "1"):
+        (found,) = check_arithmetic(tex + " = 1")
+        assert found.message == "it is too long"
