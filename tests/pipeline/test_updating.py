@@ -131,8 +131,7 @@ def test_update_changes_outputs_of_every_form_and_no_other_byte(
     assert got == (mark + UPDATED).replace("\n", newline).replace("never", clock(got))
     assert folder.main("check").status == 0
     assert folder.main("update").status == 0
-    again = folder.text(folder.lesson())
-    assert again == got.replace(clock(got), clock(again))
+    assert folder.text(folder.lesson()) == got  # volatile text too
 
 
 def clock(text: str) -> str:

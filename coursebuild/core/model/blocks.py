@@ -170,13 +170,25 @@ class Mode(enum.Enum):
 class Comparison(Struct, frozen=True):
     """How a recording is compared.
 
-    `rtol` and `atol` count only in mode `TOLERANCE`; `ellipsis` goes with all but `VOLATILE`.
+    `rtol` and `atol` count only in mode `TOLERANCE`; the last two go with all but `VOLATILE`.
     """
 
     mode: Mode = Mode.EXACT
     rtol: Decimal = Decimal(0)
     atol: Decimal = Decimal(0)
     ellipsis: bool = False
+    volatile: str = ""
+    """A regular expression: what matches it is not compared."""
+
+    @property
+    def filters(self) -> tuple[Filter, ...]:
+        """What takes volatile text out of both sides, with the space that its width moves."""
+        return (Filter(volatile_pattern(self.volatile), "…"),) if self.volatile else ()
+
+
+def volatile_pattern(pattern: str) -> str:
+    """A regular expression for what another one matches and the space beside it."""
+    return rf"[^\S\n]*(?:{pattern})[^\S\n]*"
 
 
 class Filter(Struct, frozen=True):

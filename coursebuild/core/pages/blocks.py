@@ -180,7 +180,11 @@ def compared(words: Strings, comparison: Comparison) -> str:
             how = _tolerance(words, comparison.rtol, comparison.atol)
         case _:
             assert_never(comparison.mode)
-    return f"{how}; {words('receipt.ellipsis')}" if comparison.ellipsis else how
+    if comparison.ellipsis:
+        how += f"; {words('receipt.ellipsis')}"
+    if comparison.volatile:
+        how += f"; {words('receipt.varies', pattern=comparison.volatile)}"
+    return how
 
 
 def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:

@@ -113,7 +113,7 @@ class Printed:
         """The lines of a recorded output."""
         key = _key(verdict)
         if key not in self._lines:
-            self._lines[key] = printed_lines(verdict.recording)
+            self._lines[key] = printed_lines(verdict.recording, verdict.comparison.filters)
         return self._lines[key]
 
 
@@ -178,23 +178,24 @@ def _check(
     if not verdicts and not ran_well:
         return _never_run(binding, path, run)
     steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
-    if verdicts and not steady:
-        return diagnose(
-            "binding-volatile",
-            binding.text_span,
-            f"`{binding.text}` is bound to an output that differs by machine",
-            help="take `{out}` away, or compare the output by another key than `volatile`",
-        )
     shown = Shown.of(binding.text)
     lines = [line for verdict in steady for line in printed.lines(verdict)]
     if _holds(shown, lines):
         return lines
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
     drifted = any(v.status == "drift" for v in steady)
-    if (partial or drifted or not steady) and run is not None and ran_well:
-        lines = list(lines_of_run(run.stdout))
+    if (partial or drifted or not verdicts) and run is not None and ran_well:
+        lines = lines_of_run(run.stdout, [f for v in steady for f in v.comparison.filters])
         if _holds(shown, lines):
             return lines
+    varying = [v.recording for v in verdicts if v not in steady or v.comparison.volatile]
+    if varying and (not steady or _holds(shown, [n for r in varying for n in printed_lines(r)])):
+        return diagnose(
+            "binding-volatile",
+            binding.text_span,
+            f"`{binding.text}` is bound to an output that differs from run to run",
+            help="take `{out}` away, or let `volatile` leave this number in the comparison",
+        )
     return mismatch(binding, path, lines, before)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.model import Recording, Table
+from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.mapped_text import Side, plain
 from coursebuild.core.scripts.numbers import (
     Number,
@@ -41,16 +41,16 @@ class PrintedLine(Struct, frozen=True):
         return cls(text, scan(text), locate)
 
 
-def lines_of_run(stdout: str) -> tuple[PrintedLine, ...]:
+def lines_of_run(stdout: str, filters: Iterable[Filter] = ()) -> list[PrintedLine]:
     """The lines of an output that is not recorded."""
-    return tuple(map(PrintedLine.of, Side.of(stdout).lines))
+    return list(map(PrintedLine.of, Side.of(stdout, filters).lines))
 
 
-def printed_lines(recording: Recording) -> tuple[PrintedLine, ...]:
-    """The lines of a recorded output, as the author sees them: no filter is applied."""
+def printed_lines(recording: Recording, filters: Iterable[Filter] = ()) -> tuple[PrintedLine, ...]:
+    """The lines of a recorded output; as the author sees them, where no filter is applied."""
     if isinstance(recording.body, Table):
         return tuple(map(_row_line, table_rows(recording.body)))
-    side = Side.of(recording.body.text)
+    side = Side.of(recording.body.text, filters)
     return tuple(
         PrintedLine.of(line, _in_fence(recording.body, side, index))
         for index, line in enumerate(side.lines)

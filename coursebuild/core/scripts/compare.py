@@ -73,7 +73,7 @@ def compare(
     recording: Recording, comparison: Comparison, filters: tuple[Filter, ...], stdout: str
 ) -> Verdict:
     """The verdict on one recording, given what its script printed."""
-    body = recording.body
+    body, filters = recording.body, (*filters, *comparison.filters)
     if comparison.mode is Mode.VOLATILE:
         return Verdict(recording, comparison, "volatile")
     if isinstance(body, Table):

@@ -68,7 +68,7 @@ def diff_rows(
         return tuple(
             row for change in verdict.changes for row in _whole(change.recorded, change.ran)
         )
-    matcher = LineMatcher(verdict.comparison)
+    matcher, filters = LineMatcher(verdict.comparison), (*filters, *verdict.comparison.filters)
     recorded, ran = Side.of(recording.body.text, filters), Side.of(stdout, filters)
     steps = align(recorded, ran, matcher)
     rows = (row for step in steps for row in _rows(step, recorded, ran, matcher))

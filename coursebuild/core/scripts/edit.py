@@ -4,7 +4,7 @@ Entry points: `updated_body` (what to write into one recorded output), `adopted`
 that was edited), `apply_edits`.
 
 1. A recording that matches is left alone; it must match both of two runs. A volatile one takes the
-   text of the first run.
+   text of the first run, where that differs in more than its numbers.
 2. The new lines of a fence are those of the first run. Lines with `...`, and lines that match only
    after a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
    indentation) are those of the lesson.
@@ -68,11 +68,13 @@ def updated_body(
         return refused(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, Table):
         return updated_table(recording, recording.body, comparison, filters, first, second)
-    body = recording.body
+    body, filters = recording.body, (*filters, *comparison.filters)
     if comparison.mode is Mode.VOLATILE:
-        if Side.of(body.text).lines == Side.of(first).lines:
+        before, now = Side.of(body.text).lines, Side.of(first).lines
+        alike = LineMatcher(comparison).alike
+        if len(before) == len(now) and all(map(alike, before, now)):
             return None
-        return _fence_edit(recording, list(Side.of(first).lines))
+        return _fence_edit(recording, now)
     recorded, ran, again = (Side.of(text, filters) for text in (body.text, first, second))
     lines: list[str] | Diagnostic
     if same_lines(recorded, ran, comparison):

@@ -25,6 +25,7 @@ from coursebuild.core.scripts.extract import Extraction, extract, owners
 from coursebuild.core.scripts.failures import divergence, failure, silence
 from coursebuild.core.scripts.numbers import scan
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.source import Excerpt
 
 _NAMED = 3
 _WIDTH = 60
@@ -85,6 +86,14 @@ def drift_diagnostic(verdict: Verdict, owner: str, leaning: Sequence[Leaning] = 
     The first differing place is pointed at; notes name the next ones, and every bound number in the
     prose that leans on a value that changed.
     """
+    recording, update = verdict.recording, f"`coursebuild update {owner}`"
+    if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
+        return diagnose(
+            "output-drift",
+            recording.caption_span,
+            f"nothing is recorded yet of what `{recording.script}` prints",
+            help=f"run {update}",
+        )
     first, *others = sorted(verdict.changes, key=lambda change: change.span.start)
     notes = [Note(_further(change), change.span) for change in others[:_NAMED]]
     if len(others) > _NAMED:
@@ -96,7 +105,7 @@ def drift_diagnostic(verdict: Verdict, owner: str, leaning: Sequence[Leaning] = 
         first.span,
         f"recorded output differs from this run ({classes(verdict.changes)})",
         label=_label(first),
-        help=f"if the change is intended, run `coursebuild update {owner}`",
+        help=f"if the change is intended, run {update}",
         notes=notes,
     )
 

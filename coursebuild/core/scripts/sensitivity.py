@@ -68,7 +68,7 @@ def sensitivity(
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
     found = [one for each in compared for one in _doubtful(course, *each, base, moved)]
-    numbers = sum(len(line.numbers) for r, _ in compared for line in printed_lines(r))
+    numbers = sum(len(line.numbers) for r, c in compared for line in printed_lines(r, c.filters))
     doubts = tuple(one for one in found if isinstance(one, Doubt))
     flips = tuple(one for one in found if isinstance(one, Flip))
     return Sensitivity(path, owner, standing, numbers, amplification(moved), doubts, flips)

@@ -6,7 +6,6 @@ Entry points: `check_settings`, and one function for each setting that gives its
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
 
@@ -21,7 +20,7 @@ from coursebuild.core.syntax.course_schema import (
 )
 from coursebuild.core.syntax.decode import Decoding
 from coursebuild.core.syntax.nodes import NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.wording import named
+from coursebuild.core.syntax.wording import named, pattern_mistake
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
@@ -81,31 +80,16 @@ def _check_filter(node: ObjectNode) -> Iterator[Diagnostic]:
     pattern, replacement = node.get("pattern"), node.get("replacement")
     if not isinstance(pattern, StringNode) or not isinstance(replacement, StringNode):
         return
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            compiled = re.compile(pattern.value)
-    except (re.error, ValueError, OverflowError, RecursionError) as error:
-        message = f"the pattern does not compile: {_reason(error)}"
-        yield diagnose("field-value", _place(pattern, error), message)
-        return
-    try:
-        compiled.sub(replacement.value, "")
-    except (re.error, IndexError) as error:
-        message = f"the replacement cannot be used: {_reason(error)}"
-        yield diagnose("field-value", _place(replacement, error), message)
+    if (mistake := pattern_mistake(pattern.value)) is not None:
+        message = f"the pattern does not compile: {mistake[0]}"
+        yield diagnose("field-value", _place(pattern, mistake[1]), message)
+    elif (mistake := pattern_mistake(pattern.value, replacement.value)) is not None:
+        message = f"the replacement cannot be used: {mistake[0]}"
+        yield diagnose("field-value", _place(replacement, mistake[1]), message)
 
 
-def _reason(error: Exception) -> str:
-    if isinstance(error, RecursionError):
-        return "it nests too deep"
-    text = error.msg if isinstance(error, re.error) else str(error)
-    return text[:1].lower() + text[1:]
-
-
-def _place(node: StringNode, error: Exception) -> Span:
-    """The character that the error names, or the whole string."""
-    at = error.pos if isinstance(error, re.error) else None
+def _place(node: StringNode, at: int | None) -> Span:
+    """The character at an offset, or the whole string."""
     if at is None or at >= len(node.value):
         return node.span
     return node.excerpt.span(at, at + 1)

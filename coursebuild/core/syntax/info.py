@@ -85,7 +85,7 @@ def kind_of(info: Excerpt) -> Excerpt:
 def read_keys(
     info: Excerpt, *, values: Sequence[str] = (), flags: Sequence[str] = (), named: bool = False
 ) -> Parsed[FenceKeys]:
-    """Sort the words of a fence of ours: which keys take a value, which are flags.
+    """Sort the words of a fence of ours: which keys take a value, which are flags, which are both.
 
     With `named` a first word without `=` is a name.
     """
@@ -104,10 +104,10 @@ def read_keys(
             notes = [Note("first given here", kept[key].key_span)]
             message = f"`{key}` is given twice"
             diagnostics.append(diagnose("fence-key-repeated", word.key_span, message, notes=notes))
-        elif key in flags and word.value is not None:
+        elif key not in values and word.value is not None:
             message, help = f"`{key}` takes no value", f"write `{key}` alone"
             diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
-        elif key in values and not word.value:
+        elif word.value == "" or (key not in flags and word.value is None):
             message, help = f"`{key}` needs a value", f"write `{key}=…`"
             diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
         else:

@@ -11,9 +11,11 @@ import re
 from decimal import Decimal
 
 from coursebuild.core.model import Comparison, Inline, Mode, Recording, Table, plain_text
+from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.syntax.fence import Fence, is_ours
 from coursebuild.core.syntax.info import FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.syntax.wording import pattern_mistake
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
@@ -28,9 +30,9 @@ _PRINTS = re.compile(
 )
 """A sentence that leads to what a script prints: "On this machine it prints (abridged):"."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
-_VALUES = ("rtol", "atol")
+_VALUES = ("rtol", "atol", "volatile")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
-_MODES = {key: "rtol" if key == "atol" else key for key in (*_VALUES, *_FLAGS)}
+_MODES = {"rtol": "rtol", "atol": "rtol", **{key: key for key in _FLAGS}}
 
 
 def is_caption(inlines: tuple[Inline, ...]) -> bool:
@@ -131,13 +133,15 @@ def _comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | 
     atol = _tolerance(keys.get("atol"), diagnostics)
     _contradictions(keys, diagnostics)
     ellipsis = keys.get("ellipsis") is not None
-    if keys.get("volatile"):
+    volatile = _pattern(keys.get("volatile"), diagnostics)
+    if keys.get("volatile") and not volatile:
         return Comparison(Mode.VOLATILE)
+    mode = Mode.DIGITS if keys.get("digits") else Mode.EXACT
     if rtol is not None or atol is not None:
-        return Comparison(Mode.TOLERANCE, rtol or Decimal(0), atol or Decimal(0), ellipsis)
-    if keys.get("digits"):
-        return Comparison(Mode.DIGITS, ellipsis=ellipsis)
-    return Comparison(ellipsis=ellipsis) if keys.get("exact") or ellipsis else None
+        mode = Mode.TOLERANCE
+    if not keys.words:
+        return None
+    return Comparison(mode, rtol or Decimal(0), atol or Decimal(0), ellipsis, volatile)
 
 
 def stray_keys(fence: Fence, session: ParsingState) -> None:
@@ -165,10 +169,26 @@ def _tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | No
     return None
 
 
+def _pattern(word: Word | None, diagnostics: list[Diagnostic]) -> str:
+    """The regular expression of what differs from run to run; empty where there is none."""
+    if word is None or word.value_text is None:
+        return ""
+    pattern = word.value_text.text
+    mistake = pattern_mistake(pattern) or pattern_mistake(volatile_pattern(pattern))
+    if mistake is None and re.search(pattern, "") is None:
+        return pattern
+    message = "the pattern matches where there is nothing"
+    if mistake is not None:
+        message = f"the pattern does not compile: {mistake[0]}"
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+    return ""
+
+
 def _contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
     """Report the first key that does not go with one before it."""
-    for i, second in enumerate(keys.words):
-        for first in keys.words[:i]:
+    words = [w for w in keys.words if w.key != "volatile" or w.value is None]
+    for i, second in enumerate(words):
+        for first in words[:i]:
             modes = {_MODES[first.key], _MODES[second.key]}
             if len(modes) == 2 and ("ellipsis" not in modes or "volatile" in modes):
                 message = f"`{second.key}` contradicts `{first.key}`"

@@ -151,7 +151,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "A bound number is not a value that the script printed, rounded.",
     ),
-    ("binding-volatile", "error", "A number is bound to an output that differs by machine."),
+    ("binding-volatile", "error", "A number is bound to what differs from run to run."),
     ("binding-attribute", "error", "The attribute of a bound number cannot be read."),
     # scripts and recorded outputs
     ("script-path", "error", "The path of a script is not one that a script may have."),

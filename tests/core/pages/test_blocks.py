@@ -113,6 +113,9 @@ def test_an_output_in_the_next_list_item_stays_apart_from_the_script(make: Make)
          "every number to a relative 1e-6 or within 0.5."),
         (" digits ellipsis", "verified", "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: "
          "every number to the last digit shown; “...” stands for text that is not compared."),
+        (' volatile="[0-9.]+ s"', "verified",
+         "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: the same text, character by "
+         "character; what matches [0-9.]+ s varies from run to run and is not compared."),
         (" volatile", "volatile",
          "volatile: Differs by machine. The script ran with MuJoCo 3.14.0, "
          "Python 3.11.7; what it printed is not compared."),
