@@ -48,6 +48,9 @@ if TYPE_CHECKING:  # the layers above, of which a feature's functions take value
 
 B = TypeVar("B", bound=FeatureBlock)
 
+Mathml: TypeAlias = Callable[[str, bool], str]
+"""Gives a formula, which stands on a line of its own or not; empty for one that cannot be set."""
+
 
 class IndexReader(Protocol):
     """Reads what the search finds of a block."""
@@ -260,11 +263,11 @@ class Feature(Struct, frozen=True, kw_only=True):
     """Names of the features whose modules it imports."""
     fences: tuple[FenceKind[Any], ...] = ()
     pages: tuple[PageKind, ...] = ()
+    summary: Callable[[Document, Mathml], Parsed[Struct | None]] | None = None
+    """What other pages show of a document, from all its text; nothing where that says nothing.
+    It goes with the document's summary (`Library.summaries`). And what is wrong in it."""
     rules: tuple[Rule, ...] = ()
     """Mistakes that it can name, in addition to the catalogue (`coursebuild.core.text.rules`)."""
-    summary: Callable[[Document], Struct] | None = None
-    """What its functions have to know of the text of a document, of which they see no prose; see
-    `registry.note_of`."""
     check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
     """What is wrong in some documents of the course, beside what parsing found."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None

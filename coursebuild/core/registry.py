@@ -12,10 +12,10 @@ import importlib
 import importlib.util
 import pkgutil
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
 
@@ -23,6 +23,7 @@ from coursebuild.core.features import (
     Exporter,
     Feature,
     FenceKind,
+    Mathml,
     PageCopy,
     PageKind,
     PublishedTrials,
@@ -31,13 +32,12 @@ from coursebuild.core.features import (
 )
 from coursebuild.core.model import Course, Document, FeatureBlock
 from coursebuild.core.model.results import Results, ScriptRun
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import RULES
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.assets import Assets
 
-Note = TypeVar("Note", bound=Struct)
 
 GROUP = "coursebuild.features"
 """The group of entry points under which packages offer features."""
@@ -161,27 +161,18 @@ def page_copies() -> tuple[PageCopy, ...]:
     return tuple(sorted(copies, key=lambda copy: not copy.download))
 
 
-def document_notes(document: Document) -> dict[str, Struct]:
-    """What features have to know of the text of a document, by their names."""
-    return {
-        feature.name: feature.summary(document)
-        for feature in features()
-        if feature.summary is not None
-    }
-
-
-def note_of(
-    document: Document, name: str, kind: type[Note], summary: Callable[[Document], Note]
-) -> Note:
-    """What a feature's `summary` said of a document, whose text may be left out."""
-    known = document.notes.get(name)
-    return known if isinstance(known, kind) else summary(document)
-
-
 def unproven(course: Course) -> tuple[Diagnostic, ...]:
     """What nothing in the course proves."""
     lists = (feature.unproven for feature in features() if feature.unproven is not None)
     return tuple(found for one in lists for found in one(course))
+
+
+def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
+    """What features have of a document, by their names, and what they find wrong in it."""
+    makers = {f.name: f.summary for f in features() if f.summary is not None}
+    made = {name: make(document, mathml) for name, make in makers.items()}
+    values = {name: one.value for name, one in made.items() if one.value is not None}
+    return Parsed(values, tuple(found for one in made.values() for found in one.diagnostics))
 
 
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:

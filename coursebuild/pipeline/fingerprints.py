@@ -40,10 +40,9 @@ _SHOWN: dict[type, Callable[[Any], object]] = {
 
 def document_fingerprint(document: Document) -> str:
     """That of a document, by its summary."""
-    raw = tuple(_raw(document))
-    return fingerprint(
-        (document.blocks, document.footnotes, document.lexicon, document.notes, raw), _SHOWN
-    )
+    raw, known = tuple(_raw(document)), (document.equations, document.summaries)
+    parts = (document.blocks, document.footnotes, known, raw)
+    return fingerprint(parts, _SHOWN)
 
 
 def _raw(document: Document) -> Iterator[str]:

@@ -30,7 +30,7 @@ from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.frame import Frames, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import has
-from coursebuild.core.pages.page_list import PageEntry, own_pages, page_list, page_title
+from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.pages.shared import PageFacts
 from coursebuild.core.text.source import key_of
@@ -189,7 +189,7 @@ class Pages:
             course.repository,
             course.licence,
             tuple((page.id, page.title, page.menu) for page in course.pages),
-            tuple((p.path, page_title(self._library, p)) for p in own_pages(self._library)),
+            tuple((p.path, page_title(self._library, p)) for p in self._library.added_pages),
             results.engine,
             results.python,
             names,

@@ -32,14 +32,14 @@ from coursebuild.core.model import Document, Script, document_blocks
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import strings_for
-from coursebuild.core.pages.lookup.lexicon import lexicon, misdeclared
+from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.templates import templates_of
-from coursebuild.core.pages.tools import Tools, mark_now
+from coursebuild.core.pages.tools import Tools, known_mathml, mark_now
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.pages.zips import imports
-from coursebuild.core.registry import document_notes
+from coursebuild.core.registry import summarize
 from coursebuild.core.run.versions import package_version
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import key_of
@@ -140,14 +140,15 @@ class PageReader:
 
     def _summary(self, whole: _Whole) -> DocumentSummary:
         found = formula_findings(whole.document, whole.formulas)
-        told = misdeclared(whole.document, whole.formulas)
+        mathml = known_mathml(whole.formulas)
+        known = summarize(whole.document, mathml)
         scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
         bare = without_prose(whole.document)
-        bare = replace(bare, lexicon=lexicon(whole.document, whole.formulas))
-        bare = replace(bare, notes=document_notes(whole.document))
+        equations = equations_of(whole.document, mathml)
+        bare = replace(bare, equations=equations, summaries=known.value)
         return DocumentSummary(
             document=bare,
-            diagnostics=(*whole.diagnostics, *found, *told),
+            diagnostics=(*whole.diagnostics, *found, *known.diagnostics),
             imports=tuple((s.path, tuple(sorted(imports(s.code.text)))) for s in scripts),
             lasting=not found,
             fingerprint=document_fingerprint(bare),

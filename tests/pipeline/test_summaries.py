@@ -24,15 +24,18 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Outcome, Results, ScriptRun
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.document_inputs import document_inputs
-from coursebuild.core.pages.lookup.lexicon import lexicon
+from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.page_list import page_list
+from coursebuild.core.pages.tools import known_mathml
 from coursebuild.core.pages.urls import Place
+from coursebuild.core.registry import summarize
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode, fingerprint
+from coursebuild.features.glossary.page import course_terms
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.quiz.checks import check_output_lines
 from coursebuild.features.quiz.model import Quiz
@@ -59,7 +62,9 @@ def courses(*texts: str) -> tuple[Course, Course]:
 
 
 def summarized(whole: Document) -> Document:
-    return replace(without_prose(whole), lexicon=lexicon(whole, {}))
+    mathml = known_mathml({})
+    summaries = summarize(whole, mathml).value
+    return replace(without_prose(whole), equations=equations_of(whole, mathml), summaries=summaries)
 
 
 def from_store(whole: Document) -> Document:
@@ -78,7 +83,6 @@ def known_of(course: Course) -> Iterator[object]:
     ]
     verdicts = verify(course, runs)
     library = library_of(course, Results(tuple(runs), verdicts, (), (), "3", "3"))
-    references = library.references
     yield check_course(course)
     yield [
         (text.text, text.code, text.block.span, text.lines_before) for text in mjcf_texts(course)
@@ -89,8 +93,8 @@ def known_of(course: Course) -> Iterator[object]:
     yield script_findings(course, extracted.value, runs, verdicts)
     yield list(check_output_lines(course, runs))
     yield [(n, [(u.owner.id, u.by_lab, u.by_script) for u in us]) for n, us in library.uses.items()]
-    yield {id: [owner.id for owner in owners] for id, owners in references.referrers.items()}
-    yield [(t.term, t.owner.id, [o.id for o in t.used]) for t in references.terms.values()]
+    yield {id: [owner.id for owner in owners] for id, owners in library.referrers.items()}
+    yield [(t.term, t.owner.id, [o.id for o in t.used]) for t in course_terms(library)]
     for one in course.documents:
         try:
             yield fingerprint(document_inputs(library, Place("lessons/x.html"), one))

@@ -113,8 +113,8 @@ def anchors(document: Document) -> frozenset[str]:
 
 def _anchors(document: Document) -> set[str]:
     outputs: dict[str, int] = {}
-    lexicon = document.lexicon
-    found = {*equation_ids(document)} if lexicon is None else {e.id for e in lexicon.equations}
+    whole = document.summaries is None
+    found = {*equation_ids(document)} if whole else {e.id for e in document.equations}
     for block in document_blocks(document):
         if isinstance(block, Heading):
             found.add(block.anchor)

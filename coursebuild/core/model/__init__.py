@@ -13,6 +13,5 @@ from coursebuild.core.model.addresses import *
 from coursebuild.core.model.blocks import *
 from coursebuild.core.model.course import *
 from coursebuild.core.model.inlines import *
-from coursebuild.core.model.lexicon import *
 from coursebuild.core.model.scenarios import *
 from coursebuild.core.model.walk import *

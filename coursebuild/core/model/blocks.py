@@ -13,7 +13,6 @@ from typing import Literal, TypeAlias
 from msgspec import Struct
 
 from coursebuild.core.model.inlines import Inline, Label, MediaAddress
-from coursebuild.core.model.lexicon import Lexicon
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 
@@ -337,13 +336,22 @@ class Footnote(Struct, frozen=True):
     blocks: tuple[Block, ...]
 
 
+class Equation(Struct, frozen=True):
+    """A formula on a line of its own."""
+
+    id: str
+    """Its anchor."""
+    number: str = ""
+    """Of one with a label: `3`."""
+
+
 class Document(Struct, frozen=True, dict=True):
-    """One Markdown text, parsed."""
+    """One Markdown text, parsed; or its summary, for others than its own page."""
 
     source: Source
     blocks: tuple[Block, ...]
     footnotes: tuple[Footnote, ...]
-    lexicon: Lexicon | None = None
-    """Only of a summary, which does not have what it was taken from."""
-    notes: Mapping[str, Struct] = {}
-    """The same: what features know of it, by their names."""
+    equations: tuple[Equation, ...] = ()
+    """Of a summary, which does not have what they were taken from."""
+    summaries: Mapping[str, Struct] | None = None
+    """Of a summary: what features have of the whole text, by their names (`Feature.summary`)."""

@@ -37,8 +37,8 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.lookup.references import owner_path
 from coursebuild.core.pages.page_inputs import (
     ShownBench,
     ShownCallout,
@@ -191,9 +191,9 @@ def address(library: Library, place: urls.Place, path: str, target: Target) -> s
         case ExampleTarget():
             return place.href(target.path)
         case TermTarget():
-            found = library.references.terms.get(target.id)
+            found = library.terms.get(target.id)
             # In a preview the text that defined it may have changed just now.
-            path = place.path if found is None else owner_path(found.owner)
+            path = place.path if found is None else urls.owner_path(found)
             return place.href(path, f"term:{target.id}")
         case UrlTarget():
             return file_address(place, path, target.url)
@@ -212,8 +212,9 @@ def equation_name(library: Library, path: str, target: Target) -> str:
     owner = library.lessons[target.id] if lesson else library.pages[target.id]
     if owner.document is None:
         return ""
-    number = library.lexicon(owner.document).numbers.get(target.anchor)
-    if number is None:
+    equations = equations_of(owner.document, library.mathml)
+    number = next((e.number for e in equations if e.id == target.anchor), "")
+    if not number:
         return ""
     if owner.document.source.path == path:
         return f"({number})"

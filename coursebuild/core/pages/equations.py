@@ -1,6 +1,6 @@
 r"""Numbers of formulas: those that an author labels are numbered, in the order of the text.
 
-Entry point: `numbered(document, mathml)`.
+Entry points: `numbered(document, mathml)`; `equations_of`, for others than their own page.
 
 LaTeX's numbered environments count too: their numbers are written by the style sheet, which counts
 on where ours left off. A formula with such numbers of its own, or with a `\tag`, gets none besides.
@@ -14,7 +14,8 @@ from html import unescape
 
 from msgspec import Struct
 
-from coursebuild.core.model import Document
+from coursebuild.core.features import Mathml
+from coursebuild.core.model import Document, Equation
 from coursebuild.core.model.equations import display_formulas
 
 _COUNTED = 'class="tml-eqn"'
@@ -48,3 +49,11 @@ def numbered(document: Document, mathml: Callable[[str], str]) -> dict[int, Numb
         if formula.id:
             found[formula.start] = NumberedFormula(formula.id, number, shown)
     return found
+
+
+def equations_of(document: Document, mathml: Mathml) -> tuple[Equation, ...]:
+    """The formulas on lines of their own of a document, or of a summary."""
+    if document.summaries is not None:
+        return document.equations
+    found = numbered(document, lambda tex: mathml(tex, True)).values()
+    return tuple(Equation(one.id, one.number) for one in found)

@@ -24,7 +24,7 @@ from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.draft import Draft as Draft
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_list import own_pages, page_title
+from coursebuild.core.pages.page_list import page_title
 from coursebuild.core.registry import features, page_copies, page_kind
 
 PAGE_WORDS = (
@@ -280,5 +280,5 @@ def _own_navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
     """Links to what the site adds to the pages of the course."""
     return tuple(
         NavLink(place.href(kind.path), page_title(library, kind), kind.path == place.path)
-        for kind in own_pages(library)
+        for kind in library.added_pages
     )

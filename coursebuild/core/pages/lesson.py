@@ -122,7 +122,7 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         "needs": lesson_link(library, place, lesson, needs=True).needs,
         "leads": tuple(lesson_link(library, place, other) for other in library.leads[lesson.id]),
         "graph": neighbourhood(library, place, lesson),
-        "referrers": owner_links(library, place, library.references.referrers.get(lesson.id, ())),
+        "referrers": owner_links(library, place, library.referrers.get(lesson.id, ())),
         "previous": lesson_link(library, place, order[at - 1]) if at else None,
         "following": lesson_link(library, place, order[at + 1]) if at + 1 < len(order) else None,
     }

@@ -7,14 +7,15 @@ afterwards.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from typing import Any, TypeAlias
 
 from jinja2 import Environment
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import PublishedTrials
+from coursebuild.core.features import PageKind, PublishedTrials
 from coursebuild.core.model import (
     Bench,
     CalloutKind,
@@ -22,15 +23,18 @@ from coursebuild.core.model import (
     Document,
     FeatureBlock,
     Lesson,
+    LessonTarget,
     Level,
-    Lexicon,
     Link,
     ModelTarget,
     Page,
     Recording,
     Script,
+    Target,
+    Term,
     document_blocks,
     document_inlines,
+    resolve,
 )
 from coursebuild.core.model import document_scripts as document_scripts
 from coursebuild.core.model.results import (
@@ -44,12 +48,11 @@ from coursebuild.core.model.results import (
 )
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.assets import Assets, strings_for
-from coursebuild.core.pages.lookup.references import CrossReferences, Mentions, mentions
 from coursebuild.core.pages.quiz_index import QuizIndex, quiz_index
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import templates_of
-from coursebuild.core.pages.tools import Tools
-from coursebuild.core.registry import feature_trials, publish_trials
+from coursebuild.core.pages.tools import Tools, known_mathml
+from coursebuild.core.registry import feature_trials, page_kinds, publish_trials, summarize
 from coursebuild.numerics.reports import Reports
 
 _OURS = {kind.name: kind for kind in CALLOUTS}
@@ -67,7 +70,7 @@ class ModelUse(Struct, frozen=True):
     by_link: bool
 
 
-class Library(Struct, frozen=True):
+class Library(Struct, frozen=True, dict=True):
     """A course and its results, by name."""
 
     course: Course
@@ -90,7 +93,10 @@ class Library(Struct, frozen=True):
     """The lessons that need a lesson, by its id."""
     uses: Mapping[str, tuple[ModelUse, ...]]
     """Where a model is used, by its name, in the order of the course."""
-    references: CrossReferences
+    referrers: Mapping[str, tuple[Owner, ...]]
+    """Who links to a lesson, by its id, in the order of the course."""
+    terms: Mapping[str, Owner]
+    """Where a term is defined, by its id."""
     asked: QuizIndex
     """The questions of each document, as lists of lessons name them."""
     tried: Mapping[tuple[str, int], Struct]
@@ -119,16 +125,19 @@ class Library(Struct, frozen=True):
         `trials` is what a site needs of what was tried, where it is known. `models_of` is
         `named_models`, or what remembers its results.
         """
-        formulas = dict(results.formulas)
         questions: dict[str, str] = {}
-
-        def said(document: Document) -> Mentions:
+        terms: dict[str, Owner] = {}
+        referrers: dict[str, list[Owner]] = {}
+        for owner, document in documents(course):
             text = quiz_index(document)  # while its blocks are at hand
             if text:
                 questions[document.source.path] = text
-            return mentions(document, course, lexicon_of(document, formulas))
-
-        references = references_of(course, said)
+            for id in _linked_lessons(course, document):
+                if not (isinstance(owner, Lesson) and owner.id == id):
+                    referrers.setdefault(id, []).append(owner)
+            for inline in document_inlines(document):
+                if isinstance(inline, Term):
+                    terms.setdefault(inline.id, owner)
         if trials is None:
             trials = publish_trials(results, assets)
         return cls(
@@ -147,18 +156,33 @@ class Library(Struct, frozen=True):
             positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
             leads=_leads(course),
             uses=uses_of(course, models_of or named_models),
-            references=references,
+            referrers={id: tuple(found) for id, found in referrers.items()},
+            terms=terms,
             asked=questions,
             tried=_placed(course, trials),
             feature_files=trials.files,
-            _formulas=formulas,
+            _formulas=dict(results.formulas),
             verdicts={recording_place(verdict.recording): verdict for verdict in results.verdicts},
             reports=reports or Reports(),
         )
 
-    def lexicon(self, document: Document) -> Lexicon:
-        """What a document, or its summary, adds to the glossary and the like."""
-        return lexicon_of(document, self._formulas)
+    @cached_property
+    def added_pages(self) -> tuple[PageKind, ...]:
+        """The pages that features add to this course, in their order."""
+        return tuple(kind for kind in page_kinds() if kind.exists(self))
+
+    def mathml(self, tex: str, display: bool) -> str:
+        """A formula; empty for one that cannot be set."""
+        return known_mathml(self._formulas)(tex, display)
+
+    def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
+        """What a feature has of documents (`Feature.summary`), in the order of the course."""
+        for owner, document in documents(self.course):
+            known = document.summaries
+            if known is None:
+                known = summarize(document, self.mathml).value
+            if feature in known:
+                yield owner, known[feature]
 
     @property
     def tools(self) -> Tools:
@@ -202,24 +226,22 @@ def owners(course: Course) -> tuple[Owner, ...]:
     return (*course.lessons, *course.pages)
 
 
-def lexicon_of(document: Document, formulas: Mapping[Formula, str | MathError]) -> Lexicon:
-    """That of a summary, or made from a whole document and its formulas."""
-    if document.lexicon is not None:
-        return document.lexicon
-    from coursebuild.core.pages.lookup.lexicon import lexicon  # with all that it takes to draw
-
-    return lexicon(document, formulas)
+def documents(course: Course) -> Iterator[tuple[Owner, Document]]:
+    """The documents that there are, in the order of the course."""
+    for owner in owners(course):
+        if owner.document is not None:
+            yield owner, owner.document
 
 
-def references_of(course: Course, mentions_of: Callable[[Document], Mentions]) -> CrossReferences:
-    """What the documents of a course say of each other."""
-    return CrossReferences.of(
-        lambda: (
-            (owner, mentions_of(owner.document))
-            for owner in owners(course)
-            if owner.document is not None
-        )
-    )
+def links(course: Course, document: Document) -> Iterator[Target]:
+    """Where the links of a document lead."""
+    for inline in document_inlines(document):
+        if isinstance(inline, Link):
+            yield resolve(inline.target, course, document.source.path)
+
+
+def _linked_lessons(course: Course, document: Document) -> set[str]:
+    return {one.id for one in links(course, document) if isinstance(one, LessonTarget)}
 
 
 _MODEL_NAMED = re.compile(
@@ -263,10 +285,9 @@ def named_models(document: Document) -> NamedModels:
 def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
     """The scripts of a course by path, in order; of two with one path, the first."""
     found: dict[str, tuple[Script, Owner]] = {}
-    for owner in owners(course):
-        if owner.document is not None:
-            for script in document_scripts(owner.document):
-                found.setdefault(script.path, (script, owner))
+    for owner, document in documents(course):
+        for script in document_scripts(document):
+            found.setdefault(script.path, (script, owner))
     return found
 
 
@@ -288,10 +309,8 @@ def uses_of(
 ) -> dict[str, tuple[ModelUse, ...]]:
     """Where each model is used."""
     found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
-    for owner in owners(course) if found else ():
-        if owner.document is None:
-            continue
-        named = models_of(owner.document)
+    for owner, document in documents(course) if found else ():
+        named = models_of(document)
         for name in sorted(named.by_labs | named.by_scripts | named.by_links):
             if name in found:
                 how = (name in named.by_labs, name in named.by_scripts, name in named.by_links)

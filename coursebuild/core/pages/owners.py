@@ -1,6 +1,6 @@
 """Lessons and pages as other pages name them.
 
-Entry points: `owner_link`, `owner_links`.
+Entry points: `owner_link`, `owner_links`; `added_page`.
 """
 
 from __future__ import annotations
@@ -11,9 +11,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.lookup.references import Owner
-from coursebuild.core.pages.lookup.references import owner_path as owner_path
+from coursebuild.core.pages.library import Library, Owner
 
 MOST = 12
 """Links that a list shows; of more it says how many there are."""
@@ -38,7 +36,7 @@ class OwnerLinks(Struct, frozen=True):
 def owner_link(place: urls.Place, owner: Owner, anchor: str = "") -> OwnerLink:
     """The link to one, or to an anchor there."""
     id = owner.id if isinstance(owner, Lesson) else ""
-    return OwnerLink(place.href(owner_path(owner), anchor or None), id, owner.title)
+    return OwnerLink(place.href(urls.owner_path(owner), anchor or None), id, owner.title)
 
 
 def owner_links(library: Library, place: urls.Place, owners: Sequence[Owner]) -> OwnerLinks:
@@ -49,3 +47,9 @@ def owner_links(library: Library, place: urls.Place, owners: Sequence[Owner]) ->
     )
     shown = tuple(owner_link(place, owner) for owner in current)
     return OwnerLinks(shown, max(0, len(owners) - MOST))
+
+
+def added_page(library: Library, place: urls.Place, name: str) -> str:
+    """The address of the page of a name that a feature adds; empty where there is none."""
+    found = (kind for kind in library.added_pages if kind.name == name)
+    return next((place.href(kind.path) for kind in found), "")

@@ -1,7 +1,6 @@
 """Every page of a site, in order: the one place that says which there are.
 
-Entry points: `page_list(library)`; `own_pages(library)`, those of features, as the foot of each
-page names them.
+Entry point: `page_list(library)`.
 
 An entry may be asked with another library of the same course: while a course is edited its
 documents change, and its pages stay as long as the course map does.
@@ -20,7 +19,7 @@ from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.tools import Tools
-from coursebuild.core.registry import page_kind, page_kinds
+from coursebuild.core.registry import page_kind
 
 
 class PageEntry(Struct, frozen=True):
@@ -73,17 +72,12 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         yield PageEntry(urls.lesson_path(lesson), "lesson", lesson.id)
     for model in course.models:
         yield PageEntry(urls.model_page_path(model.name), "model", model.name)
-    for kind in own_pages(library):
+    for kind in library.added_pages:
         yield PageEntry(kind.path, kind.name)
     for page in course.pages:
         if page.document is not None:
             yield PageEntry(urls.page_path(page), "page", page.id)
     yield PageEntry(urls.NOT_FOUND, "notfound")
-
-
-def own_pages(library: Library) -> tuple[PageKind, ...]:
-    """The pages that features add to this course, in their order."""
-    return tuple(kind for kind in page_kinds() if kind.exists(library))
 
 
 def page_title(library: Library, kind: PageKind) -> str:

@@ -1,6 +1,6 @@
 """What pages are drawn with, whatever they show: words, templates, formulas.
 
-Entry point: `Tools`.
+Entry points: `Tools`; `known_mathml`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,22 @@ from jinja2 import Environment
 from markupsafe import Markup
 from msgspec import Struct, field
 
+from coursebuild.core.features import Mathml
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.quantities import text_html
 from coursebuild.core.pages.strings import Strings
+
+
+def known_mathml(formulas: Mapping[Formula, str | MathError]) -> Mathml:
+    """Gives formulas as MathML, as far as they are set."""
+
+    def mathml(tex: str, display: bool) -> str:
+        found = formulas.get(Formula(tex, display))
+        return found if isinstance(found, str) else ""
+
+    return mathml
+
 
 _SLOT = "\ue000"
 """Stands for a value; no template has it."""

@@ -76,6 +76,11 @@ def page_path(page: Page) -> str:
     return f"{page.id}.html"
 
 
+def owner_path(owner: Lesson | Page) -> str:
+    """The page of a lesson, or another page."""
+    return lesson_path(owner) if isinstance(owner, Lesson) else page_path(owner)
+
+
 def file_path(path: str) -> str:
     """`files/lessons/sketch.svg`: a file of the course that pages show or link to.
 

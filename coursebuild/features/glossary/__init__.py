@@ -1,23 +1,22 @@
-"""Two pages to look things up in: the terms of the course, and the symbols of its formulas."""
+"""The terms of a course: what a document says of each, and a page of all.
+
+1. `terms` reads a document: each term with the sentence that defines it (`sentences`).
+2. `page` brings those of all documents together.
+"""
 
 from coursebuild.core.features import Feature, PageKind
-from coursebuild.features.glossary.glossary import glossary_values
-from coursebuild.features.glossary.symbol_index import symbols_values
+from coursebuild.features.glossary.page import glossary_values
+from coursebuild.features.glossary.terms import document_terms
 
 FEATURE = Feature(
     name="glossary",
+    summary=document_terms,
     pages=(
         PageKind(
             name="glossary",
             values=glossary_values,
-            exists=lambda library: bool(library.references.terms),
+            exists=lambda library: any(library.summaries("glossary")),
             order=20,
-        ),
-        PageKind(
-            name="symbols",
-            values=symbols_values,
-            exists=lambda library: library.references.has_symbols,
-            order=30,
         ),
     ),
 )

@@ -12,7 +12,6 @@ from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, owners
-from coursebuild.core.pages.owners import owner_path
 from coursebuild.core.pages.pages import level_view
 from coursebuild.core.pages.quiz_index import count
 
@@ -58,7 +57,7 @@ def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:
         text = library.asked.get(owner.path, "")
         if text:
             id = owner.id if isinstance(owner, Lesson) else ""
-            href = place.href(owner_path(owner))
+            href = place.href(urls.owner_path(owner))
             found.append(Asking(id, owner.title, href, text, count(text)))
     return tuple(found)
 

@@ -1,20 +1,48 @@
 """The glossary: every term of the course, the sentence that defines it, and where it is used.
 
-Entry point: `glossary_values`.
+Entry points: `course_terms`; `glossary_values`, what the page shows.
 """
 
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Iterator
 from itertools import groupby
 
 from markupsafe import Markup
 from msgspec import Struct
 
+from coursebuild.core.model import TermTarget
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.lookup.references import GlossaryTerm
-from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, owner_link, owner_links
+from coursebuild.core.pages.library import Library, Owner, documents, links
+from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, added_page, owner_link, owner_links
+from coursebuild.features.glossary.terms import DefinedTerm
+
+
+class GlossaryTerm(Struct, frozen=True):
+    """A term of the course."""
+
+    term: DefinedTerm
+    owner: Owner
+    """Where it is defined."""
+    used: tuple[Owner, ...]
+    """Where else it is linked to, in the order of the course."""
+
+
+def course_terms(library: Library) -> Iterator[GlossaryTerm]:
+    """The terms of a course; of two definitions of one the first."""
+    users: dict[str, list[Owner]] = {}
+    for owner, document in documents(library.course):
+        targets = links(library.course, document)
+        for id in {target.id for target in targets if isinstance(target, TermTarget)}:
+            users.setdefault(id, []).append(owner)
+    done: set[str] = set()
+    for owner, found in library.summaries("glossary"):
+        for term in found.terms:
+            if term.id not in done:
+                done.add(term.id)
+                used = tuple(user for user in users.get(term.id, ()) if user is not owner)
+                yield GlossaryTerm(term, owner, used)
 
 
 class PieceView(Struct, frozen=True):
@@ -44,7 +72,7 @@ class LetterView(Struct, frozen=True):
 def glossary_values(library: Library) -> dict[str, object]:
     """What the glossary shows."""
     place = urls.Place("glossary/index.html")
-    terms = sorted(library.references.terms.values(), key=lambda t: sort_key(t.term.name))
+    terms = sorted(course_terms(library), key=lambda t: sort_key(t.term.name))
     groups = groupby(terms, key=lambda t: initial(t.term.name))
     letters = tuple(
         LetterView(letter, tuple(_view(library, place, term) for term in group))
@@ -52,7 +80,7 @@ def glossary_values(library: Library) -> dict[str, object]:
     )
     return {
         "letters": letters,
-        "symbols": place.href("symbols/index.html") if library.references.has_symbols else "",
+        "symbols": added_page(library, place, "symbols"),
     }
 
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import Formula
-from coursebuild.core.pages.lookup.symbols import only_symbol, sort_key, symbols
 from coursebuild.core.run.v8 import MathEngine
+from coursebuild.features.symbols.mathml import only_symbol, sort_key, symbols
 
 Typeset = Callable[[str], str]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.model import Paragraph, Term, plain_text, walk_inlines
-from coursebuild.core.pages.lookup.sentences import runs_on, sentence_of
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
+from coursebuild.features.glossary.sentences import runs_on, sentence_of
 
 
 def sentence(text: str) -> tuple[str, bool]:

@@ -1,0 +1,131 @@
+"""The terms of a document, each with what the text says of it where it defines it.
+
+Entry point: `document_terms`. Each term gets the sentence that defines it, as HTML. Where that runs
+on into a formula on a line of its own, the formula comes with it. Links lose their addresses: the
+glossary stands elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.features import Mathml
+from coursebuild.core.model import (
+    Block,
+    Document,
+    Inline,
+    Math,
+    MathBlock,
+    NumberBinding,
+    Paragraph,
+    Term,
+    child_blocks,
+    walk_inlines,
+)
+from coursebuild.core.pages import formulas
+from coursebuild.core.pages.look import Look
+from coursebuild.core.pages.markup import render_inlines
+from coursebuild.core.pages.plain import PlainContext
+from coursebuild.core.pages.plainly import without_links
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.features.glossary.sentences import runs_on, sentence_of
+
+_LOOK = Look(anchors=False)
+
+
+class DefinitionPart(Struct, frozen=True):
+    """A part of a definition, as HTML; `display`: a formula on a line of its own."""
+
+    html: str
+    display: bool = False
+
+
+class DefinedTerm(Struct, frozen=True):
+    """A term, and what the text says of it where it defines it."""
+
+    id: str
+    name: str
+    title: str
+    """The name as HTML."""
+    definition: tuple[DefinitionPart, ...]
+
+
+class DocumentTerms(Struct, frozen=True):
+    """The terms of a document, in the order of its text."""
+
+    terms: tuple[DefinedTerm, ...]
+
+
+def document_terms(document: Document, mathml: Mathml) -> Parsed[DocumentTerms | None]:
+    """The terms of a document; a formula that is not typeset stays TeX."""
+    terms = tuple(_terms(document, mathml)) if "]{" in document.source.text else ()
+    return Parsed(DocumentTerms(terms) if terms else None)
+
+
+class _Excerpted(PlainContext):
+    """The context of a sentence that is shown on another page."""
+
+    def __init__(self, mathml: Mathml) -> None:
+        self._mathml = mathml
+
+    def math(self, tex: str) -> Markup:
+        found = self._mathml(tex, False)
+        return Markup(formulas.breakable(found)) if found else super().math(tex)
+
+    def display(self, tex: str, start: int) -> Markup:
+        return Markup(self._mathml(tex, True)) or super().display(tex, start)
+
+    def binding(self, binding: NumberBinding) -> Markup:
+        return Markup.escape(binding.text)
+
+
+def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
+    context = _Excerpted(mathml)
+
+    def html(inlines: tuple[Inline, ...]) -> str:
+        return str(render_inlines(without_links(inlines), context, _LOOK))
+
+    for siblings in _sibling_groups(document):
+        for number, block in enumerate(siblings):
+            if not isinstance(block, Paragraph):
+                continue
+            for term in walk_inlines(block.children):
+                if not isinstance(term, Term):
+                    continue
+                following = siblings[number + 1] if number + 1 < len(siblings) else None
+                title = Markup.escape(term.name) if term.renamed else html(term.children)
+                pieces = tuple(_pieces(sentence_of(block.children, term), following, html, context))
+                yield DefinedTerm(term.id, term.name, str(title), pieces)
+
+
+def _pieces(
+    sentence: tuple[Inline, ...],
+    following: Block | None,
+    html: Callable[[tuple[Inline, ...]], str],
+    context: _Excerpted,
+) -> Iterator[DefinitionPart]:
+    """A sentence, cut at its displayed formulas."""
+    line: list[Inline] = []
+    for inline in sentence:
+        if isinstance(inline, Math) and inline.display:
+            yield DefinitionPart(html(tuple(line)).strip())
+            yield DefinitionPart(str(context.display(inline.tex.text, 0)), display=True)
+            line = []
+        else:
+            line.append(inline)
+    if line:
+        yield DefinitionPart(html(tuple(line)).strip())
+    if isinstance(following, MathBlock) and following.tex.text and runs_on(sentence):
+        yield DefinitionPart(str(context.display(following.tex.text, 0)), display=True)
+
+
+def _sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
+    """All blocks of a document, those side by side together."""
+    waiting = [document.blocks, *(note.blocks for note in document.footnotes)]
+    while waiting:
+        group = waiting.pop(0)
+        yield group
+        waiting += [child_blocks(block) for block in group]

@@ -1,0 +1,93 @@
+"""The index of symbols: what the letters in the formulas of the course stand for, and where.
+
+Entry points: `symbols_values`, what the page shows; `used_symbols`.
+
+Symbols whose meaning a lesson declares come first; the others are listed with their places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from markupsafe import Markup
+from msgspec import Struct, field
+
+from coursebuild.core.model import Lesson
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.library import Library, Owner
+from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, added_page, owner_link, owner_links
+from coursebuild.features.symbols.mathml import sort_key
+from coursebuild.features.symbols.uses import SymbolUse
+
+
+class CourseSymbol(Struct):
+    """A symbol of the formulas of the lessons of a course."""
+
+    first: SymbolUse
+    owners: list[Owner] = field(default_factory=list)
+    """Where it is used, in the order of the course."""
+    meanings: dict[tuple[str, str], list[Owner]] = field(default_factory=dict)
+    """What it stands for, with its unit, and in which lessons."""
+
+
+def used_symbols(library: Library) -> Iterator[tuple[Lesson, SymbolUse]]:
+    """The symbols of all lessons, in the order of the course."""
+    for owner, found in library.summaries("symbols"):
+        if isinstance(owner, Lesson):
+            for use in found.uses:
+                yield owner, use
+
+
+def _course_symbols(library: Library) -> list[CourseSymbol]:
+    found: dict[str, CourseSymbol] = {}
+    for owner, use in used_symbols(library):
+        row = found.setdefault(use.symbol, CourseSymbol(use))
+        row.owners.append(owner)
+        if use.meaning:
+            row.meanings.setdefault((use.meaning, use.unit), []).append(owner)
+    return sorted(found.values(), key=lambda row: sort_key(row.first.symbol))
+
+
+class MeaningView(Struct, frozen=True):
+    """What a symbol stands for; `places`, where lessons differ in it."""
+
+    text: str
+    unit: str
+    places: OwnerLinks | None
+
+
+class SymbolView(Struct, frozen=True):
+    """A row."""
+
+    symbol: Markup
+    meanings: tuple[MeaningView, ...]
+    first: OwnerLink
+    section: str
+    """The heading under which it stands there; empty before the first."""
+    others: OwnerLinks
+
+
+def symbols_values(library: Library) -> dict[str, object]:
+    """What the index shows."""
+    place = urls.Place("symbols/index.html")
+    rows = [_view(library, place, row) for row in _course_symbols(library)]
+    return {
+        "declared": tuple(row for row in rows if row.meanings),
+        "undeclared": tuple(row for row in rows if not row.meanings),
+        "glossary": added_page(library, place, "glossary"),
+    }
+
+
+def _view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
+    anchor, section = row.first.section
+    several = len(row.meanings) > 1
+    return SymbolView(
+        Markup(f"<math>{row.first.symbol}</math>"),
+        tuple(
+            MeaningView(text, unit, owner_links(library, place, owners) if several else None)
+            for (text, unit), owners in row.meanings.items()
+        ),
+        owner_link(place, row.owners[0], anchor),
+        section,
+        owner_links(library, place, row.owners[1:]),
+    )
