@@ -23,7 +23,6 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import course_formulas
-from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.resources import bundled_files, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Results
@@ -32,19 +31,20 @@ from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.draw import draw
 from coursebuild.core.pages.folding import fold, imported
-from coursebuild.core.pages.fonts import FontJob, subset_font
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import record
-from coursebuild.core.pages.site import SiteOptions, render_site
 from coursebuild.core.run.v8 import MathEngine
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.script import python_mistake
 from coursebuild.core.values import encode
+from coursebuild.numerics.reports import Reports
+from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
+from coursebuild.pipeline.site import site_files
 from coursebuild.pipeline.verify import verify
 
 
@@ -115,17 +115,19 @@ def scripts(root: Path, repeat: int) -> None:
 
 def stages(course: Course, results: Results, root: Path, repeat: int) -> None:
     """The rest of a build."""
-    assets = Assets(template_texts(), bundled_files())
+    options = Options(root, 1, quiet=True)
 
-    def subset(job: FontJob) -> bytes:
-        return Memo(root).get_or_create("fonts", job.key, lambda: subset_font(job))
+    def put_together() -> None:
+        with Documents(options.store, 1) as documents:
+            loaded = load(root, documents).course
+            assert loaded is not None
+            for file in site_files(loaded, results, documents, options, Reports()).files:
+                file.make()
 
     candidates: dict[str, Callable[[], object]] = {
         "load: read, parse, check": lambda: load(root),
         f"typeset {len(course_formulas(course))} formulas": lambda: typeset(course),
-        "render, fonts kept": lambda: render_site(
-            course, results, assets, SiteOptions(subset=subset)
-        ),
+        "load from the memo and make all files": put_together,
     }
     show("stages", timed(candidates, max(2, repeat // 2)), "load: read, parse, check")
 

@@ -10,7 +10,7 @@ Entry point: `Documents`, a context manager and the `Parser` of a course, which 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
@@ -23,26 +23,25 @@ from coursebuild.core.text.source import Source
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import course_fingerprint
 from coursebuild.pipeline.load import Parser
-from coursebuild.pipeline.tasks import (
+from coursebuild.pipeline.reading import (
+    PAGES,
     SUMMARIES,
-    Answer,
     DocumentSummary,
-    Draw,
-    Drawn,
-    Later,
-    Request,
-    Task,
+    DrawnPage,
+    PageReader,
+    PageRequest,
+    Text,
+    prepare_to_read,
 )
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.workers import Workers
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.page_inputs import PageInputs
-    from coursebuild.core.pages.record import PageRecord
-    from coursebuild.pipeline.reading import PageReader
 
 Value = TypeVar("Value")
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
+Request: TypeAlias = Text | PageRequest
 
 
 def _silent(name: str) -> AbstractContextManager[None]:
@@ -53,8 +52,6 @@ _MAPS, _DECLARATIONS, _CHECKED = "maps", "declarations", "checked"
 """Kinds of entries in the store; the last says in what nothing was wrong."""
 _MANY = 8
 """Texts or pages for which copies of this process are worth their start."""
-_AT_ONCE = 256
-"""Texts whose summaries are waited for before more are read."""
 
 
 class Documents(Parser):
@@ -65,13 +62,13 @@ class Documents(Parser):
         self._store = store
         self._stage = stage
         self._jobs = jobs
-        self._tasks: dict[str, Task] = {}
+        self._texts: dict[str, Text] = {}
         self._summaries: dict[str, DocumentSummary] = {}
         self._fingerprint: tuple[Course, str | None] | None = None
         self._readers: dict[str, int] = {}
         """Which copy has read a text, by its path."""
-        self._reader: PageReader | None = None
-        self._workers: Workers[Request, Answer] | None = None
+        self._reader = PageReader(store)
+        self._workers: Workers[Request, bytes] | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -82,18 +79,27 @@ class Documents(Parser):
     def close(self) -> None:
         """End the copies, and what typesets formulas: a process that ends with it may hang."""
         self.rest()
-        if self._reader is not None:
-            self._reader.close()
+        self._reader.close()
+
+    def rest(self) -> None:
+        """End the copies; what they remember is gone, and the room is free that they took."""
+        if self._workers is not None:
+            self._workers.close()
+            self._workers = None
+            self._readers.clear()
+
+    # --- reading
 
     @property
-    def summaries(self) -> tuple[DocumentSummary, ...]:
-        """All that are known."""
-        return tuple(self._summaries.values())
+    def imports(self) -> dict[str, frozenset[str]]:
+        """The modules that each script imports, by its path, as far as texts were read."""
+        found = (imported for summary in self._summaries.values() for imported in summary.imports)
+        return {path: frozenset(modules) for path, modules in found}
 
     def fingerprint(self, course: Course) -> str | None:
         """That of a course whose documents these are; `None` for any other."""
         if self._fingerprint is None or self._fingerprint[0] is not course:
-            known = ((summary.document, summary.fingerprint) for summary in self.summaries)
+            known = ((s.document, s.fingerprint) for s in self._summaries.values())
             self._fingerprint = course, course_fingerprint(course, known)
         return self._fingerprint[1]
 
@@ -110,45 +116,37 @@ class Documents(Parser):
 
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Have the summaries of sources, of which it is said which are lessons."""
-        tasks = [Task.of(source, callouts, lesson) for source, lesson in sources]
-        missing = [task for task in tasks if not self._has(task)]
-        self._tasks.update((task.source.path, task) for task in tasks)
+        texts = [Text.of(source, callouts, lesson=lesson) for source, lesson in sources]
+        missing = [text for text in texts if not self._has(text)]
         if len(missing) >= _MANY:
-            from coursebuild.pipeline.reading import prepare_to_read
-
             prepare_to_read(missing[0])
-        rest = iter(missing)
-        while at_once := tuple(islice(rest, _AT_ONCE)):
-            self._read(at_once)
+        answers = self._work("reading lessons and pages", iter(missing))
+        for text, (data, reader) in zip(missing, answers, strict=True):
+            self._take(text, decode(data, DocumentSummary, text.source))
+            if reader is not None:
+                self._readers[text.source.path] = reader
 
-    def _has(self, task: Task) -> bool:
+    def _has(self, text: Text) -> bool:
         """Whether the summary of a text is known, or in the store."""
-        path = task.source.path
-        if path in self._summaries and self._tasks[path].key == task.key:
+        known = self._texts.get(text.source.path)
+        if known is not None and known.key == text.key:
             return True
-        data = self._store.get(SUMMARIES, task.key, local=True)
-        summary = decode(data, DocumentSummary, task.source)
+        data = self._store.get(SUMMARIES, text.key, local=True)
+        summary = decode(data, DocumentSummary, text.source)
         if summary is not None:
-            self._summaries[path] = summary
+            self._take(text, summary)
         return summary is not None
 
-    def _read(self, tasks: Sequence[Task]) -> None:
-        requests: Iterator[tuple[int | None, Request]] = ((None, task) for task in tasks)
-        answers, readers = self._work("reading lessons and pages", requests)
-        for task, data, reader in zip(tasks, answers, readers, strict=True):
-            summary = decode(data, DocumentSummary, task.source)
-            assert summary is not None
-            self._summaries[task.source.path] = summary
-            if reader is not None:
-                self._readers[task.source.path] = reader
+    def _take(self, text: Text, summary: DocumentSummary | None) -> None:
+        assert summary is not None, "what was just encoded can be decoded"
+        self._texts[text.source.path] = text
+        self._summaries[text.source.path] = summary
 
     def document(
         self, source: Source, callouts: frozenset[str], *, lesson: bool
     ) -> Parsed[Document]:
         """A document without its prose, and what is wrong in it."""
-        known = self._tasks.get(source.path)
-        if known is None or not known.is_of(source, callouts, lesson):
-            self.ahead([(source, lesson)], callouts)
+        self.ahead([(source, lesson)], callouts)
         summary = self._summaries[source.path]
         return Parsed(summary.document, summary.diagnostics)
 
@@ -173,68 +171,45 @@ class Documents(Parser):
         self._store.put(kind, key, encode(parsed), local=True)
         return parsed
 
-    def task(self, path: str) -> Task:
-        """The text of a path, with all that its document depends on."""
-        return self._tasks[path]
+    # --- drawing
 
-    def draw(self, pages: Iterable[Later]) -> list[bytes]:
-        """Draw pages; gives their packed records, and their bodies are in the store then.
+    def draw(self, pages: Iterator[PageRequest]) -> list[bytes]:
+        """Draw pages, which are in the store then; gives their records, encoded.
 
         Pages are asked for while others are drawn.
         """
-        rest = iter(pages)
-        first = tuple(islice(rest, 1))
-        return self._work("drawing pages", map(self._to, chain(first, rest)))[0] if first else []
+        return [data for data, _ in self._work("drawing pages", pages)]
 
-    def _to(self, page: Later) -> tuple[int | None, Request]:
-        """The page, to the copy that has its document."""
-        return (self._readers.get(page.path) if page.path is not None else None), page
-
-    def drawn(self, page: Draw) -> Drawn:
-        """A page, its body, and what it is found by, drawn here and now."""
-        return self._here().draw(page)
-
-    def page(self, page: Draw) -> tuple[PageRecord, str]:
-        """A page and its body alone, drawn here and now."""
-        return self._here().page(page)
+    def page(self, key: str, request: Callable[[], PageRequest]) -> DrawnPage:
+        """The page of a key, as it is in the store; drawn here and now, where it is not."""
+        return decode(self._store.peek(PAGES, key), DrawnPage) or self._reader.draw(request())
 
     def context(self, path: str, inputs: PageInputs, language: str) -> PageContext:
         """The document at a path with all its text, on the page with these inputs."""
-        return self._here().context(self._tasks[path], inputs, language)
+        return self._reader.context(self._texts[path], inputs, language)
 
-    def _work(
-        self, name: str, requests: Iterator[tuple[int | None, Request]]
-    ) -> tuple[list[Answer], list[int | None]]:
+    # --- here, or in copies of this process
+
+    def _work(self, name: str, requests: Iterator[Request]) -> Iterator[tuple[bytes, int | None]]:
         """The answers to requests, from copies of this process where there are many requests."""
-        reader = self._here()
-        if self._workers is None:
-            first = tuple(islice(requests, max(_MANY, self._jobs * _MANY // 2)))
-            requests = chain(first, requests)
-            few = len(first) < _MANY or self._jobs == 1
-            if not few:
-                from coursebuild.core.engine.workers import Workers, can_fork
+        first = tuple(islice(requests, max(_MANY, self._jobs * _MANY // 2)))
+        requests = chain(first, requests)
+        if self._workers is None and len(first) >= _MANY and self._jobs > 1:
+            from coursebuild.core.engine.workers import Workers, can_fork
 
-            if few or not can_fork():
-                with self._stage(name):
-                    answers = [reader.answer(request) for _, request in requests]
-                return answers, [None] * len(answers)
             # Before the stage begins, which may start a thread that could not come along.
-            count = min(self._jobs, -(-2 * len(first) // _MANY))
-            self._workers = Workers(reader.answer, count)
+            if can_fork():
+                count = min(self._jobs, -(-2 * len(first) // _MANY))
+                self._workers = Workers(self._reader.answer, count)
+        if not first:
+            return
         with self._stage(name):
-            return self._workers.map(requests)
+            if self._workers is None:
+                yield from ((self._reader.answer(request), None) for request in requests)
+            else:
+                yield from self._workers.map(map(self._to, requests))
 
-    def rest(self) -> None:
-        """End the copies; what they remember is gone, and the room is free that they took."""
-        if self._workers is not None:
-            self._workers.close()
-            self._workers = None
-            self._readers.clear()
-
-    def _here(self) -> PageReader:
-        """What reads and draws in this process."""
-        if self._reader is None:
-            from coursebuild.pipeline.reading import PageReader
-
-            self._reader = PageReader(self._store)
-        return self._reader
+    def _to(self, request: Request) -> tuple[int | None, Request]:
+        """A request, to the copy that has its document."""
+        text = request.text if isinstance(request, PageRequest) else None
+        return (None if text is None else self._readers.get(text.source.path)), request

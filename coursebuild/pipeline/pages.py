@@ -3,28 +3,23 @@
 Entry point: `Pages`.
 
 1. Every page has inputs, all that it shows of the course, and a key: a hash of its inputs, of its
-   document's text, and of the tool.
-   Where nothing has changed of what inputs are made of, the key is known without (`page_index`).
-2. The records of pages come from the store; a page that has none is drawn.
-3. From records alone it is known whether all links lead somewhere, and which characters and
-   styles the pages use (`page_index`).
-4. A body is fetched, and framed, when its file is written.
-
-Of a page no more is held than its key and how its inputs are made: a course may have any number.
+   document's text, and of the tool. Where nothing has changed of what inputs are made of, the key
+   is known without (`page_index`).
+2. What was drawn before comes from the store; a page that is not there is drawn.
+3. From the records of pages it is known whether all links lead somewhere, and which characters and
+   styles the pages use.
+4. A body is fetched, and framed, when its file is written: a course may have any number of pages.
 """
 
 from __future__ import annotations
 
 import functools
-import itertools
-import operator
 from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
-from coursebuild.core.model import Course
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.frame import Frames, Names
@@ -37,27 +32,17 @@ from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
-from coursebuild.pipeline.page_index import Facts, PageKeys
-from coursebuild.pipeline.tasks import PAGES, Draw, KeptPage, Later, Task
+from coursebuild.pipeline.page_index import PageKeys
+from coursebuild.pipeline.reading import PAGES, DrawnPage, PageRequest, Text
 
 
-class _Wanted(Struct, frozen=True):
-    """A page as it should be."""
+class SitePage(Struct, frozen=True):
+    """A page that was drawn, now or before."""
 
-    page: PageEntry
+    entry: PageEntry
     key: str
-    task: Task | None
-    """The text of its document."""
-
-    @property
-    def path(self) -> str:
-        """Its site path."""
-        return self.page.path
-
-
-class _Page(Struct, frozen=True):
-    wanted: _Wanted
     indexed: bool
+    """Whether search engines should list it."""
     notes: tuple[tuple[str, NotedPage], ...]
     """Of features, by name."""
     ids: tuple[str, ...]
@@ -82,100 +67,65 @@ class Pages:
         self._library = library
         self._documents = documents
         self._store = store
-        self._facts = Facts()
-        self._by_path: dict[str, _Wanted] = {}
-        self._inputs: dict[str, bytes] = {}
-        """Of the pages without a known key, by site path, until these are drawn."""
-        keys = PageKeys(store, self._around())
         self._last_good = last_good or {}
+        self._text: set[str] = set()
+        self._mathematics: set[str] = set()
+        self._declarations: set[str] = set()
+        self._links: set[tuple[str, str]] = set()
+        """Site paths and anchors that pages lead to on others."""
+        self._sound = True
+        """Whether every page has the anchors that it leads to itself."""
+        self._latest: tuple[str, DrawnPage] | None = None
+        """The page that was asked for last: several files are made of it."""
+        keys = PageKeys(store, self._around())
         self._pages = self._made(page_list(library) if entries is None else entries, keys)
-        self._inputs.clear()
         if entries is None:
             keys.save()
 
     @property
     def facts(self) -> PageFacts:
         """What the shared files must know of all pages together."""
-        return self._facts.together()
+        found = self._text, self._mathematics, self._declarations
+        return PageFacts(*map(frozenset, found))
+
+    @property
+    def keys(self) -> dict[str, str]:
+        """The keys of all pages, by site path."""
+        return {path: page.key for path, page in self._pages.items()}
 
     @property
     def indexed(self) -> Iterator[str]:
         """Site paths of the pages that search engines should list."""
-        return (page.wanted.path for page in self._pages if page.indexed)
+        return (path for path, page in self._pages.items() if page.indexed)
 
     def noted(self, feature: str) -> tuple[NotedPage, ...]:
         """The pages of which a feature has noted something, in order."""
-        return tuple(one for page in self._pages for name, one in page.notes if name == feature)
+        pages = self._pages.values()
+        return tuple(one for page in pages for name, one in page.notes if name == feature)
 
     def note(self, feature: str, path: str) -> bytes:
         """What a feature has noted of one of these pages."""
-        page = self._at(path)
-        kept = KeptPage.read(self._store.peek(PAGES, page.key))
-        if kept is not None and feature in kept.notes:
-            return kept.notes[feature]
-        # It was damaged, or the store cannot be written.
-        return self._documents.drawn(self._request(page)).notes[feature]
+        return self._drawn(path).notes[feature]
 
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
-        pages = {page.wanted.path: page for page in self._pages}
-        if not self._facts.sound or not self._facts.leads.keys() <= files | pages.keys():
-            return False
-        for path, led in itertools.groupby(sorted(self._facts.anchors), operator.itemgetter(0)):
-            if path in pages:
-                ids = frozenset(pages[path].ids)
-                if not all(has(ids, anchor) for _, anchor in led):
-                    return False
-        return True
+        ids = {path: frozenset(page.ids) for path, page in self._pages.items()}
+
+        def leads(path: str, anchor: str) -> bool:
+            return anchor == "" or has(ids[path], anchor) if path in ids else path in files
+
+        return self._sound and all(leads(path, anchor) for path, anchor in self._links)
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
         frame = self._frame(names)
         frames = Frames(self._library, names)
-        for page in self._pages:
-            key = key_of(page.wanted.key, frame)
-            make = functools.partial(self._framed, page.wanted, frames)
-            yield CachedFile(page.wanted.path, key, make)
+        for path, page in self._pages.items():
+            make = functools.partial(self._framed, path, frames)
+            yield CachedFile(path, key_of(page.key, frame), make)
 
-    @property
-    def keys(self) -> dict[str, str]:
-        """The keys of all pages, by site path."""
-        return {page.wanted.path: page.wanted.key for page in self._pages}
-
-    def _at(self, path: str) -> _Wanted:
-        if not self._by_path:
-            self._by_path.update((page.wanted.path, page.wanted) for page in self._pages)
-        return self._by_path[path]
-
-    # --- keys
-
-    def _around(self) -> str | None:
-        """A hash of all that inputs are made of, but for documents; `None` where it has none."""
-        course = self._documents.fingerprint(self._library.course)
-        if course is None:
-            return None
-        results = results_fingerprint(self._library.results, self._library.reports)
-        return key_of(course, results)
-
-    def _wanted(self, page: PageEntry, keys: PageKeys) -> _Wanted:
-        task = text_of(page, self._library)
-        if page.path in self._last_good:
-            return _Wanted(page, self._last_good[page.path], task)
-        text = "" if task is None else task.key
-        key = keys.get(page.path, text)
-        if key is None:
-            data = encode(page.inputs(self._library))
-            key = page_key(self._library.course, task, data)
-            keys.add(page.path, text, key)
-            self._inputs[page.path] = data
-        return _Wanted(page, key, task)
-
-    def _request(self, wanted: _Wanted) -> Draw:
-        course = self._library.course
-        inputs = self._inputs.pop(wanted.path, None)
-        if inputs is None:
-            inputs = encode(wanted.page.inputs(self._library))
-        return Draw(inputs, wanted.task, course.language, course.base_url, wanted.key)
+    def _framed(self, path: str, frames: Frames) -> bytes:
+        return framed(self._drawn(path), frames)
 
     def _frame(self, names: Names) -> str:
         """The key of all that a frame shows besides its page."""
@@ -195,109 +145,108 @@ class Pages:
             names,
         )
 
-    # --- records and bodies
+    # --- keys
 
-    def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> list[_Page]:
-        """The pages with what their records say; they are drawn where they have none."""
-        pages: list[_Wanted] = []
-        records: dict[str, PageRecord] = {}
-        new: list[_Wanted] = []
+    def _around(self) -> str | None:
+        """A hash of all that inputs are made of, but for documents; `None` where it has none."""
+        course = self._documents.fingerprint(self._library.course)
+        if course is None:
+            return None
+        return key_of(course, results_fingerprint(self._library.results, self._library.reports))
 
-        def missing() -> Iterator[Later]:  # inputs are made while pages are drawn
+    def _request(self, entry: PageEntry, keys: PageKeys) -> tuple[str, PageRequest | None]:
+        """The key of a page; where its inputs were made for that, the request with them."""
+        if entry.path in self._last_good:
+            return self._last_good[entry.path], None
+        text = text_of(entry, self._library)
+        text_key = "" if text is None else text.key
+        key = keys.get(entry.path, text_key)
+        if key is not None:
+            return key, None
+        request = page_request(entry, self._library)
+        keys.add(entry.path, text_key, request.key)
+        return request.key, request
+
+    # --- drawing
+
+    def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> dict[str, SitePage]:
+        """The pages by site path, in order; they are drawn where they are not kept."""
+        found: dict[str, tuple[PageEntry, str, PageRecord | None]] = {}
+
+        def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
             for entry in entries:
-                page = self._wanted(entry, keys)
-                record = self._known(page.key)
-                if record is None and page.path in self._last_good:
+                key, request = self._request(entry, keys)
+                kept = decode(self._store.get(PAGES, key, local=True), DrawnPage)
+                if kept is None and entry.path in self._last_good:
                     continue  # what it was is gone
-                pages.append(page)
-                if record is None:
-                    new.append(page)
-                    yield self._later(page)
-                else:
-                    self._inputs.pop(page.path, None)
-                    records[page.path] = record
+                found[entry.path] = entry, key, None if kept is None else kept.record
+                if kept is None:
+                    yield request or page_request(entry, self._library)
 
-        for page, data in zip(new, self._documents.draw(missing()), strict=True):
-            record = decode(data, PageRecord)
-            assert record is not None
-            records[page.path] = record
-        self.drawn = tuple(page.path for page in new)
+        records = self._documents.draw(missing())
+        self.drawn = tuple(path for path, (_, _, record) in found.items() if record is None)
         """Site paths of the pages that were drawn just now."""
-        return [self._noted(page, records[page.path]) for page in pages]
+        new = dict(zip(self.drawn, records, strict=True))
+        return {
+            path: self._noted(entry, key, record or _decoded(new[path]))
+            for path, (entry, key, record) in found.items()
+        }
 
-    def _later(self, page: _Wanted) -> Later:
-        path = None if page.task is None else page.task.source.path
-        return Later(path, functools.partial(self._request, page))
-
-    def _noted(self, page: _Wanted, record: PageRecord) -> _Page:
+    def _noted(self, entry: PageEntry, key: str, record: PageRecord) -> SitePage:
         """A page, now that it is known what it says."""
-        self._facts.add(record)
+        self._text.update(record.text)
+        self._mathematics.update(record.mathematics)
+        self._declarations.update(record.declarations)
+        own = frozenset(record.ids)
+        for path, anchor in record.references:
+            if path != entry.path:
+                self._links.add((path, "" if anchor == "top" else anchor))
+            elif anchor not in ("", "top") and not has(own, anchor):
+                self._sound = False
         draft = record.draft
         notes = tuple(
-            (name, NotedPage(draft.path, draft.kind, page.page.id, draft.title, digest))
+            (name, NotedPage(draft.path, draft.kind, entry.id, draft.title, digest))
             for name, digest in record.notes
         )
-        return _Page(page, draft.indexed, notes, record.ids)
+        return SitePage(entry, key, draft.indexed, notes, record.ids)
 
-    def _known(self, key: str) -> PageRecord | None:
-        """The record of a page that was drawn before."""
-        kept = KeptPage.read(self._store.get(PAGES, key, local=True))
-        return None if kept is None else kept.record
-
-    def _framed(self, page: _Wanted, frames: Frames) -> bytes:
-        kept = KeptPage.read(self._store.peek(PAGES, page.key))
-        record = None if kept is None else kept.record
-        if kept is None or record is None:  # it was damaged, or the store cannot be written
-            drawn = self._documents.drawn(self._request(page))
-            record, body = drawn.record, drawn.body.encode()
-        else:
-            body = kept.body
-        before, after = frames.around(record.draft, record.parts)
-        return before.encode() + body + after.encode()
+    def _drawn(self, path: str) -> DrawnPage:
+        """What was drawn of a page."""
+        if self._latest is None or self._latest[0] != path:
+            page = self._pages[path]
+            make = functools.partial(page_request, page.entry, self._library)
+            self._latest = path, self._documents.page(page.key, make)
+        return self._latest[1]
 
 
-class DemandedPage(Struct, frozen=True):
-    """A page without its frame."""
-
-    key: str
-    record: PageRecord
-    body: str
+def _decoded(data: bytes) -> PageRecord:
+    record = decode(data, PageRecord)
+    assert record is not None
+    return record
 
 
-def demanded_page(
-    entry: PageEntry,
-    library: Library,
-    documents: Documents,
-    store: Memo,
-    known: DemandedPage | None = None,
-) -> DemandedPage:
-    """One page: as it is known, as it was drawn before, or drawn now and not kept."""
-    course, task = library.course, text_of(entry, library)
-    inputs = encode(entry.inputs(library))
-    key = page_key(course, task, inputs)
-    if known is not None and known.key == key:
-        return known
-    kept = KeptPage.read(store.get(PAGES, key, local=True))
-    record = None if kept is None else kept.record
-    if kept is not None and record is not None:
-        return DemandedPage(key, record, kept.body.decode())
-    request = Draw(inputs, task, course.language, course.base_url, key)
-    record, text = documents.page(request)
-    return DemandedPage(key, record, text)
+def framed(page: DrawnPage, frames: Frames) -> bytes:
+    """A page as it is published."""
+    record = page.record
+    before, after = frames.around(record.draft, record.parts)
+    return before.encode() + page.body + after.encode()
 
 
-def text_of(page: PageEntry, library: Library) -> Task | None:
+def text_of(entry: PageEntry, library: Library) -> Text | None:
     """The text of the document that a page shows, if it shows one."""
-    document = page.document(library)
+    document = entry.document(library)
     if document is None:
         return None
     callouts = frozenset(kind.name for kind in library.course.callouts)
-    lesson = library.lessons.get(page.id)
+    lesson = library.lessons.get(entry.id)
     is_lesson = lesson is not None and lesson.document is document
-    return Task.of(document.source, callouts, is_lesson)
+    return Text.of(document.source, callouts, lesson=is_lesson)
 
 
-def page_key(course: Course, text: Task | None, inputs: bytes) -> str:
-    """A hash of all that a page depends on: its document's text and its inputs' bytes."""
-    key = text.key if text is not None else ""
-    return step_key("page", course.language, course.base_url, inputs, key)
+def page_request(entry: PageEntry, library: Library) -> PageRequest:
+    """A page with all that it shows; its key is a hash of that."""
+    course, text = library.course, text_of(entry, library)
+    inputs = encode(entry.inputs(library))
+    text_key = "" if text is None else text.key
+    key = step_key("page", course.language, course.base_url, inputs, text_key)
+    return PageRequest(inputs, text, course.language, course.base_url, key)

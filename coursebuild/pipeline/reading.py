@@ -1,13 +1,11 @@
-"""Documents read and pages drawn, one request at a time, here or in a copy of this process.
+"""Texts read and pages drawn, one at a time, here or in a copy of this process.
 
-Entry point: `PageReader`, whose `answer` takes a `Task` or a `Draw`.
+Entry point: `PageReader`: `read` takes a `Text` and gives its `DocumentSummary`, `draw` takes a
+`PageRequest` and gives a `DrawnPage`. Both keep what they make.
 
-1. `Task`: the text is parsed and its formulas are typeset; the summary is kept in the store.
-2. `Draw`: a page is drawn from its inputs and its document; body and record are kept in the store.
-3. The document and its formulas stay for the drawing. Those that an earlier build has read, or
-   another process, are parsed again, and their MathML comes from the store.
-
-What draws is imported when there is something to draw.
+A document and its formulas stay for the drawing. Those that an earlier build has read, or another
+process, are parsed again, and their MathML comes from the store. What draws is imported when there
+is something to draw.
 """
 
 from __future__ import annotations
@@ -16,9 +14,8 @@ import hashlib
 import importlib
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, assert_never
+from typing import TYPE_CHECKING
 
-import msgspec
 from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
@@ -42,32 +39,78 @@ from coursebuild.core.pages.zips import imports
 from coursebuild.core.registry import summarize
 from coursebuild.core.run.versions import package_version
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.core.text.source import key_of
+from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import document_fingerprint
-from coursebuild.pipeline.tasks import (
-    PAGES,
-    SUMMARIES,
-    Answer,
-    DocumentSummary,
-    Draw,
-    Drawn,
-    KeptPage,
-    Later,
-    Request,
-    Task,
-)
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.run.v8 import MathEngine
 
+SUMMARIES, PAGES = "summaries", "pages"
+"""Kinds of entries in the store. They stay on this machine, where they are made soon enough."""
 _MATHML, _CODE = "mathml", "code"
-"""Kinds of entries in the store. One has the formulas of a text: one for each formula would take as
-long to write as to make."""
+"""Likewise. One has the formulas of a text: one for each formula would take as long to write as to
+make."""
 _ROOM = 700_000
 """Characters of documents that wait to be drawn, some 25 bytes each. Further ones are parsed
 again, so that memory does not grow with the course."""
+
+
+class Text(Struct, frozen=True):
+    """A text that holds a document."""
+
+    source: Source
+    callouts: frozenset[str]
+    lesson: bool
+    key: str
+    """A hash of all that its summary depends on."""
+
+    @classmethod
+    def of(cls, source: Source, callouts: frozenset[str], *, lesson: bool) -> Text:
+        """With its key."""
+        key = step_key("summary", lesson, callouts, source.path, source.digest)
+        return cls(source, callouts, lesson, key)
+
+
+class DocumentSummary(Struct, frozen=True):
+    """A parsed text: what others than its own page look at, and what is wrong in it."""
+
+    document: Document
+    """Without its prose; see `model.summary`."""
+    diagnostics: tuple[Diagnostic, ...]
+    """Those of formulas among them."""
+    imports: tuple[tuple[str, tuple[str, ...]], ...]
+    """Paths of scripts, each with the modules that it imports."""
+    lasting: bool
+    """Whether the same text gives the same again."""
+    fingerprint: str = ""
+    """Of what others than its own page can see of it; see `pipeline.fingerprints`."""
+
+
+class PageRequest(Struct, frozen=True):
+    """A page to be drawn."""
+
+    packed: bytes
+    """Its inputs, as its key is made from them."""
+    text: Text | None
+    """That of its document, if it has one."""
+    language: str
+    """Of the interface."""
+    base_url: str
+    key: str
+    """Under which it is kept."""
+
+
+class DrawnPage(Struct, frozen=True):
+    """A page as it is kept."""
+
+    record: PageRecord
+    """What the site must know of it."""
+    notes: dict[str, bytes]
+    """See `page_notes`."""
+    body: bytes
+    """UTF-8."""
 
 
 class _Whole(Struct, frozen=True):
@@ -86,7 +129,7 @@ _HEAVY = (
 )
 
 
-def prepare_to_read(sample: Task) -> None:
+def prepare_to_read(sample: Text) -> None:
     """Import and make what reading and drawing need, so that copies of this process share it."""
     for name in _HEAVY:
         importlib.import_module(name)
@@ -103,13 +146,13 @@ def prepare_to_read(sample: Task) -> None:
 
 
 class PageReader:
-    """Reads and draws; formulas are typeset by an engine, which is closed at last."""
+    """Reads and draws, one thing at a time, whichever thread asks."""
 
     def __init__(self, store: Memo) -> None:
         self._store = store
         self._lock = threading.RLock()
         self._engine: MathEngine | None = None
-        self._waiting: dict[str, tuple[Task, _Whole]] = {}
+        self._waiting: dict[str, tuple[Text, _Whole]] = {}
         """Documents that were read and not drawn yet, by path."""
         self._room = _ROOM
         self._tools: dict[str, Tools] = {}
@@ -120,68 +163,54 @@ class PageReader:
             self._engine.close()
             self._engine = None
 
-    def answer(self, request: Request) -> Answer:
-        """Do what is asked; one thing at a time, whichever thread asks."""
-        if isinstance(request, Later):
-            return self.answer(request.make())
-        with self._lock:
-            return self._answer(request)
-
-    def _answer(self, request: Task | Draw) -> Answer:
-        match request:
-            case Task():
-                return self._read(request)
-            case Draw():
-                return self._draw(request)
-            case _:
-                assert_never(request)
+    def answer(self, request: Text | PageRequest) -> bytes:
+        """The summary of a text, or the record of a page, encoded."""
+        if isinstance(request, Text):
+            return self.read(request)
+        return encode(self.draw(request).record)
 
     # --- reading
 
-    def _summary(self, whole: _Whole) -> DocumentSummary:
-        found = formula_findings(whole.document, whole.formulas)
-        mathml = known_mathml(whole.formulas)
-        known = summarize(whole.document, mathml)
-        scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
-        bare = without_prose(whole.document)
-        equations = equations_of(whole.document, mathml)
-        bare = replace(bare, equations=equations, summaries=known.value)
-        return DocumentSummary(
-            document=bare,
-            diagnostics=(*whole.diagnostics, *found, *known.diagnostics),
-            imports=tuple((s.path, tuple(sorted(imports(s.code.text)))) for s in scripts),
-            lasting=not found,
-            fingerprint=document_fingerprint(bare),
-        )
+    def read(self, text: Text) -> bytes:
+        """The summary of a text, encoded."""
+        with self._lock:
+            whole = self._whole(text)
+            found = formula_findings(whole.document, whole.formulas)
+            mathml = known_mathml(whole.formulas)
+            known = summarize(whole.document, mathml)
+            equations = equations_of(whole.document, mathml)
+            bare = without_prose(whole.document)
+            bare = replace(bare, equations=equations, summaries=known.value)
+            wrong = (*whole.diagnostics, *found, *known.diagnostics)
+            scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
+            imported = tuple((s.path, tuple(sorted(imports(s.code.text)))) for s in scripts)
+            lasting = not found  # that a formula took too long may not happen again
+            fingerprint = document_fingerprint(bare)
+            data = encode(DocumentSummary(bare, wrong, imported, lasting, fingerprint))
+            if lasting:
+                self._store.put(SUMMARIES, text.key, data, local=True)
+            self._keep(text, whole)
+            return data
 
-    def _read(self, task: Task) -> bytes:
-        whole = self._whole(task)
-        summary = self._summary(whole)
-        data = encode(summary)
-        if summary.lasting:  # that a formula took too long may not happen again
-            self._store.put(SUMMARIES, task.key, data, local=True)
-        self._keep(task, whole)
-        return data
-
-    def _keep(self, task: Task, whole: _Whole) -> None:
+    def _keep(self, text: Text, whole: _Whole) -> None:
         """Keep a document until it is drawn, as far as there is room."""
-        size = len(task.source.text)
+        size = len(text.source.text)
         if size <= self._room:
-            self._waiting[task.source.path] = task, whole
+            self._waiting[text.source.path] = text, whole
             self._room -= size
 
-    def _whole(self, task: Task) -> _Whole:
+    def _whole(self, text: Text) -> _Whole:
         """A document with its formulas."""
-        known = self._waiting.pop(task.source.path, None)
+        known = self._waiting.pop(text.source.path, None)
         if known is not None:
             self._room += len(known[0].source.text)
-            if known[0].key == task.key:
+            if known[0].key == text.key:
                 return known[1]
         from coursebuild.core.syntax.document import parse_document
 
-        parsed = parse_document(task.source, task.callouts, lesson=task.lesson)
+        parsed = parse_document(text.source, text.callouts, lesson=text.lesson)
         formulas = document_formulas(parsed.value)
-        return _Whole(parsed.value, parsed.diagnostics, self._typeset(task.source.path, formulas))
+        return _Whole(parsed.value, parsed.diagnostics, self._typeset(text.source.path, formulas))
 
     def _typeset(self, path: str, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
         """MathML; that of formulas which the text at this path had before is in the store."""
@@ -207,66 +236,43 @@ class PageReader:
 
     # --- drawing
 
-    def draw(self, request: Draw) -> Drawn:
+    def draw(self, request: PageRequest) -> DrawnPage:
         """A page, its body, and what is noted of it."""
-        with self._lock:
-            return self._drawn(request)
-
-    def page(self, request: Draw) -> tuple[PageRecord, str]:
-        """A page and its body, of which neither the search nor other files are to know yet."""
-        from coursebuild.core.pages.draw import draw
-
-        with self._lock:
-            document, tools = None, self._tools_for(request.language)
-            if request.task is not None:
-                whole = self._whole(request.task)
-                self._keep(request.task, whole)
-                document, tools = whole.document, replace(tools, formulas=whole.formulas)
-            return record(draw(request.inputs, document, tools), request.base_url)
-
-    def _drawn(self, request: Draw) -> Drawn:
         from coursebuild.core.pages.added_files import page_notes
         from coursebuild.core.pages.draw import draw_whole
 
-        whole = self._whole(request.task) if request.task is not None else None
-        tools = self._tools_for(request.language)
-        document = None
-        if whole is not None:
-            tools, document = replace(tools, formulas=whole.formulas), whole.document
-        inputs = request.inputs
-        draft, page = draw_whole(inputs, document, tools)
-        found, body = record(draft, request.base_url)
-        notes = page_notes(inputs, page, body)
-        digests = tuple((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
-        found = replace(found, notes=digests)
-        return Drawn(found, body, notes)
+        inputs = decode(request.packed, PageInputs)
+        assert inputs is not None, "what was just encoded can be decoded"
+        with self._lock:
+            whole = None if request.text is None else self._whole(request.text)
+            document = None if whole is None else whole.document
+            draft, context = draw_whole(inputs, document, self._tools_for(request.language, whole))
+            found, body = record(draft, request.base_url)
+            notes = page_notes(inputs, context, body)
+            digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
+            found = replace(found, notes=tuple(digests))
+            page = DrawnPage(found, notes, body.encode())
+            self._store.put(PAGES, request.key, encode(page), local=True)
+            return page
 
-    def _draw(self, request: Draw) -> bytes:
-        drawn = self._drawn(request)
-        page = KeptPage.of(drawn)
-        self._store.put(PAGES, request.key, msgspec.msgpack.encode(page), local=True)
-        return page.packed_record
-
-    def context(self, task: Task, inputs: PageInputs, language: str) -> PageContext:
+    def context(self, text: Text, inputs: PageInputs, language: str) -> PageContext:
         """A document with all its text, on its page."""
         from coursebuild.core.pages.context import PageContext
 
         assert inputs.shown is not None, "a page with a document shows it"
-        whole = self._whole(task)
-        tools = replace(self._tools_for(language), formulas=whole.formulas)
+        whole = self._whole(text)
+        tools = self._tools_for(language, whole)
         return PageContext.made(tools, inputs.shown, Place(inputs.path), whole.document)
 
-    def _tools_for(self, language: str) -> Tools:
+    def _tools_for(self, language: str, whole: _Whole | None) -> Tools:
+        """Words, templates and marked code, with the formulas of a document."""
         if language not in self._tools:
-            self._tools[language] = drawing_tools(self._store, language)
-        return self._tools[language]
-
-
-def drawing_tools(store: Memo, language: str) -> Tools:
-    """Words, templates and the store's marked code."""
-    texts = template_texts()
-    templates = templates_of(texts, prepared_folder())
-    return Tools(strings_for(texts, language), templates, mark=_Marks(store))
+            texts = template_texts()
+            templates = templates_of(texts, prepared_folder())
+            strings = strings_for(texts, language)
+            self._tools[language] = Tools(strings, templates, mark=_Marks(self._store))
+        tools = self._tools[language]
+        return tools if whole is None else replace(tools, formulas=whole.formulas)
 
 
 class _Marks:

@@ -11,11 +11,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import msgspec
 from msgspec import Struct, field
 from msgspec.structs import replace
 
@@ -35,27 +33,23 @@ from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Res
 from coursebuild.core.pages import meta, urls, zips
 from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.compressed import COPIES, compressed_files, kept_copy
+from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
 from coursebuild.core.pages.shared import PageFacts, common_characters
 from coursebuild.core.run.packages import distributions, library_files
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Excerpt, Source, key_of, text_digest
+from coursebuild.core.text.source import Source, key_of, text_digest
+from coursebuild.core.values import decode, encode
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.pages import Pages
-from coursebuild.pipeline.tasks import all_imports
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.fonts import FontJob
 
-_SHARED, _SHARED_DATA = "shared", "shared-data"
-"""Kinds of entries in the store: the names of what all pages share, and its bytes."""
-_PARTS = "parts"
-"""Kind of the entries that hold parts of what features add to a site."""
 _DIGEST = hashlib.sha256().digest_size * 2
 
 
@@ -92,8 +86,12 @@ _ANYTHING = PageFacts(
 """What pages may need that nobody has looked at."""
 
 
-def _whole(job: FontJob) -> bytes:
-    return job.data
+class SharedFiles(Struct, frozen=True):
+    """What all pages share."""
+
+    names: Names
+    files: dict[str, bytes]
+    """By path."""
 
 
 class SiteMaker:
@@ -105,14 +103,9 @@ class SiteMaker:
         self.library = library
         self.course = library.course
         self.assets = assets
-        self.options = options
+        self.root = options.root
         self.store = options.store
         self.documents = documents
-        self._packed: dict[str, tuple[str, zips.MakeArchive]] = {}
-        """The archives, with their keys."""
-        self._imports: Callable[[str], frozenset[str]] = zips.imports
-        self._files: dict[str, tuple[str, Callable[[], bytes]]] = {}
-        """Files of the course, with their keys."""
 
     def made(
         self,
@@ -128,13 +121,17 @@ class SiteMaker:
         pages = Pages(self.library, self.documents, self.store, entries, last_good)
         self.documents.rest()
         names, shared = self._shared(None if whole_fonts else pages.facts)
-        files = [*self._feature_files(), *self._downloads()]
-        added, listed = added_files(functools.partial(self._context, pages, names))
-        files += [*added, *shared]
-        files.append(OutputFile(urls.ROBOTS, meta.robots(self.course)))
+        own = self.library.feature_files
+        files: list[SiteFile] = [*shared, *own, *self._copies(own), *self._downloads()]
+        around = self._around()
+        archives = {archive.path: archive for archive in zips.archives(self.library, around)}
+        for one in archives.values():
+            files.append(CachedFile(one.path, step_key("archive", one.key), one.packed))
+        context = functools.partial(self._context, pages, names, archives, around.imports)
+        added, listed = added_files(context)
+        files += [*added, OutputFile(urls.ROBOTS, meta.robots(self.course))]
         if self.course.base_url:
-            sitemap = meta.sitemap(self.course, pages.indexed)
-            files.append(OutputFile(urls.SITEMAP, sitemap))
+            files.append(OutputFile(urls.SITEMAP, meta.sitemap(self.course, pages.indexed)))
         framed = tuple(pages.files(names))
         found: tuple[Diagnostic, ...] = ()
         if entries is None and not pages.are_sound({file.path for file in files}):
@@ -149,48 +146,43 @@ class SiteMaker:
 
         With whole fonts where there are no facts.
         """
-        if facts is None:
-            facts, cut = _ANYTHING, _whole
-        else:
-            facts = replace(facts, text=facts.text | common_characters(self.library))
-            cut = functools.partial(_cut_font, self.store)
-        key = step_key("shared files", facts, cut is _whole)
-        data = _Data(self.store, key, functools.partial(self._make_shared, facts, cut))
-        names, paths = data.listing()
-        files = [CachedFile(p, key_of(data.key, p), functools.partial(data.file, p)) for p in paths]
-        # Those of the style sheet, which is another in every course, are made where files are made
-        # at the same time. They are smaller in any case: most of it is the same everywhere.
-        for suffix in COPIES:
-            path = f"{names.style}.{suffix}"
-            make = functools.partial(self._copy, data, names.style, suffix)
-            files.append(CachedFile(path, key_of(data.key, path), make))
-        return names, [*files]
+        from_whole = facts is None
+        facts = facts or _ANYTHING
+        facts = replace(facts, text=facts.text | common_characters(self.library))
+        key = step_key("shared files", facts, from_whole)
+        found = decode(self.store.get("shared", key, local=True), SharedFiles)
+        if found is None:
+            found = self._shared_made(facts, whole=from_whole)
+            self.store.put("shared", key, encode(found), local=True)
+        return found.names, [
+            CachedFile(path, key_of(key, path), functools.partial(found.files.__getitem__, path))
+            for path in found.files
+        ]
 
-    def _make_shared(
-        self, facts: PageFacts, cut: Callable[[FontJob], bytes]
-    ) -> tuple[Names, dict[str, bytes]]:
+    def _shared_made(self, facts: PageFacts, *, whole: bool) -> SharedFiles:
         from coursebuild.core.pages.shared import shared_files
 
+        cut = (lambda job: job.data) if whole else functools.partial(_cut_font, self.store)
         made, names = shared_files(self.assets, cut, facts)
-        copies = self._copies(file for file in made if file.path != names.style)
-        return names, {file.path: file.data for file in (*made, *copies)}
-
-    def _copy(self, data: _Data, path: str, suffix: str) -> bytes:
-        # Local: a copy of this process does not live until a shared cache has it.
-        keep = functools.partial(self._kept_copy, local=True)
-        return kept_copy(data.file(path), suffix, keep)
+        files = (*made, *self._copies(made))
+        return SharedFiles(names, {file.path: file.data for file in files})
 
     def _copies(self, files: Iterable[OutputFile]) -> tuple[OutputFile, ...]:
-        return compressed_files(files, self._kept_copy)
+        """Compressed copies."""
 
-    def _kept_copy(self, key: str, make: Callable[[], bytes], *, local: bool = False) -> bytes:
-        return prepared_copy(key) or self.store.get_or_create("compressed", key, make, local=local)
+        def keep(key: str, make: Callable[[], bytes]) -> bytes:
+            return prepared_copy(key) or self.store.get_or_create("compressed", key, make)
 
-    def _feature_files(self) -> list[SiteFile]:
-        files = self.library.feature_files
-        return [*files, *self._copies(files)]
+        return compressed_files(files, keep)
 
-    def _context(self, pages: Pages, names: Names, feature: str) -> SiteContext:
+    def _context(
+        self,
+        pages: Pages,
+        names: Names,
+        archives: Mapping[str, zips.Archive],
+        imports: Callable[[str], frozenset[str]],
+        feature: str,
+    ) -> SiteContext:
         """What a feature makes further files from."""
         return SiteContext(
             self.library,
@@ -198,45 +190,26 @@ class SiteMaker:
             names,
             pages.noted(feature),
             functools.partial(pages.note, feature),
-            functools.partial(self.store.get_or_create, _PARTS, local=True),
-            self._packed,
-            self._imports,
+            functools.partial(self.store.get_or_create, "parts", local=True),
+            archives,
+            imports,
         )
 
     # --- downloads
 
     def _downloads(self) -> Iterator[SiteFile]:
-        """Scripts, models, archives, and files of the course."""
+        """Scripts, models, and files of the course."""
         for path, (script, _) in self.library.scripts.items():
-            yield CachedFile(path, script.code.digest.hex(), functools.partial(self._script, path))
+            yield CachedFile(path, script.code.digest.hex(), script.code.text.encode)
         for model in self.course.models:
             path = urls.model_file_path(model.name)
             yield OutputFile(path, model.source.text.encode())
-        yield from self._archives()
-        yield from self._course_files()
-
-    def _script(self, path: str) -> bytes:
-        return self.library.scripts[path][0].code.text.encode()
-
-    def _archives(self) -> Iterator[SiteFile]:
-        """The archives; of each only its key is held until it is written."""
-        around = self._around()
-        self._imports = around.imports
-        for make in zips.archives(self.library, around):
-            archive = make()
-            if archive is not None:
-                key = step_key("archive", archive.key)
-                self._packed[archive.path] = key, make
-                yield CachedFile(archive.path, key, functools.partial(_packed, make))
-
-    def _course_files(self) -> Iterator[SiteFile]:
         digests = Digests(self.store)
         for path in self.course.files:
-            digest = digests.file(f"{self.options.root}/{path}")
-            read = functools.partial(read_bytes, self.options.root, path)
+            digest = digests.file(f"{self.root}/{path}")
+            read = functools.partial(read_bytes, self.root, path)
             if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
                 digest = hashlib.sha256(read()).hexdigest()
-            self._files[urls.file_path(path)] = digest, read
             yield CachedFile(urls.file_path(path), digest, read)
         digests.save()
 
@@ -244,23 +217,30 @@ class SiteMaker:
         """What scripts need around them."""
         if not self.library.scripts:
             return zips.Surroundings()
-        known = all_imports(self.documents.summaries)
-        by_text = {
-            script.code.digest: known[path]
-            for path, (script, _) in self.library.scripts.items()
-            if path in known
-        }
-        used = {name for modules in by_text.values() for name in modules}
+        imports = self._imports()
+        used = {name for s, _ in self.library.scripts.values() for name in imports(s.code.text)}
         library = library_files() if "mjcourse" in used else ()
-        imports = _Imports(self.store, by_text)
-        modules = zips.imported_modules(self.course, library, imports, imports.of)
+        modules = zips.imported_modules(self.course, library, imports)
         packages = tuple(zips.Package(*p) for p in distributions(self.store, modules))
         meshes = tuple(
-            OutputFile(path, read_bytes(self.options.root, path))
+            OutputFile(path, read_bytes(self.root, path))
             for path in self.course.files
             if path.startswith("models/")
         )
-        return zips.Surroundings(packages, library, meshes, imports, imports.of)
+        return zips.Surroundings(packages, library, meshes, imports)
+
+    def _imports(self) -> Callable[[str], frozenset[str]]:
+        """What Python texts import: those of lessons are known."""
+        scripts, known = self.library.scripts, self.documents.imports
+        found = {scripts[path][0].code.digest: known[path] for path in scripts.keys() & known}
+
+        def imports(text: str) -> frozenset[str]:
+            digest = text_digest(text)
+            if digest not in found:
+                found[digest] = zips.imports(text)
+            return found[digest]
+
+        return imports
 
 
 def _cut_font(store: Memo, job: FontJob) -> bytes:
@@ -273,77 +253,6 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
         return subset_font(job if source is None else replace(job, data=source))
 
     return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make)
-
-
-class _Data:
-    """Files that are made together, of which the names may be all that is needed."""
-
-    def __init__(
-        self, store: Memo, key: str, make: Callable[[], tuple[Names, dict[str, bytes]]]
-    ) -> None:
-        self._store = store
-        self.key = key
-        self._make = make
-        self._files: dict[str, bytes] | None = None
-
-    def listing(self) -> tuple[Names, tuple[str, ...]]:
-        """Their names."""
-        return self._load(_SHARED, tuple[Names, tuple[str, ...]]) or self._made()
-
-    def file(self, path: str) -> bytes:
-        """The bytes of one."""
-        if self._files is None:
-            self._files = self._load(_SHARED_DATA, dict[str, bytes])
-        if self._files is None:
-            self._made()
-        assert self._files is not None
-        return self._files[path]
-
-    def _made(self) -> tuple[Names, tuple[str, ...]]:
-        names, self._files = self._make()
-        listing = names, tuple(self._files)
-        self._store.put(_SHARED_DATA, self.key, msgspec.msgpack.encode(self._files), local=True)
-        self._store.put(_SHARED, self.key, msgspec.msgpack.encode(listing), local=True)
-        return listing
-
-    def _load(self, kind: str, type: Any) -> Any:
-        data = self._store.get(kind, self.key, local=True)
-        try:
-            return None if data is None else msgspec.msgpack.decode(data, type=type)
-        except msgspec.MsgspecError:
-            return None
-
-
-class _Imports:
-    """What Python texts import: those of lessons are known, others are kept."""
-
-    def __init__(self, store: Memo, known: dict[bytes, frozenset[str]]) -> None:
-        """`known` go by the hash of their text."""
-        self._store = store
-        self._known = known
-
-    def of(self, code: Excerpt) -> frozenset[str]:
-        """What the code of a script imports; it is only read where that is not known."""
-        known = self._known.get(code.digest)
-        return self(code.text) if known is None else known
-
-    def __call__(self, text: str) -> frozenset[str]:
-        """What a text imports."""
-        digest = text_digest(text)
-        if digest not in self._known:
-            key = key_of(sys.version, text)
-            found = self._store.get_value("imports", key, list[str])
-            if found is None:
-                found = sorted(zips.imports(text))
-                self._store.put_value("imports", key, found)
-            self._known[digest] = frozenset(found)
-        return self._known[digest]
-
-
-def _packed(make: zips.MakeArchive) -> bytes:
-    archive = make()
-    assert archive is not None
-    return archive.packed()
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:

@@ -26,7 +26,8 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.pages import DemandedPage, demanded_page
+from coursebuild.pipeline.pages import framed, page_request
+from coursebuild.pipeline.reading import DrawnPage
 from coursebuild.pipeline.site import Site, SiteMaker
 
 _DRAWN = 64
@@ -35,12 +36,13 @@ _SITES = 3
 """Sites whose shared files stay available: a browser may still ask for those of an older page."""
 
 
-class DrawnPage(Struct, frozen=True):
+class ServedPage(Struct, frozen=True):
     """The text of a page, and what it was made from."""
 
     frames: Frames
     """Others where the course or what pages share is another."""
-    page: DemandedPage
+    key: str
+    page: DrawnPage
     text: bytes
 
 
@@ -61,7 +63,7 @@ class Files:
         self._is_sound = is_sound
         self._library: Library | None = None
         self._entries: dict[str, PageEntry] = {}
-        self._pages: dict[str, DrawnPage] = {}
+        self._pages: dict[str, ServedPage] = {}
         self._last_good: dict[str, str] = {}
         """Keys of pages as they are in the site that was made last, by site path."""
         self._frames: Frames | None = None
@@ -153,15 +155,19 @@ class Files:
         library, frames, known = self._library, self._frames, self._pages.pop(path, None)
         assert library is not None and frames is not None
         if known is None or known.frames is not frames:
-            document, page = self.document(path), None if known is None else known.page
+            document = self.document(path)
             if document is None or self._is_sound(document):
-                entry, store = self._entries[path], self._options.store
-                page = demanded_page(entry, library, self._documents, store, page)
-            elif page is None:
+                request = page_request(self._entries[path], library)
+                if known is None or known.key != request.key:
+                    page = self._documents.page(request.key, lambda: request)
+                else:
+                    page = known.page
+                known = ServedPage(frames, request.key, page, framed(page, frames))
+            elif known is None:
                 files = self._sites[-1][1]
                 return _data(files[path]) if path in files else None
-            before, after = frames.around(page.record.draft, page.record.parts)
-            known = DrawnPage(frames, page, f"{before}{page.body}{after}".encode())
+            else:
+                known = replace(known, frames=frames, text=framed(known.page, frames))
         self._pages[path] = known  # as the one that was asked for last
         if len(self._pages) > _DRAWN:
             del self._pages[next(iter(self._pages))]

@@ -11,7 +11,6 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.pages import SiteOptions
 from coursebuild.core.pages.urls import Place
 from coursebuild.features.markdown.copies import markdown_href
 from support.rendered_course import Make
@@ -83,9 +82,7 @@ OTHER = (
 def site(make: Make, text: str = LESSON, **texts: str) -> dict[str, bytes]:
     runs = {"examples/never.py": ScriptRun("examples/never.py", Outcome.NORUN, 0, "", "", 0.0)}
     texts.setdefault("1.1", OTHER)
-    made: dict[str, bytes] = make(text, runs=runs, **texts).site(
-        SiteOptions(subset=lambda job: job.data)
-    )
+    made: dict[str, bytes] = make(text, runs=runs, **texts).site()
     return made
 
 
@@ -223,7 +220,7 @@ def test_a_course_without_written_lessons_has_no_notebook(make: Make) -> None:
         for level in made.course.levels
     )
     course = replace(made.course, levels=levels)
-    files = replace(made, course=course).site(SiteOptions(subset=lambda job: job.data))
+    files = replace(made, course=course).site()
     assert not [path for path in files if path.endswith(".ipynb")]
     assert b"Optional" in files["llms.txt"]
 

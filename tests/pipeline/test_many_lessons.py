@@ -50,8 +50,7 @@ def peak(folder: Folder) -> int:
             for file in prepared.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
                     assert isinstance(file, CachedFile)
-                    for _ in file.pieces() if file.pieces is not None else (file.make(),):
-                        pass  # as it is written
+                    file.make()
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

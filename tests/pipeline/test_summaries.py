@@ -40,7 +40,7 @@ from coursebuild.features.lab.model import Lab
 from coursebuild.features.quiz.checks import check_output_lines
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.pipeline.fingerprints import document_fingerprint
-from coursebuild.pipeline.tasks import DocumentSummary
+from coursebuild.pipeline.reading import DocumentSummary
 from support.scratch_course import ROOT
 from support.summary_lessons import MAP, PARTS, document, library_of, with_documents
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
 
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model import (
     Course,
     Document,
@@ -21,6 +25,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import (
     CompileResult,
+    FileFacts,
     Formula,
     ModelFacts,
     Outcome,
@@ -29,13 +34,17 @@ from coursebuild.core.model.results import (
     Verdict,
 )
 from coursebuild.core.model.vocabulary import CALLOUTS
-from coursebuild.core.pages import Assets, FontJob, SiteOptions, render_site
+from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.urls import Place, lesson_path
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
+from coursebuild.numerics.reports import Reports
+from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.site import SiteMaker
 
 ROOT = Path(__file__).parents[2]
 
@@ -129,16 +138,29 @@ class Made(Struct, frozen=True):
         page = self.page(lesson)
         return f"{page.blocks(page.document.blocks)}\n{page.footnotes()}"
 
-    def site(self, options: SiteOptions | None = None) -> dict[str, bytes]:
-        """The whole site; fonts are not cut, to save time."""
-        options = options or SiteOptions(subset=whole_font)
-        files = render_site(self.course, self.results, self.assets, options)
-        assert [file.path for file in files] == sorted({file.path for file in files})
-        return {file.path: file.data for file in files}
+    def site(
+        self, files: Mapping[str, bytes] = MappingProxyType({}), reports: Reports | None = None
+    ) -> dict[str, bytes]:
+        """The whole site as a build puts it together, with these files of the course."""
+        with TemporaryDirectory() as folder:
+            root = Path(folder)
+            for path, data in files.items():
+                (root / path).parent.mkdir(parents=True, exist_ok=True)
+                (root / path).write_bytes(data)
+            course = replace(self.course, files=tuple(files))
+            library = Library.of(course, self.results, self.assets, reports or Reports())
+            options = Options(root, 1, quiet=True, cache=Memo(Path(KEPT.name)))
+            with Documents(options.store, 1) as documents:
+                site = SiteMaker(library, self.assets, documents, options).made()
+                made = {file.path: file.make() for file in site.files}
+        assert [file.path for file in site.files] == sorted(made)
+        assert site.listed is not None
+        facts = [FileFacts(path, sha256(d).hexdigest(), len(d)) for path, d in made.items()]
+        return dict(sorted({**made, site.listed.path: site.listed.make(facts)}.items()))
 
 
-def whole_font(job: FontJob) -> bytes:
-    return job.data
+KEPT = TemporaryDirectory()
+"""Where fonts are kept that were cut, and all else that depends on no course."""
 
 
 class Make(Struct, frozen=True):

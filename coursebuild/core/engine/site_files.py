@@ -49,7 +49,9 @@ def writing(
 
         def written() -> dict[str, ManifestEntry]:
             tasks = ((None, start) for start in starts)
-            parts = map(share, starts) if workers is None else workers.map(tasks)[0]
+            parts = (
+                map(share, starts) if workers is None else (part for part, _ in workers.map(tasks))
+            )
             entries = (entry for part in parts for entry in part)
             return {file.path: entry for (file, _), entry in zip(files, entries, strict=True)}
 

@@ -4,8 +4,8 @@ Entry points: `Workers`, a context manager; `can_fork`, whether there can be any
 
 1. A worker is forked with all that this process has read and imported, and does one task at a time
    with the function that it was made with. What it remembers from one task to the next stays in it.
-2. `map` gives each task to the worker that is named for it, or to the first that is free, and gives
-   the results in the order of the tasks. Tasks may be made while workers are at earlier ones.
+2. `map` gives each task to the worker that is named for it, or to the first that is free, and
+   yields the results in the order of the tasks. Tasks are made while workers are at earlier ones.
 3. What a worker did not finish, because it died, is done here. What the function raises in a worker
    is raised here.
 4. Workers are killed when the work is over, however it ends. They have nothing to save, and where
@@ -22,17 +22,18 @@ import signal
 import sys
 import threading
 import traceback
-from collections import deque
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any, Generic, NoReturn, Self, TypeVar
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_AHEAD = 32
+"""Tasks that are made before a worker is free for them."""
 
 
 def can_fork() -> bool:
@@ -47,10 +48,8 @@ class _Worker(Struct, eq=False):
     number: int
     process: int
     connection: Connection
-    own: deque[int] = field(default_factory=deque)
-    """Tasks that are for this one, by their numbers."""
     task: int | None = None
-    """The one that it is at."""
+    """The number of the one that it is at."""
 
 
 class Workers(Generic[Task, Result]):
@@ -78,41 +77,41 @@ class Workers(Generic[Task, Result]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def map(
-        self, tasks: Iterable[tuple[int | None, Task]]
-    ) -> tuple[list[Result], list[int | None]]:
-        """The results, in the order of the tasks, and which worker did each.
+    def map(self, tasks: Iterable[tuple[int | None, Task]]) -> Iterator[tuple[Result, int | None]]:
+        """The results, in the order of the tasks, each with the worker that gave it.
 
         A task comes with the number of the worker that should do it, if any.
         """
-        asked: list[Task] = []
+        coming, there_are_more = enumerate(tasks), True
+        asked: dict[int, Task] = {}
+        """Tasks without a result."""
+        waiting: list[tuple[int, int | None]] = []
+        """Those that no worker is at, each with the one that should do it."""
         done: dict[int, tuple[Result, int | None]] = {}
-        free: deque[int] = deque()
-        coming = iter(tasks)
-        there_are_more = True
+        given = 0
         try:
-            while True:
-                task = next(coming, None) if there_are_more else None
-                there_are_more = task is not None
-                if task is not None:
-                    worker = self._workers.get(-1 if task[0] is None else task[0])
-                    (free if worker is None else worker.own).append(len(asked))
-                    asked.append(task[1])
+            while there_are_more or asked or done:
+                if hungry := there_are_more and len(waiting) < _AHEAD:
+                    number, task = next(coming, (-1, None))
+                    there_are_more = task is not None
+                    if task is not None:
+                        waiting.append((number, task[0]))
+                        asked[number] = task[1]
                 for worker in self._workers.values():
-                    self._give(worker, free, asked)
+                    if worker.task is None and waiting:
+                        self._give(worker, waiting, asked)
                 busy = {w.connection: w for w in self._workers.values() if w.task is not None}
-                if not there_are_more and not busy:
-                    break
-                for ready in wait(busy, 0 if there_are_more else None):
-                    self._take(busy[ready], done)  # type: ignore[index]
+                if not busy and not hungry and waiting:
+                    number, _ = waiting.pop(0)
+                    done[number] = self._work(asked.pop(number)), None
+                for ready in wait(busy, 0 if hungry or not busy else None):
+                    self._take(busy[ready], asked, done)  # type: ignore[index]
+                while given in done:
+                    yield done.pop(given)
+                    given += 1
         except BaseException:  # a result that is still to come would be taken for a later one
             self.close()
             raise
-        for number, one in enumerate(asked):
-            if number not in done:
-                done[number] = self._work(one), None
-        found = [done[number] for number in range(len(asked))]
-        return [result for result, _ in found], [number for _, number in found]
 
     def close(self) -> None:
         """End them: all of them at once, since giving back their memory takes a while."""
@@ -121,21 +120,37 @@ class Workers(Generic[Task, Result]):
         for worker in [*self._workers.values()]:
             self._lose(worker)
 
-    def _give(self, worker: _Worker, free: deque[int], asked: list[Task]) -> None:
-        """Give a worker that has nothing to do its next task."""
-        queue = worker.own or free
-        if worker.task is None and queue:
-            worker.task = queue.popleft()
+    def _give(
+        self, worker: _Worker, waiting: list[tuple[int, int | None]], asked: Mapping[int, Task]
+    ) -> None:
+        """Give a worker that has nothing to do a task: one for it, or else for nobody.
+
+        Where too many wait, it takes that of another.
+        """
+        others = self._workers.keys() - {worker.number}
+        own = next((one for one in waiting if one[1] == worker.number), None)
+        free = next((one for one in waiting if one[1] not in others), None)
+        chosen = own or free or (waiting[0] if len(waiting) >= _AHEAD else None)
+        if chosen is not None:
+            waiting.remove(chosen)
+            worker.task = chosen[0]
             with contextlib.suppress(OSError):  # it is dead, as reading from it will show
                 worker.connection.send_bytes(pickle.dumps(asked[worker.task]))
 
-    def _take(self, worker: _Worker, done: dict[int, tuple[Result, int | None]]) -> None:
-        """Take the result of a worker's task; one that has died is no more."""
+    def _take(
+        self,
+        worker: _Worker,
+        asked: dict[int, Task],
+        done: dict[int, tuple[Result, int | None]],
+    ) -> None:
+        """Take the result of a worker's task; the task of one that has died is done here."""
         assert worker.task is not None
+        task = asked.pop(worker.task)
         try:
             good, value = pickle.loads(worker.connection.recv_bytes())
         except (EOFError, OSError):
             self._lose(worker)
+            done[worker.task] = self._work(task), None
             return
         if not good:
             raise value

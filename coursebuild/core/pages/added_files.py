@@ -17,7 +17,7 @@ from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
-from coursebuild.core.pages.zips import MakeArchive
+from coursebuild.core.pages.zips import Archive
 from coursebuild.core.registry import features
 
 
@@ -48,8 +48,8 @@ class SiteContext(Struct, frozen=True):
     """Gives what it noted, by the page's site path."""
     get_or_create: Callable[[str, Callable[[], bytes]], bytes]
     """Gives what was made under a key before, or makes it."""
-    archives: Mapping[str, tuple[str, MakeArchive]]
-    """Archives of scripts by site path, with their keys."""
+    archives: Mapping[str, Archive]
+    """Archives of scripts by site path."""
     imports: Callable[[str], frozenset[str]]
     """Says what a Python text imports."""
 

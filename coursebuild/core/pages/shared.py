@@ -1,6 +1,6 @@
 """The files that every page refers to: fonts, the style sheet, the page's script, the icon.
 
-Entry points: `page_facts(draft)` and `common_characters(library)`, by which they depend on the
+Entry points: `page_characters(html)` and `common_characters(library)`, by which they depend on the
 pages; `shared_files`, which makes them, with `needed_fonts`.
 
 The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
@@ -15,15 +15,13 @@ import re
 from collections.abc import Callable
 from html import unescape
 
-from markupsafe import Markup
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.features import Feature, PagePart
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages import fonts, formulas, styles
+from coursebuild.core.pages import fonts, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
-from coursebuild.core.pages.frame import Draft, Names
+from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.registry import features
 
@@ -39,12 +37,6 @@ class PageFacts(Struct, frozen=True):
     """Styles that were written in its elements."""
 
 
-def settled(draft: Draft) -> tuple[Draft, frozenset[str]]:
-    """A page without styles in its elements, and the declarations that were there."""
-    body, found = styles.hoist(formulas.glue(str(draft.body)))
-    return replace(draft, body=Markup(body)), found
-
-
 _FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
 _SIGN = re.compile(
     r"(?:[\x00-%'-;=-\x7f]++|<[^>]*+>)*+"
@@ -53,12 +45,6 @@ _SIGN = re.compile(
 """What is not ASCII, or may be a character reference, as in `html.unescape`; tags are passed over.
 A match goes on to the next of these, or to the end: no place is looked at twice.
 """
-
-
-def page_facts(draft: Draft, declarations: frozenset[str]) -> PageFacts:
-    """The facts of a settled page."""
-    text, mathematics = page_characters(draft.body)
-    return PageFacts(text.union(draft.title) - fonts.BASE, mathematics, declarations)
 
 
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:

@@ -1,7 +1,7 @@
 """Scripts as archives that run elsewhere, with models, `mjcourse` and exact requirements.
 
-Entry points: `archives`; `course_zip`, `lesson_zip`; `imported_modules` says which packages whoever
-calls should give the versions of.
+Entry points: `archives`; `imported_modules` says which packages whoever calls should give the
+versions of.
 
 The bytes depend on the content alone: entries in order of their paths, one fixed date, one fixed
 way to compress.
@@ -9,16 +9,14 @@ way to compress.
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Lesson, Script
+from coursebuild.core.model import Course, Script
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, document_scripts, models_named, owners
@@ -45,10 +43,6 @@ def imports(text: str) -> frozenset[str]:
     return imported(text)
 
 
-def _imports_of(code: Excerpt) -> frozenset[str]:
-    return imports(code.text)
-
-
 def _path(part: tuple[str, object]) -> str:
     return part[0]
 
@@ -64,8 +58,6 @@ class Surroundings(Struct, frozen=True):
     root."""
     imports: Callable[[str], frozenset[str]] = imports
     """What a Python text imports: whoever calls may know it already."""
-    imports_of: Callable[[Excerpt], frozenset[str]] = _imports_of
-    """What the code of a script imports, likewise."""
 
 
 class Archive(Struct, frozen=True):
@@ -74,7 +66,7 @@ class Archive(Struct, frozen=True):
     path: str
     """Site path."""
     parts: Mapping[str, bytes | Excerpt]
-    """What is in it by path: code, which may be away, or bytes."""
+    """What is in it by path: code, or bytes."""
 
     @property
     def files(self) -> dict[str, bytes]:
@@ -98,76 +90,26 @@ class Archive(Struct, frozen=True):
         return pack(self.files)
 
 
-MakeArchive: TypeAlias = Callable[[], Archive | None]
-"""Makes an archive; `None` for one without scripts."""
-
-
-def archives(library: Library, around: Surroundings) -> Iterator[MakeArchive]:
-    """Those of the course and of its lessons."""
+def archives(library: Library, around: Surroundings) -> Iterator[Archive]:
+    """That of the course and those of its lessons, as far as they have scripts."""
+    by_module = {_module(path): script for path, (script, _) in library.scripts.items()}
     if library.scripts:
-        yield functools.partial(course_archive, library, around)
-    by_module = _by_module(library)
+        scripts = tuple(script for script, _ in library.scripts.values())
+        folder = _slug(library.course.title)
+        files = _files(library, around, scripts, folder, by_module)
+        yield Archive(urls.EXAMPLES_ZIP, files)
     for lesson in library.order:
-        yield functools.partial(lesson_archive, library, around, lesson, by_module)
-
-
-def course_archive(library: Library, around: Surroundings) -> Archive:
-    """All scripts of the course."""
-    scripts = tuple(script for script, _ in library.scripts.values())
-    folder = _slug(library.course.title)
-    files = _files(library, around, scripts, folder, _by_module(library))
-    return Archive(urls.EXAMPLES_ZIP, files)
-
-
-def lesson_archive(
-    library: Library,
-    around: Surroundings,
-    lesson: Lesson,
-    by_module: Mapping[str, Script] | None = None,
-) -> Archive | None:
-    """The scripts of a lesson and those that they import; `None` where it has none.
-
-    `by_module` are all scripts by what imports them.
-    """
-    scripts = document_scripts(lesson.document) if lesson.document is not None else ()
-    if not scripts:
-        return None
-    by_module = _by_module(library) if by_module is None else by_module
-    needed = _with_siblings(by_module, around, scripts)
-    files = _files(library, around, needed, f"{lesson.id}-{lesson.slug}", by_module)
-    return Archive(urls.lesson_zip_path(lesson), files)
-
-
-def lesson_archives(library: Library, around: Surroundings) -> dict[str, tuple[str, MakeArchive]]:
-    """Those of the lessons that have scripts, by site path, each with an empty key."""
-    by_module = _by_module(library)
-    return {
-        urls.lesson_zip_path(lesson): (
-            "",
-            functools.partial(lesson_archive, library, around, lesson, by_module),
-        )
-        for lesson in library.order
-        if lesson.document is not None and document_scripts(lesson.document)
-    }
-
-
-def course_zip(library: Library, around: Surroundings) -> OutputFile:
-    """The archive of the course, packed."""
-    archive = course_archive(library, around)
-    return OutputFile(archive.path, archive.packed())
-
-
-def lesson_zip(library: Library, around: Surroundings, lesson: Lesson) -> OutputFile | None:
-    """The archive of a lesson, packed; `None` where it has no script."""
-    archive = lesson_archive(library, around, lesson)
-    return None if archive is None else OutputFile(archive.path, archive.packed())
+        scripts = document_scripts(lesson.document) if lesson.document is not None else ()
+        if scripts:
+            needed = _with_siblings(by_module, around, scripts)
+            files = _files(library, around, needed, f"{lesson.id}-{lesson.slug}", by_module)
+            yield Archive(urls.lesson_zip_path(lesson), files)
 
 
 def imported_modules(
     course: Course,
     library: Iterable[OutputFile] = (),
     imports: Callable[[str], frozenset[str]] = imports,
-    imports_of: Callable[[Excerpt], frozenset[str]] = _imports_of,
 ) -> tuple[str, ...]:
     """Top-level modules of others that the scripts, and the package they come with, import."""
     documents = (owner.document for owner in owners(course))
@@ -178,7 +120,7 @@ def imported_modules(
         for script in document_scripts(document)
     ]
     own = {_module(script.path) for script in scripts} | {"mjcourse"}
-    found = {name for script in scripts for name in imports_of(script.code)}
+    found = {name for script in scripts for name in imports(script.code.text)}
     texts = (file.data.decode() for file in library if file.path.endswith(".py"))
     found |= {name for text in texts for name in imports(text)}
     return tuple(sorted(found - own - sys.stdlib_module_names))
@@ -186,10 +128,6 @@ def imported_modules(
 
 def _module(path: str) -> str:
     return path.removeprefix("examples/").removesuffix(".py").partition("/")[0]
-
-
-def _by_module(library: Library) -> dict[str, Script]:
-    return {_module(path): script for path, (script, _) in library.scripts.items()}
 
 
 def _with_siblings(
@@ -201,7 +139,7 @@ def _with_siblings(
         script = waiting.pop()
         if script.path not in found:
             found[script.path] = script
-            named = around.imports_of(script.code)
+            named = around.imports(script.code.text)
             waiting += [by_module[name] for name in named if name in by_module]
     return tuple(found[path] for path in sorted(found))
 
@@ -218,7 +156,7 @@ def _files(
     `mjcourse` lies beside the scripts, where Python looks first.
     """
     files: dict[str, bytes | Excerpt] = {script.path: script.code for script in scripts}
-    modules = [around.imports_of(script.code) for script in scripts]
+    modules = [around.imports(script.code.text) for script in scripts]
     if any("mjcourse" in names for names in modules):
         files |= {f"examples/{file.path}": file.data for file in around.library}
         modules += [

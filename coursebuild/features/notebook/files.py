@@ -30,15 +30,14 @@ def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
     """The notebooks of all written lessons."""
     for page in site.pages:
         lesson = site.library.lessons[page.id]
-        archive, make = site.archives.get(urls.lesson_zip_path(lesson), ("", lambda: None))
-        key = step_key("notebook", page.digest, archive)
+        archive = site.archives.get(urls.lesson_zip_path(lesson))
+        key = step_key("notebook", page.digest, archive.key if archive else "")
         path = urls.copy_path(page.path, ".ipynb")
-        yield CachedFile(path, key, functools.partial(_notebook, site, lesson, page.path, make))
+        yield CachedFile(path, key, functools.partial(_notebook, site, lesson, page.path, archive))
 
 
-def _notebook(site: SiteContext, lesson: Lesson, page: str, make: zips.MakeArchive) -> bytes:
+def _notebook(site: SiteContext, lesson: Lesson, page: str, archive: zips.Archive | None) -> bytes:
     head, *cells = json.loads(site.note(page))
-    archive = make()
     setup = () if archive is None else _setup(site, lesson, archive)
     document = {
         "cells": [head, *setup, *cells],

@@ -36,8 +36,8 @@ def test_answers_come_in_the_order_of_the_tasks() -> None:
         return number * number
 
     with Workers(slow_at_first, 3) as workers:
-        answers, by = workers.map([(None, n) for n in range(40)])
-    assert answers == [n * n for n in range(40)]
+        answers, by = zip(*workers.map([(None, n) for n in range(40)]), strict=True)
+    assert list(answers) == [n * n for n in range(40)]
     assert set(by) == {0, 1, 2}
 
 
@@ -49,8 +49,8 @@ def test_a_task_goes_to_the_worker_that_it_names_and_finds_what_that_remembers()
         return os.getpid(), list(seen)
 
     with Workers(remember, 2) as workers:
-        first, by = workers.map([(None, n) for n in range(8)])
-        again, _ = workers.map([(by[n], n) for n in range(8)])
+        first, by = zip(*workers.map([(None, n) for n in range(8)]), strict=True)
+        again = [answer for answer, _ in workers.map([(by[n], n) for n in range(8)])]
     for n in range(8):
         assert first[n][0] == again[n][0]
         assert again[n][1].count(n) == 2
@@ -59,8 +59,8 @@ def test_a_task_goes_to_the_worker_that_it_names_and_finds_what_that_remembers()
 
 def test_large_answers_and_tasks() -> None:
     with Workers(lambda text: text * 3, 2) as workers:
-        answers, _ = workers.map([(None, "x" * n * 100_000) for n in range(1, 20)])
-    assert [len(answer) for answer in answers] == [n * 300_000 for n in range(1, 20)]
+        answers = workers.map([(None, "x" * n * 100_000) for n in range(1, 20)])
+        assert [len(answer) for answer, _ in answers] == [n * 300_000 for n in range(1, 20)]
 
 
 def test_what_a_worker_did_not_answer_is_answered_here() -> None:
@@ -70,7 +70,7 @@ def test_what_a_worker_did_not_answer_is_answered_here() -> None:
         return where(number)  # type: ignore[return-value]
 
     with Workers(dies, 2) as workers:
-        answers, by = workers.map([(n % 2, n) for n in range(20)])
+        answers, by = zip(*workers.map([(n % 2, n) for n in range(20)]), strict=True)
     assert [answer[0] for answer in answers] == list(range(20))
     assert {answers[n][1] for n in range(20) if by[n] is None} == {HERE}
 
@@ -82,7 +82,7 @@ def test_what_is_raised_in_a_worker_is_raised_here() -> None:
         return number
 
     with Workers(refuse, 2) as workers, pytest.raises(EffectError, match="no") as caught:
-        workers.map([(None, n) for n in range(6)])
+        list(workers.map([(None, n) for n in range(6)]))
     assert caught.value.help == "never"
     assert "refuse" in "".join(caught.value.__notes__)
 
@@ -95,12 +95,12 @@ def test_what_cannot_be_sent_is_told_as_a_text() -> None:
         raise HereError("local")
 
     with Workers(refuse, 1) as workers, pytest.raises(RuntimeError, match="HereError: local"):
-        workers.map([(None, 1)])
+        list(workers.map([(None, 1)]))
 
 
 def test_no_worker_stays() -> None:
     with Workers(where, 3) as workers:
-        answers, _ = workers.map([(None, n) for n in range(9)])
+        answers = [answer for answer, _ in workers.map([(None, n) for n in range(9)])]
     processes = {process for _, process in answers}
     assert HERE not in processes
     assert not any(alive(process) for process in processes)
@@ -112,7 +112,7 @@ def test_where_standard_input_is_closed() -> None:
         "import os\n"
         "from coursebuild.core.engine.workers import Workers\n"
         "with Workers(lambda task: os.getpid(), 2) as workers:\n"
-        "    print(os.getpid() not in workers.map([(None, 1), (None, 2)])[0])\n"
+        "    print(os.getpid() not in [p for p, _ in workers.map([(None, 1), (None, 2)])])\n"
     )
     shell = ["sh", "-c", 'exec "$0" -c "$1" <&-', sys.executable, code]
     done = subprocess.run(shell, capture_output=True, text=True, check=True)
@@ -121,8 +121,8 @@ def test_where_standard_input_is_closed() -> None:
 
 def test_without_workers_all_is_answered_here() -> None:
     with Workers(where, 0) as workers:
-        assert workers.map([(None, 1), (0, 2)])[0] == [(1, HERE), (2, HERE)]
-        assert workers.map([])[0] == []
+        assert list(workers.map([(None, 1), (0, 2)])) == [((1, HERE), None), ((2, HERE), None)]
+        assert list(workers.map([])) == []
 
 
 def test_tasks_are_made_while_workers_answer(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_tasks_are_made_while_workers_answer(tmp_path: Path) -> None:
         yield None, 10
 
     with Workers(waits, 2) as workers:
-        assert workers.map(tasks())[0] == list(range(11))
+        assert [answer for answer, _ in workers.map(tasks())] == list(range(11))
 
 
 def test_workers_that_die_while_tasks_come() -> None:
@@ -154,7 +154,7 @@ def test_workers_that_die_while_tasks_come() -> None:
             time.sleep(0.005)
 
     with Workers(dies, 3) as workers:
-        assert workers.map(tasks()) == ([(n, HERE) for n in range(30)], [None] * 30)
+        assert list(workers.map(tasks())) == [((n, HERE), None) for n in range(30)]
 
 
 def test_after_a_failure_no_answer_is_taken_for_another() -> None:
@@ -166,8 +166,8 @@ def test_after_a_failure_no_answer_is_taken_for_another() -> None:
 
     with Workers(answer, 2) as workers:
         with pytest.raises(EffectError, match="no answer"):
-            workers.map([(0, "slow"), (1, "bad")])
-        assert workers.map([(None, "later")])[0] == [("later", HERE)]
+            list(workers.map([(0, "slow"), (1, "bad")]))
+        assert list(workers.map([(None, "later")])) == [(("later", HERE), None)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -185,7 +185,8 @@ def test_a_signal_at_the_moment_of_a_fork_is_for_the_process_that_forks(
         "os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), number),\n"
         "                    after_in_parent=lambda: os.kill(os.getpid(), number))\n"
         "with Workers(lambda task: (task, os.getpid() == here), 1) as workers:\n"
-        "    print(workers.map([(None, 1)])[0], signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
+        "    answers = [a for a, _ in workers.map([(None, 1)])]\n"
+        "    print(answers, signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(int(number))], cwd=ROOT, capture_output=True, text=True
@@ -217,7 +218,7 @@ def test_workers_end_with_the_process(how: signal.Signals, tmp_path: Path) -> No
         "def work(n):\n"
         "    os.write(1, b'%d\\n' % os.getpid())\n"
         "    time.sleep(0.1)\n"
-        "with Workers(work, 2) as workers: workers.map([(None, n) for n in range(99)])\n"
+        "with Workers(work, 2) as workers: list(workers.map([(None, n) for n in range(99)]))\n"
     )
     with subprocess.Popen(
         [sys.executable, str(script)],

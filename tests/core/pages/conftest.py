@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.pages import Assets
+from coursebuild.core.pages.assets import Assets
 from support.rendered_course import Make, read_assets
 
 

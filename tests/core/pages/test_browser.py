@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, expect
 
-from coursebuild.core.pages import SiteOptions
 from support.folder_server import served
 from support.lab_page import until, watched
 from support.model_reports import reports
@@ -131,7 +130,7 @@ LESSON_PAGE = PAGES[1]
 def root(make: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site on disk, below the path of its base address."""
     folder = tmp_path_factory.mktemp("served")
-    for path, data in make(LESSON).site(SiteOptions(reports=reports())).items():
+    for path, data in make(LESSON).site(reports=reports()).items():
         target = folder / "course" / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(data)

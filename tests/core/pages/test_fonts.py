@@ -9,18 +9,20 @@ from fontTools.ttLib import TTFont
 from msgspec.structs import replace
 
 from coursebuild.core.engine.prepared import prepared_source
-from coursebuild.core.pages import Assets, FontJob, subset_font
+from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.fonts import (
     CODE,
     MATH,
     TEXT,
     VERSION,
+    FontJob,
     characters_in,
     face_rules,
     finest_font,
     font_jobs,
     italic_letter,
     read_faces,
+    subset_font,
     unicode_range,
 )
 

@@ -6,10 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages import BrokenLink, check_links
 from coursebuild.core.pages.links import (
+    BrokenLink,
     _read,
     all_lead_somewhere,
+    check_links,
     ids_and_addresses,
     references,
 )

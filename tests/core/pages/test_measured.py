@@ -7,7 +7,6 @@ import re
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.pages import SiteOptions
 from coursebuild.core.pages.figures import bounded, exact, factor, percent, power, sentence, size
 from coursebuild.numerics.reports import Reports
 from support.model_reports import box, case, diet, finding, reports, row, scenario, scene
@@ -70,7 +69,7 @@ def test_errors_percentages_factors_and_sizes_as_text() -> None:
 
 
 def pages(make: Make, found: Reports) -> dict[str, str]:
-    files = make("## A\n\nText.\n").site(SiteOptions(reports=found, subset=lambda job: job.data))
+    files = make("## A\n\nText.\n").site(reports=found)
     return {path: data.decode() for path, data in files.items() if path.endswith(".html")}
 
 

@@ -23,8 +23,7 @@ from coursebuild.core.engine.prepared import (
 )
 from coursebuild.core.files.resources import assets_dir, template_texts
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages import Assets
-from coursebuild.core.pages.assets import SCRIPTS, page_script
+from coursebuild.core.pages.assets import SCRIPTS, Assets, page_script
 from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.cutting import covered, measured
 from coursebuild.core.pages.fonts import (

@@ -1,4 +1,4 @@
-"""What the shared files must know of a page, and pages settled."""
+"""What the shared files must know of a page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from markupsafe import Markup
 from coursebuild.core.pages import formulas
 from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.fonts import BASE
-from coursebuild.core.pages.shared import page_facts, settled
+from coursebuild.core.pages.record import PageRecord, record
 
 PIECES = [
     *("<math><mi>x</mi><mo>&lt;</mo></math>", '<math display="block"><mi>α</mi></math>', "<math>"),
@@ -38,8 +38,8 @@ PIECES = [
 html = st.lists(st.sampled_from(PIECES), max_size=20).map("".join)
 
 
-def draft(body: str) -> Draft:
-    return Draft("x.html", "page", "Títle", "", Markup(body))
+def recorded(body: str) -> tuple[PageRecord, str]:
+    return record(Draft("x.html", "page", "Títle", "", Markup(body)), "")
 
 
 def glued(body: str) -> str:
@@ -66,24 +66,22 @@ def held(match: re.Match[str]) -> str:
 @given(html)
 def test_formulas_are_held_to_what_touches_them_and_nothing_is_escaped(body: str) -> None:
     body = body.replace("style=", "title=")
-    page, declarations = settled(draft(body))
-    assert (str(page.body), declarations) == (glued(formulas._tight(body)), frozenset())
+    page, html = recorded(body)
+    assert (html, page.declarations) == (glued(formulas._tight(body)), ())
 
 
 @given(html)
 def test_the_facts_of_a_page_are_its_characters(body: str) -> None:
-    facts = page_facts(draft(body), frozenset({"color:red"}))
+    facts, body = recorded(body)
     formula = re.compile(r"<math\b.*?</math>", re.DOTALL)
     # A reference ends where a tag begins.
     text = unescape(re.sub(r"<[^>]*>", "\0", formula.sub("\0", body)))
     inside = "".join(unescape(re.sub(r"<[^>]*>", "\0", m)) for m in formula.findall(body))
-    assert facts.text == {c for c in f"Títle{text}" if not c.isascii() and c not in BASE}
-    assert facts.mathematics - {" "} == {c for c in inside if not c.isascii()}
+    assert set(facts.text) == {c for c in f"Títle{text}" if not c.isascii() and c not in BASE}
+    assert set(facts.mathematics) - {" "} == {c for c in inside if not c.isascii()}
     assert (" " in facts.mathematics) == (formula.search(body) is not None)
-    assert facts.declarations == {"color:red"}
 
 
 def test_a_long_page_is_looked_through_once() -> None:
     """With something left to look at after the last character that counts, at each place."""
-    page = draft("λ" + "a > b & c " * 40_000)
-    assert page_facts(page, frozenset()).text == {"í", "λ"}
+    assert recorded("λ" + "a > b & c " * 40_000)[0].text == "íλ"

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.pages import Assets
-from coursebuild.core.pages.assets import strings_for
+from coursebuild.core.pages.assets import Assets, strings_for
 from coursebuild.core.pages.strings import parse_strings
 
 ROOT = Path(__file__).parents[3]

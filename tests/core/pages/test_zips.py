@@ -14,8 +14,9 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts, OutputFile
-from coursebuild.core.pages import Package, SiteOptions, Surroundings, imported_modules
-from coursebuild.core.pages.zips import imports
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.zips import Package, Surroundings, imported_modules, imports
+from coursebuild.core.pages.zips import archives as zip_archives
 from coursebuild.core.text.source import Source
 from support.rendered_course import Make
 
@@ -57,13 +58,13 @@ def made(make: Make) -> Any:
     return replace(found, course=replace(found.course, models=models), results=results)
 
 
+def packed(made: Any) -> dict[str, bytes]:
+    library = Library.of(made.course, made.results, made.assets)
+    return {archive.path: archive.packed() for archive in zip_archives(library, AROUND)}
+
+
 def archives(made: Any) -> dict[str, zipfile.ZipFile]:
-    site = made.site(SiteOptions(around=AROUND, subset=lambda job: job.data))
-    return {
-        path: zipfile.ZipFile(io.BytesIO(data))
-        for path, data in site.items()
-        if path.endswith(".zip")
-    }
+    return {path: zipfile.ZipFile(io.BytesIO(data)) for path, data in packed(made).items()}
 
 
 def test_the_course_archive_has_scripts_models_library_and_requirements(made: Any) -> None:
@@ -98,9 +99,7 @@ def test_a_lesson_archive_has_what_its_scripts_import(made: Any) -> None:
 
 
 def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
-    options = SiteOptions(around=AROUND, subset=lambda job: job.data)
-    one, two = made.site(options), made.site(options)
-    assert one["examples.zip"] == two["examples.zip"]
+    assert packed(made) == packed(made)
     for archive in archives(made).values():
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         assert {entry.external_attr >> 16 for entry in archive.infolist()} == {0o100644}
@@ -116,19 +115,12 @@ def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
 def test_an_unpacked_script_finds_its_library_and_its_models(
     make: Make, tmp_path: Path, load: str
 ) -> None:
-    root = Path(__file__).parents[3]
-    library = tuple(
-        OutputFile(path.relative_to(root).as_posix(), path.read_bytes())
-        for path in sorted((root / "mjcourse").rglob("*.py"))
-    )
     text = f"""```python file=examples/a.py
 from mjcourse import model_path, spatial
 print({load}.read_text().strip().splitlines()[0], spatial.__name__)
 ```
 """
-    site = make(text).site(
-        SiteOptions(around=Surroundings(library=library), subset=lambda job: job.data)
-    )
+    site = make(text).site()
     zipfile.ZipFile(io.BytesIO(site["examples.zip"])).extractall(tmp_path)
     done = subprocess.run(
         [sys.executable, "-I", "-c", RUNNER],

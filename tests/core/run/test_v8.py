@@ -403,7 +403,7 @@ class TestIsolate:
             "before = typeset('x')\n"
             "print(can_fork())\n"
             "with Workers(typeset, 2) as workers:\n"
-            "    made, numbers = workers.map((None, 'x') for _ in range(8))\n"
+            "    made, numbers = zip(*workers.map((None, 'x') for _ in range(8)))\n"
             "print(all(one == before for one in made), None in numbers)\n"
             "with MathEngine() as engine:\n"
             "    engine.typeset([Formula('x', False)])\n"
