@@ -15,6 +15,7 @@ from coursebuild.core.drawing.marks import markup_text, shortened, text_width
 from coursebuild.core.drawing.scales import log_ticks
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.points import Chart, PlotLine, Point, lane_text
+from coursebuild.numerics.reports.strokes import FINE, label
 
 SIZE = 12.0
 """Of letters, in the units of the drawing."""
@@ -221,53 +222,30 @@ def ticks_y(low: float, high: float, height: float) -> list[tuple[float, str]]:
     return log_ticks(low, high, max(2, int(height / 30)))
 
 
-def grid(
-    frame: Frame, top: float, titles: tuple[str, str], *, edge: float
-) -> tuple[list[str], list[str]]:
-    """Lines of the grid, which reach up to `top`, and the texts of the axes.
-
-    Args:
-        frame: where the plot is.
-        top: the upper end of the grid's upright lines; above the frame where something stands on
-            it.
-        titles: of the axis below and of the one at the left.
-        edge: where the title at the left stands.
-    """
+def grid(frame: Frame, titles: tuple[str, str]) -> tuple[list[str], list[str]]:
+    """Lines of the grid, and the texts of the axes; titles of the axis below and at the left."""
     lines: list[str] = []
     texts: list[str] = []
-    shown_y = ticks_y(frame.low_y, frame.high_y, frame.bottom - frame.top)
     for exponent in _decades(frame.low_y, frame.high_y):
+        lines.append(f"M{frame.left:.1f} {frame.y(10.0**exponent):.1f}H{frame.right:.1f}")
+    for exponent, text in ticks_y(frame.low_y, frame.high_y, frame.bottom - frame.top):
         y = frame.y(10.0**exponent)
-        lines.append(f"M{frame.left:.1f} {y:.1f}H{frame.right:.1f}")
-    for exponent, text in shown_y:
-        y = frame.y(10.0**exponent)
-        texts.append(_tick(frame.left - 7, y + 4, "end", text))
+        texts.append(label(frame.left - 7, y + 4, text, f'text-anchor="end" {FINE}'))
         lines.append(f"M{frame.left:.1f} {y:.1f}h-4")
-    shown_x = _fitting(frame)
-    for exponent in _decades(frame.low_x, frame.high_x) or [e for e, _ in shown_x]:
-        x = frame.x(10.0**exponent)
-        lines.append(f"M{x:.1f} {top:.1f}V{frame.bottom:.1f}")
-    for exponent, text in shown_x:
+    shown = _fitting(frame)
+    for exponent in _decades(frame.low_x, frame.high_x) or [e for e, _ in shown]:
+        lines.append(f"M{frame.x(10.0**exponent):.1f} {frame.top:.1f}V{frame.bottom:.1f}")
+    for exponent, text in shown:
         x = frame.x(10.0**exponent)
         lines.append(f"M{x:.1f} {frame.bottom:.1f}v5")
-        texts.append(_tick(x, frame.bottom + 18, "middle", text))
+        texts.append(label(x, frame.bottom + 18, text, f'text-anchor="middle" {FINE}'))
     middle, centre = (frame.top + frame.bottom) / 2, (frame.left + frame.right) / 2
     texts.append(
-        f'<text transform="translate({edge:.1f} {middle:.1f}) rotate(-90)" '
+        f'<text transform="translate({14:.1f} {middle:.1f}) rotate(-90)" '
         f'text-anchor="middle">{markup_text(titles[1])}</text>'
     )
-    texts.append(
-        f'<text x="{centre:.1f}" y="{frame.bottom + 37:.1f}" text-anchor="middle">'
-        f"{markup_text(titles[0])}</text>"
-    )
+    texts.append(label(centre, frame.bottom + 37, titles[0], 'text-anchor="middle"'))
     return lines, texts
-
-
-def _tick(x: float, y: float, anchor: str, text: str) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{TICK_SIZE:g}">'
-        f"{markup_text(text)}</text>"
-    )
 
 
 def _decades(low: float, high: float) -> list[float]:

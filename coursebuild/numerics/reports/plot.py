@@ -45,17 +45,20 @@ from coursebuild.numerics.reports.points import (
     telling,
 )
 from coursebuild.numerics.reports.strokes import (
+    FINE,
+    HALO,
     INK,
     MARK,
     OWN,
     RING,
     SMALL,
+    area,
     colour,
     cross,
-    dash,
-    halo,
     key_mark,
+    label,
     leader,
+    line_look,
     path,
     ring,
     symbol,
@@ -132,7 +135,7 @@ class _Picture:
     def parts(self) -> Iterator[str]:
         """All parts, what lies below first."""
         frame = self.frame
-        lines, texts = grid(frame, frame.top, self.layout.titles, edge=14)
+        lines, texts = grid(frame, self.layout.titles)
         yield from self._band()
         yield from self._visible()
         yield path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"')
@@ -143,12 +146,14 @@ class _Picture:
             yield from self._lane(lane)
         for line in self.lines:
             if len(line.points) > 1:
-                yield self._line(line)
+                places = (self._place(point) for point in line.points)
+                d = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in places)
+                yield path(d, line_look(line.number, round_joins=True))
         for line in self.lines:
-            for point in line.points:
-                yield self._mark(line, point, MARK)
-            for point in line.others:
-                yield self._mark(line, point, SMALL)
+            for point, size in self._sized(line):
+                x, y = self._place(point)
+                full, title = self.report.rows[point.row].front, self._title(point)
+                yield symbol(line.number, x, y, size, full=full, title=title)
         if self.layout.wide:
             yield from self._names()
         else:
@@ -156,9 +161,17 @@ class _Picture:
         yield from self._own()
         yield from self._key(self.layout.key, self.layout.key_top + 12)
 
+    def _sized(self, line: PlotLine) -> Iterator[tuple[Point, float]]:
+        """Points of a line and beside it, with the sizes of their marks."""
+        yield from ((point, MARK) for point in line.points)
+        yield from ((point, SMALL) for point in line.others)
+
     def _place(self, point: Point) -> tuple[float, float]:
         assert point.error is not None
         return self.frame.x(point.cost), self.frame.y(max(point.error, 1e-300))
+
+    def _title(self, point: Point) -> str:
+        return point_title(self.report, self.layout.chart, point)
 
     def _band(self) -> Iterator[str]:
         """What the reference does not resolve."""
@@ -166,16 +179,11 @@ class _Picture:
             return
         frame, floor = self.frame, self.layout.chart.quantity.least
         top = frame.y(floor)
-        yield (
-            f'<path d="M{frame.left:.1f} {top:.1f}H{frame.right:.1f}V{frame.bottom:.1f}'
-            f'H{frame.left:.1f}Z" fill-opacity="0.09"/>'
-        )
+        d = f"M{frame.left:.1f} {top:.1f}H{frame.right:.1f}V{frame.bottom:.1f}H{frame.left:.1f}Z"
+        yield area(d, 'fill-opacity="0.09"')
         text = f"under {number_text(floor)}: not resolved by the reference"
         y = (top + frame.bottom) / 2 + 4 if frame.bottom - top >= 16 else top - 5
-        yield (
-            f'<text x="{frame.right - 6:.1f}" y="{y:.1f}" text-anchor="end" '
-            f'font-size="{TICK_SIZE:g}"{halo()}>{markup_text(text)}</text>'
-        )
+        yield label(frame.right - 6, y, text, f'text-anchor="end" {FINE} {HALO}')
 
     def _visible(self) -> Iterator[str]:
         """From where on a learner sees the error."""
@@ -185,10 +193,7 @@ class _Picture:
         look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
         yield path(f"M{frame.left:.1f} {y:.1f}H{frame.right:.1f}", look)
         box = self._visible_box()
-        yield (
-            f'<text x="{box.left:.1f}" y="{box.bottom - 3:.1f}" '
-            f'font-size="{TICK_SIZE:g}"{halo()}>{_VISIBLE}</text>'
-        )
+        yield label(box.left, box.bottom - 3, _VISIBLE, f"{FINE} {HALO}")
 
     def _visible_box(self) -> Box:
         """Where it says so: at an end of the line, above or below it, where it hides least."""
@@ -216,36 +221,18 @@ class _Picture:
         elif line.boundary is not None and self.layout.inside(line.boundary):
             end = frame.x(line.boundary)
         if end is not None:
-            yield (
-                f'<path d="M{frame.left:.1f} {y - 5:.1f}H{end:.1f}v10H{frame.left:.1f}Z" '
-                f'fill="{paint}" fill-opacity="0.2"/>'
-            )
+            d = f"M{frame.left:.1f} {y - 5:.1f}H{end:.1f}v10H{frame.left:.1f}Z"
+            yield area(d, f'fill="{paint}" fill-opacity="0.2"')
         if end is not None and line.stable:
             yield path(f"M{end:.1f} {y - 7:.1f}v14", f'stroke="{paint}" stroke-width="2"')
         for point in line.lost:
-            d = cross(frame.x(point.cost), y, 3.6)
-            title = markup_text(point_title(self.report, self.layout.chart, point))
+            title = markup_text(self._title(point))
             yield (
-                f'<path d="{d}" fill="none" stroke="{paint}" stroke-width="1.8">'
-                f"<title>{title}</title></path>"
+                f'<path d="{cross(frame.x(point.cost), y)}" fill="none" stroke="{paint}" '
+                f'stroke-width="1.8"><title>{title}</title></path>'
             )
         base = lane.top + 11 if lane.tall else y + 4
-        yield (
-            f'<text x="{frame.right:.1f}" y="{base:.1f}" text-anchor="end" '
-            f'font-size="{TICK_SIZE:g}"{halo()}>{markup_text(lane.text)}</text>'
-        )
-
-    def _line(self, line: PlotLine) -> str:
-        places = [self._place(point) for point in line.points]
-        d = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in places)
-        dashes = f' stroke-dasharray="{dash(line.number)}"' if dash(line.number) else ""
-        look = f'stroke="{colour(line.number)}" stroke-width="1.7" stroke-linejoin="round"{dashes}'
-        return path(d, look)
-
-    def _mark(self, line: PlotLine, point: Point, size: float) -> str:
-        x, y = self._place(point)
-        title = markup_text(point_title(self.report, self.layout.chart, point))
-        return symbol(line.number, x, y, size, full=self.report.rows[point.row].front, title=title)
+        yield label(frame.right, base, lane.text, f'text-anchor="end" {FINE} {HALO}')
 
     def _names(self) -> Iterator[str]:
         """Names of the lines at the right, each with a thin line to where its own ends."""
@@ -254,21 +241,17 @@ class _Picture:
             last = (*line.others, *line.points)[-1:]
             if last:
                 x, y = self._place(last[0])
-                ends.append((y, line.number, x, line))
-        ends.sort(key=lambda end: end[:2])
+                ends.append((y, line.number, x, self.layout.short(line.integrator)))
+        ends.sort()
         frame = self.frame
         places = apart([end[0] for end in ends], 17, frame.top + 4, frame.bottom - 4)
-        for (y, number, x, line), place in zip(ends, places, strict=True):
-            at = frame.right + _STEM
-            paint = colour(number)
+        at = frame.right + _STEM
+        for (y, number, x, name), place in zip(ends, places, strict=True):
             turn = max(frame.right, x + 7)
             d = f"M{x + 7:.1f} {y:.1f}L{turn:.1f} {y:.1f}L{at - 9:.1f} {place:.1f}"
-            yield path(d, f'stroke="{paint}" stroke-opacity="0.45" stroke-width="0.8"')
+            yield path(d, f'stroke="{colour(number)}" stroke-opacity="0.45" stroke-width="0.8"')
             yield symbol(number, at, place, MARK, full=True)
-            yield (
-                f'<text x="{at + 9:.1f}" y="{place + 4:.1f}" fill="{INK}">'
-                f"{markup_text(self.layout.short(line.integrator))}</text>"
-            )
+            yield label(at + 9, place + 4, name, f'fill="{INK}"')
 
     def _own(self) -> Iterator[str]:
         """A ring around the scene's own setting, and what it is."""
@@ -288,10 +271,8 @@ class _Picture:
             if not hidden:
                 break
         yield from leader((x, y), box)
-        yield (
-            f'<text x="{(box.left + box.right) / 2:.1f}" y="{box.bottom - 3.5:.1f}" fill="{OWN}" '
-            f'text-anchor="middle" font-weight="600"{halo()}>{markup_text(text)}</text>'
-        )
+        look = f'fill="{OWN}" text-anchor="middle" font-weight="600" {HALO}'
+        yield label((box.left + box.right) / 2, box.bottom - 3.5, text, look)
 
     def _own_place(self) -> tuple[float, float, int] | None:
         rows = self.report.rows
@@ -330,13 +311,9 @@ class _Picture:
     def _key(self, rows: Sequence[Sequence[tuple[str, str]]], top: float) -> Iterator[str]:
         """Marks and what they mean, in rows."""
         numbers = {line.integrator: line.number for line in self.lines}
-        start = self.frame.left if self.layout.wide else 6.0
         for index, row in enumerate(rows):
-            x, y = start, top + ROW * index
+            x, y = self.frame.left if self.layout.wide else 6.0, top + ROW * index
             for kind, text in row:
                 yield from key_mark(kind, numbers.get(kind), x + 14, y - 4)
-                yield (
-                    f'<text x="{x + 30:.1f}" y="{y:.1f}" font-size="{TICK_SIZE:g}">'
-                    f"{markup_text(text)}</text>"
-                )
+                yield label(x + 30, y, text, FINE)
                 x += entry_width(text)

@@ -1,7 +1,6 @@
-"""The strokes of a work–precision plot: marks, dashes, rings, paths, the paper around letters.
+"""The strokes of a work–precision plot: marks, dashes, rings, lines, letters.
 
-Entry points: `mark`, `dash`, `colour`, `cross`; `key_mark`, `symbol`, `leader`, `ring`, `path`,
-`halo`.
+Entry points: `dash`, `colour`, `symbol`, `key_mark`; `path`, `area`, `label`, `ring`, `leader`.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from coursebuild.core.drawing.marks import Box
+from coursebuild.core.drawing.marks import Box, markup_text
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4")
 _LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#2b6f9e", "#1e1e1c")
@@ -21,6 +20,25 @@ RING = 8.5
 OWN = "var(--rust, #86340c)"
 INK = "var(--ink, currentColor)"
 PAPER = "var(--paper, Canvas)"
+FINE = 'font-size="11"'
+"""Of texts other than names and titles."""
+HALO = f'stroke="{PAPER}" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'
+"""The paper around letters, so that lines below do not cross them."""
+
+
+def path(d: str, look: str) -> str:
+    """A line."""
+    return f'<path d="{d}" fill="none" {look}/>'
+
+
+def area(d: str, look: str) -> str:
+    """What is filled."""
+    return f'<path d="{d}" {look}/>'
+
+
+def label(x: float, y: float, text: str, look: str = "") -> str:
+    """Words at a place."""
+    return f'<text x="{x:.1f}" y="{y:.1f}"{look and f" {look}"}>{markup_text(text)}</text>'
 
 
 def colour(number: int) -> str:
@@ -29,9 +47,12 @@ def colour(number: int) -> str:
     return f"var(--trace-{n + 1}, {_LIGHT[n]})"
 
 
-def dash(number: int) -> str:
-    """The dashes of a line; empty where it is drawn through."""
-    return _DASHES[number % len(_DASHES)]
+def line_look(number: int, *, round_joins: bool = False) -> str:
+    """The colour, width and dashes of a line."""
+    dash = _DASHES[number % len(_DASHES)]
+    joins = ' stroke-linejoin="round"' if round_joins else ""
+    dashes = f' stroke-dasharray="{dash}"' if dash else ""
+    return f'stroke="{colour(number)}" stroke-width="1.7"{joins}{dashes}'
 
 
 def mark(number: int, x: float, y: float, size: float) -> str:
@@ -45,43 +66,21 @@ def mark(number: int, x: float, y: float, size: float) -> str:
         r = f"{size:g} {size:g} 0 1 0"
         return f"M{x - size:.1f} {y:.1f}a{r} {2 * size:g} 0a{r} {-2 * size:g} 0Z"
     radius = size * math.sqrt(2 * math.pi / (corners * math.sin(2 * math.pi / corners)))
-    places = []
-    for k in range(corners):
-        angle = math.radians(_TURNED[n] + 360 * k / corners)
-        places.append(f"{x + radius * math.cos(angle):.1f} {y + radius * math.sin(angle):.1f}")
+    angles = [math.radians(_TURNED[n] + 360 * k / corners) for k in range(corners)]
+    places = (f"{x + radius * math.cos(a):.1f} {y + radius * math.sin(a):.1f}" for a in angles)
     return "M" + "L".join(places) + "Z"
 
 
-def cross(x: float, y: float, size: float) -> str:
+def cross(x: float, y: float) -> str:
     """The path of a cross."""
-    s = size
+    s = 3.6
     return f"M{x - s:.1f} {y - s:.1f}l{2 * s:g} {2 * s:g}m0 {-2 * s:g}l{-2 * s:g} {2 * s:g}"
-
-
-def key_mark(kind: str, number: int | None, x: float, y: float) -> Iterator[str]:
-    """The mark that stands before an entry of the key."""
-    if number is not None:
-        dashes = f' stroke-dasharray="{dash(number)}"' if dash(number) else ""
-        look = f'stroke="{colour(number)}" stroke-width="1.7"{dashes}'
-        yield path(f"M{x - 13:.1f} {y:.1f}h26", look)
-        yield symbol(number, x, y, MARK, full=True)
-    elif kind == "own":
-        yield ring(x, y, 6)
-    elif kind == "lost":
-        yield path(cross(x, y, 3.6), f'stroke="{INK}" stroke-width="1.8"')
-    elif kind == "unstable":
-        yield f'<path d="M{x - 11:.1f} {y - 5:.1f}h20v10h-20Z" fill-opacity="0.2"/>'
-        yield path(f"M{x + 9:.1f} {y - 7:.1f}v14", f'stroke="{INK}" stroke-width="2"')
-    else:
-        size = SMALL if kind == "other" else MARK
-        full = INK if kind == "front" else PAPER
-        yield f'<path d="{mark(0, x, y, size)}" fill="{full}" stroke="{INK}" stroke-width="1.5"/>'
 
 
 def symbol(number: int, x: float, y: float, size: float, *, full: bool, title: str = "") -> str:
     """The mark of a setting; `full` where it is on the front."""
     paint = colour(number)
-    inner = f"<title>{title}</title>" if title else ""
+    inner = f"<title>{markup_text(title)}</title>" if title else ""
     return (
         f'<path d="{mark(number, x, y, size)}" fill="{paint if full else PAPER}" '
         f'stroke="{paint}" stroke-width="1.5">{inner}</path>'
@@ -105,11 +104,19 @@ def leader(at: tuple[float, float], box: Box) -> Iterator[str]:
         yield path(f"{start}L{near[0]:.1f} {near[1]:.1f}", f'stroke="{OWN}"')
 
 
-def path(d: str, look: str) -> str:
-    """A line."""
-    return f'<path d="{d}" fill="none" {look}/>'
-
-
-def halo() -> str:
-    """The paper around letters, so that lines below do not cross them."""
-    return f' stroke="{PAPER}" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'
+def key_mark(kind: str, number: int | None, x: float, y: float) -> Iterator[str]:
+    """The mark that stands before an entry of the key; `number` is that of a line."""
+    if number is not None:
+        yield path(f"M{x - 13:.1f} {y:.1f}h26", line_look(number))
+        yield symbol(number, x, y, MARK, full=True)
+    elif kind == "own":
+        yield ring(x, y, 6)
+    elif kind == "lost":
+        yield path(cross(x, y), f'stroke="{INK}" stroke-width="1.8"')
+    elif kind == "unstable":
+        yield area(f"M{x - 11:.1f} {y - 5:.1f}h20v10h-20Z", 'fill-opacity="0.2"')
+        yield path(f"M{x + 9:.1f} {y - 7:.1f}v14", f'stroke="{INK}" stroke-width="2"')
+    else:
+        full = INK if kind == "front" else PAPER
+        look = f'fill="{full}" stroke="{INK}" stroke-width="1.5"'
+        yield area(mark(0, x, y, SMALL if kind == "other" else MARK), look)
