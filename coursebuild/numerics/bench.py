@@ -157,7 +157,7 @@ def _timed(
     spent = costs(basis.model, basis.first, settings, own, clock, quick=quick)
     found = list(rows)
     for index, cost in zip(usable, spent, strict=True):
-        seconds = cost.step * 1e-9 * rows[index].steps
+        seconds = cost.least * 1e-9 * rows[index].steps
         found[index] = replace(
             rows[index],
             cost=cost.ratio,

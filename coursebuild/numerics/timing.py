@@ -1,7 +1,7 @@
 """What steps cost, relative to each other, on a machine that does other things too.
 
-Entry points: `timed(jobs, own, clock)`; `costs(model, first, settings, …)`, of settings of a scene;
-`time_ratio(whole, changed, …)`, of two models that do the same.
+Entry points: `timed(jobs, own, clock)`; `step_times(batches, own, clock)`, of steps; `costs(model,
+first, settings, …)`, of settings of a scene.
 
 1. A scene is run once, and its full state is kept at a few times: steps are timed from there, since
    what a step costs depends on what is going on (contacts, above all). A job is a batch of steps
@@ -25,12 +25,12 @@ import gc
 import math
 import statistics
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
 from coursebuild.numerics.engine import advance, initial_data, integrator_of, silent, varied
@@ -71,7 +71,7 @@ class Timing(Struct, frozen=True):
     uncertainty: float
     """Of the ratio, relative: its standard error, from parts of the rounds."""
     least: float
-    """Least time of one job, ns."""
+    """Least time of one job, or of one step, ns."""
     spread: float
     """Median over least time."""
     rounds: int
@@ -152,20 +152,60 @@ def _uncertainty(times: Sequence[float], own: Sequence[float]) -> float:
     return statistics.stdev(parts) / (math.sqrt(_PARTS) * middle)
 
 
-# --------------------------------------------------------------------------------- jobs that step
+# ------------------------------------------------------------------------------------------ steps
 
 
-class Cost(Struct, frozen=True):
-    """What a setting costs."""
+class Batch(Struct, frozen=True, eq=False):
+    """Steps whose time is measured: so many from each of some states of a model."""
 
-    ratio: float
-    """Time for the scenario, relative to the own setting's."""
-    uncertainty: float
-    """Of the ratio, relative."""
-    step: float
-    """Least time for a step, ns."""
-    spread: float
-    """Median over least of the repeated times."""
+    model: Any
+    data: Any
+    states: Sequence[Array]
+    steps: int
+    setting: MeasuredSetting | None = None
+    """What the model is given before; it is shared with other batches then."""
+
+    def job(self, times: int, *, begin_only: bool = False) -> Job:
+        """All of that so many times, or only what it takes to begin at the states."""
+        model, data, steps = self.model, self.data, 0 if begin_only else self.steps
+
+        def job() -> None:
+            if self.setting is not None:
+                apply(model, self.setting)
+            for _ in range(times):
+                for state in self.states:
+                    mujoco.mj_setState(model, data, state, STATE)
+                    mujoco.mj_step(model, data, steps)
+
+        return job
+
+    def repeats(self, clock: Clock) -> int:
+        """How often it is repeated, to take about as long as a job should."""
+        times = 1
+        while _once(self.job(times), clock) < _JOB and times < 1 << 12:
+            times *= 2
+        return times
+
+
+def step_times(
+    batches: Sequence[Batch], own: int, clock: Clock, *, quick: bool = False
+) -> tuple[Timing, ...]:
+    """Time for a step, and its ratio to that of number `own`."""
+    with silent():
+        repeats = [one.repeats(clock) for one in batches]
+        jobs = [one.job(times) for one, times in zip(batches, repeats, strict=True)]
+        idle = []
+        for one, times in zip(batches, repeats, strict=True):
+            begin = one.job(_EMPTY, begin_only=True)
+            idle.append(times * min(_once(begin, clock) for _ in range(7)) / _EMPTY)
+        found = timed(jobs, own, clock, idle=idle, most=_QUICK_MOST if quick else MOST)
+    counts = [
+        times * one.steps * len(one.states) for one, times in zip(batches, repeats, strict=True)
+    ]
+    return tuple(
+        replace(timing, ratio=timing.ratio * counts[own] / count, least=timing.least / count)
+        for timing, count in zip(found, counts, strict=True)
+    )
 
 
 def costs(
@@ -176,35 +216,27 @@ def costs(
     clock: Clock,
     *,
     quick: bool = False,
-) -> tuple[Cost, ...]:
-    """The costs of settings, of which number `own` is the scene's own."""
-    one = with_setting(model, chosen[own])
-    scenario = first.scene.scenario
+) -> tuple[Timing, ...]:
+    """What the scenario costs under some settings, relative to number `own` of them."""
+    one, scenario = with_setting(model, chosen[own]), first.scene.scenario
     data = initial_data(scenario, one)
     states = moments(one, data, scenario)
-    jobs, steps, repeats = [], [], []
-    with silent():
-        for setting in chosen:
-            count = _steps(model, first, setting)
-            made = partial(_job, one, data, states, count, setting=setting)
-            job, times = _lasting(made, clock)
-            jobs.append(job)
-            steps.append(count * times * len(states))
-            repeats.append(times)
-        begin = _beginning(_job(one, data, states, 0, _EMPTY, chosen[own]), clock)
-        idle = [begin * times for times in repeats]
-        found = timed(jobs, own, clock, idle=idle, most=_QUICK_MOST if quick else MOST)
-    ours = chosen[own].timestep * steps[own]
+    # Over the same time with every timestep, as far as that is little.
+    span = min(step_count(model) * first.scene.own, scenario.duration / _MOMENTS)
+    batches = []
+    for setting in chosen:
+        count = max(1, min(round(span / setting.timestep), step_count(model)))
+        batches.append(Batch(one, data, states, count, setting))
+    found = step_times(batches, own, clock, quick=quick)
     return tuple(
-        # A job's time, over the time that it simulates.
-        Cost(
-            timing.ratio / (count * setting.timestep / ours),
-            timing.uncertainty,
-            timing.least / count,
-            timing.spread,
-        )
-        for timing, setting, count in zip(found, chosen, steps, strict=True)
+        replace(timing, ratio=timing.ratio * chosen[own].timestep / setting.timestep)
+        for timing, setting in zip(found, chosen, strict=True)
     )
+
+
+def step_count(model: Any) -> int:
+    """Steps from each state, at most: fewer where they take long."""
+    return min(_MOST_STEPS, max(_FEWEST_STEPS, _COORDINATES // max(1, int(model.nv))))
 
 
 def subnormal(model: Any, first: Pilot) -> bool:
@@ -234,75 +266,3 @@ def full_state(model: Any, data: Any) -> Array:
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     return state
-
-
-class Stepped(Struct, frozen=True, eq=False):
-    """A model whose steps are timed, from some of its states."""
-
-    model: Any
-    data: Any
-    states: Sequence[Array]
-
-
-def time_ratio(whole: Stepped, changed: Stepped, clock: Clock, *, quick: bool) -> Timing | None:
-    """Time of a model over that of a changed one that does the same; `None` if it cannot be told.
-
-    Their states belong together, one by one.
-    """
-    if not whole.states:
-        return None
-    steps = min(_MOST_STEPS, max(_FEWEST_STEPS, _COORDINATES // max(1, int(whole.model.nv))))
-
-    def job(one: Stepped, times: int, count: int = steps) -> Job:
-        return _job(one.model, one.data, one.states, count, times)
-
-    with silent():
-        _, times = _lasting(lambda times: job(changed, times), clock)
-        jobs = [job(one, times) for one in (whole, changed)]
-        idle = [_beginning(job(one, _EMPTY, 0), clock) * times for one in (whole, changed)]
-        most = _QUICK_MOST if quick else MOST
-        found, own = timed(jobs, 1, clock, idle=idle, most=most)
-    return found if found.least > 0 and own.least > 0 else None
-
-
-def _lasting(made: Callable[[int], Job], clock: Clock) -> tuple[Job, int]:
-    """A job that takes about as long as it should, and how often it repeats what it does."""
-    times = 1
-    while True:
-        job = made(times)
-        if _once(job, clock) >= _JOB or times >= 1 << 12:
-            return job, times
-        times *= 2
-
-
-def _steps(model: Any, first: Pilot, setting: MeasuredSetting) -> int:
-    """Steps from each moment: over the same time with every timestep, as far as that is little."""
-    most = min(_MOST_STEPS, max(_FEWEST_STEPS, _COORDINATES // max(1, int(model.nv))))
-    span = min(most * first.scene.own, first.scene.scenario.duration / _MOMENTS)
-    return max(1, min(round(span / setting.timestep), most))
-
-
-def _job(
-    model: Any,
-    data: Any,
-    states: Sequence[Array],
-    steps: int,
-    times: int,
-    setting: MeasuredSetting | None = None,
-) -> Job:
-    """So many steps from each of the states, and all of that so many times."""
-
-    def job() -> None:
-        if setting is not None:
-            apply(model, setting)
-        for _ in range(times):
-            for state in states:
-                mujoco.mj_setState(model, data, state, STATE)
-                mujoco.mj_step(model, data, steps)
-
-    return job
-
-
-def _beginning(job: Job, clock: Clock) -> float:
-    """What it takes to begin at all states, without any step, ns."""
-    return min(_once(job, clock) for _ in range(7)) / _EMPTY

@@ -11,7 +11,7 @@ import pytest
 from coursebuild.numerics.pilot import pilot
 from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.timing import FEWEST, Job, Stepped, costs, full_state, time_ratio, timed
+from coursebuild.numerics.timing import FEWEST, Batch, Job, costs, full_state, step_times, timed
 
 
 class Machine:
@@ -120,15 +120,16 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
     found = costs(model, first, chosen, 4, machine.clock)
     expected = [price * 0.004 / h for price in (13 / 3, 1.0) for h in (0.008, 0.004, 0.001)]
     assert [one.ratio for one in found] == pytest.approx(expected, rel=1e-4)
-    assert [one.step for one in found] == pytest.approx([1300] * 3 + [300] * 3, rel=1e-4)
+    assert [one.least for one in found] == pytest.approx([1300] * 3 + [300] * 3, rel=1e-4)
 
 
 def test_a_model_beside_a_changed_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a clock that goes by the steps made, three times as fast for one model."""
     models = [mujoco.MjModel.from_xml_string(SPRING) for _ in range(2)]
+    datas = [mujoco.MjData(model) for model in models]
     whole, changed = (
-        Stepped(model, data, [full_state(model, data)])
-        for model, data in ((model, mujoco.MjData(model)) for model in models)
+        Batch(model, data, [full_state(model, data)], 64)
+        for model, data in zip(models, datas, strict=True)
     )
     machine, noise = Machine(), random.Random(0)
 
@@ -136,11 +137,8 @@ def test_a_model_beside_a_changed_one(monkeypatch: pytest.MonkeyPatch) -> None:
         machine.now += nstep * (3e5 if model is models[0] else 1e5) * noise.uniform(1.0, 1.02)
 
     monkeypatch.setattr(mujoco, "mj_step", step)
-    found = time_ratio(whole, changed, machine.clock, quick=False)
-    assert found is not None and found.ratio == pytest.approx(3.0, rel=0.02)
-    equal = time_ratio(whole, whole, machine.clock, quick=True)
-    assert equal is not None and equal.ratio == pytest.approx(1.0, abs=0.03)
-    assert time_ratio(whole, changed, lambda: 0, quick=True) is None
-    assert (
-        time_ratio(Stepped(models[0], whole.data, []), changed, machine.clock, quick=True) is None
-    )
+    found, _ = step_times((whole, changed), 1, machine.clock)
+    assert found.ratio == pytest.approx(3.0, rel=0.02)
+    equal, _ = step_times((whole, whole), 1, machine.clock, quick=True)
+    assert equal.ratio == pytest.approx(1.0, abs=0.03)
+    assert all(one.least == 0 for one in step_times((whole, changed), 1, lambda: 0, quick=True))

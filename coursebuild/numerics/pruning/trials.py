@@ -27,12 +27,13 @@ from coursebuild.numerics.reports.diet import Saving
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import (
     STATE,
+    Batch,
     Clock,
-    Stepped,
     Timing,
     full_state,
     moments,
-    time_ratio,
+    step_count,
+    step_times,
 )
 
 
@@ -170,7 +171,7 @@ class PruningTrials:
 
     def timing(self, trial: PruningTrial) -> Timing | None:
         """Time of the original over that of a changed model; `None` where it cannot be told."""
-        if self.clock is None:
+        if self.clock is None or not self._states:
             return None
         whole, model = self.text.model, trial.model
         data, other = mujoco.MjData(whole), mujoco.MjData(model)
@@ -180,10 +181,12 @@ class PruningTrials:
                 mujoco.mj_setState(whole, data, state, STATE)
                 transfer(whole, data, trial.index, model, other)
                 states.append(full_state(model, other))
-            one, two = Stepped(whole, data, self._states), Stepped(model, other, states)
-            return time_ratio(one, two, self.clock, quick=self.quick)
+            steps = step_count(whole)
+            batches = Batch(whole, data, self._states, steps), Batch(model, other, states, steps)
+            found, own = step_times(batches, 1, self.clock, quick=self.quick)
         except (ValueError, mujoco.FatalError):
             return None
+        return found if found.least > 0 and own.least > 0 else None
 
     @cached_property
     def _states(self) -> list[Any]:
