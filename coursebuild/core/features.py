@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # the layers above, of which a feature's functions take value
     from coursebuild.core.pages.library import Library
     from coursebuild.core.pages.page_inputs import PageInputs
     from coursebuild.core.pages.tools import Tools
+    from coursebuild.core.pages.urls import Place
     from coursebuild.core.scripts.dependencies import Inputs
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
@@ -67,6 +68,9 @@ class IndexReader(Protocol):
     def text(self, inlines: Iterable[Inline]) -> str:
         """A line of Markdown as text."""
 
+    def shown(self, block: FeatureBlock) -> Struct | None:
+        """The block's `values`, where its kind has some."""
+
 
 class MarkdownWriter(Protocol):
     """Writes a document as Markdown that every reader understands."""
@@ -84,6 +88,9 @@ class MarkdownWriter(Protocol):
 
     def inlines(self, inlines: tuple[Inline, ...]) -> str:
         """Inlines as Markdown in one line."""
+
+    def html(self, html: Markup) -> str:
+        """HTML of a template as Markdown."""
 
     def words(self, key: str, **values: str | int | float) -> str:
         """A text of the interface, as Markdown."""
@@ -109,6 +116,9 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """The block, and what is wrong in it. Without a block the text is shown as code."""
     nested: bool = False
     """Whether it may stand in a text of another block, where no lines can be updated."""
+    values: Callable[[Library, Place, B], Struct] | None = None
+    """What its page shows of the course beside the block, as `page.shown.blocks` has it by the
+    block's offset: the page is drawn again where this is another."""
     draw: Callable[[PageContext, B], Markup]
     """The block in a page."""
     markdown: Callable[[MarkdownWriter, B], str]

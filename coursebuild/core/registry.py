@@ -45,7 +45,7 @@ CORE_PAGES = ("home", "level", "lesson", "stub", "model", "page", "notfound")
 """The kinds of pages that every site has."""
 _FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
 """Folders of every site."""
-CORE_FENCES = ("bench", "mjcf", "python", "text")
+CORE_FENCES = ("mjcf", "python", "text")
 """The kinds of fences that the core reads."""
 
 _INSTALLED_BY = {

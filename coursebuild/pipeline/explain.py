@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from typing import Literal
 
 from coursebuild.core.model import (
-    Bench,
     Course,
     Document,
     ExampleTarget,
@@ -194,10 +193,7 @@ class _Explainer:
 def _uses(document: Document, path: str) -> Iterator[object]:
     """What in a document shows a file, links to it, or quotes its output."""
     for block in document_blocks(document):
-        models = block.models() if isinstance(block, FeatureBlock) else ()
-        if path in [f"models/{model}.xml" for model in models]:
-            yield block
-        if isinstance(block, Bench) and path in _shown_of(block.model):
+        if isinstance(block, FeatureBlock) and path in _shown_of(block):
             yield block
         for inline in walk_inlines(block_inlines(block)):
             match inline:
@@ -215,9 +211,11 @@ def _uses(document: Document, path: str) -> Iterator[object]:
                     pass
 
 
-def _shown_of(model: str) -> tuple[str, str]:
-    """The files of which a report on a model is shown."""
-    return f"models/{model}.xml", BENCH.path(model)
+def _shown_of(block: FeatureBlock) -> Iterator[str]:
+    """The models that a block shows or is about, and recorded reports on the latter."""
+    for model in (*block.models(), *block.mentioned_models()):
+        yield f"models/{model}.xml"
+    yield from map(BENCH.path, block.mentioned_models())
 
 
 def _local(url: str, document: Document, path: str) -> bool:

@@ -8,7 +8,7 @@ Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, mo
    what they name. A file that only other models include need not compile by itself.
 3. Scenarios that are declared for a model are held against it: what they name is there, states and
    commands have as many numbers as the model takes, and its timestep ends where the state is looked
-   at and commands change. Of a model that declares none, the scenarios that texts name.
+   at and commands change.
 """
 
 from __future__ import annotations
@@ -18,9 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.checks.benches import check_keyframes, declared_scenarios
 from coursebuild.core.model import (
-    Bench,
     Course,
     Declarations,
     DeclaredScenario,
@@ -84,8 +82,7 @@ def check_compiled(
     `readable` makes one line of a message of MuJoCo's.
     """
     blocks = (block for document in course.documents for block in document_blocks(document))
-    using = [block for block in blocks if isinstance(block, FeatureBlock | Bench)]
-    shown = {n for block in using if isinstance(block, FeatureBlock) for n in block.models()}
+    shown = {n for block in blocks if isinstance(block, FeatureBlock) for n in block.models()}
     found: list[Diagnostic] = []
     parts = _parts(course, models) - shown
     for model in course.models:
@@ -101,17 +98,13 @@ def check_compiled(
             facts[_place(text.block)] = result.facts
 
     def known(block: FeatureBlock) -> ModelFacts | None:
-        named = (models[name].facts for name in block.models() if name in models)
+        names = (*block.models(), *block.mentioned_models())
+        named = (models[name].facts for name in names if name in models)
         return next(named, None) or facts.get(_place(block))
 
     for feature in features():
         if feature.check_models is not None:
             found += feature.check_models(course, known)
-    for bench in (block for block in using if isinstance(block, Bench)):
-        compiled = models.get(bench.model)
-        undeclared = not declared_scenarios(course, bench.model)
-        if undeclared and compiled is not None and compiled.facts is not None:
-            found += check_keyframes(bench, compiled.facts)
     for declared in course.declarations:
         facts_of_model = models[declared.model].facts
         if facts_of_model is not None:

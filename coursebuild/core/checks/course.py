@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from coursebuild.core.checks.benches import bench_findings
 from coursebuild.core.checks.links import LinkTargets, document_links, link_targets
 from coursebuild.core.model import (
     Block,
@@ -46,7 +45,6 @@ def _document_findings(
     blocks = tuple(document_blocks(document))
     yield from _lesson_findings(course, document, blocks)
     yield from document_links(course, document, targets)
-    yield from bench_findings(blocks, course)
     yield from _term_findings(blocks, targets.terms)
 
 

@@ -232,23 +232,6 @@ class Mjcf(Struct, frozen=True):
     error_span: Span | None
 
 
-BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
-"""What of a report is shown."""
-
-
-class Bench(Struct, frozen=True):
-    """What was recorded of a model in one of its scenarios."""
-
-    span: Span
-    model: str
-    model_span: Span
-    scenario: str | None
-    """`None`: the first."""
-    scenario_span: Span | None
-    shows: tuple[BenchPart, ...]
-    """In the order in which it is shown."""
-
-
 class PlainCode(Struct, frozen=True):
     """A Python block without `file=`: shown, not run; `fragment` says that it need not parse."""
 
@@ -289,6 +272,10 @@ class FeatureBlock(Struct, frozen=True):
         """The names of the models in `models/` that it shows."""
         return ()
 
+    def mentioned_models(self) -> tuple[str, ...]:
+        """The names of models that it is about, and does not show."""
+        return ()
+
     def mjcf(self) -> Excerpt | None:
         """The text of a whole model that it holds, which is compiled with the course's."""
         return None
@@ -318,7 +305,6 @@ Block: TypeAlias = (
     | Script
     | Recording
     | Mjcf
-    | Bench
     | FeatureBlock
 )
 

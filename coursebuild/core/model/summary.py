@@ -3,8 +3,8 @@
 Entry point: `without_prose(document)`, a document of the same type whose walk (`document_blocks`,
 `document_inlines`) meets, in the same order, everything that somebody other than the document's own
 page looks at, or for which that page looks up something elsewhere: headings with their anchors,
-scripts, recorded outputs, bound numbers, labs, quizzes, MJCF, shown reports, callouts, links,
-terms, pictures, raw HTML.
+scripts, recorded outputs, bound numbers, blocks of features, MJCF, callouts, links, terms,
+pictures, raw HTML.
 
 1. Containers are opened, since nobody outside the page asks what stands in what.
 2. Of text only links, pictures, bound numbers and raw HTML stay. What links say is left out.
@@ -21,7 +21,6 @@ from typing import assert_never
 from msgspec.structs import replace
 
 from coursebuild.core.model.blocks import (
-    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -69,7 +68,7 @@ def _kept_of(block: Block) -> Iterator[Block]:
             yield from _text(block.span, _inlines(block))
         case Heading():
             yield replace(block, children=_inlines(block))
-        case Script() | Mjcf() | Bench() | HtmlBlock():
+        case Script() | Mjcf() | HtmlBlock():
             yield block
         case Recording():
             yield replace(block, caption=_inlines(block))

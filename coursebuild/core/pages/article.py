@@ -9,7 +9,6 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.model import (
-    Bench,
     Block,
     Document,
     FeatureBlock,
@@ -56,7 +55,7 @@ class _Group(Struct, frozen=True):
     after: tuple[Block, ...] = ()
 
 
-_WIDE = (Script, Recording, Mjcf, Bench, Table, HtmlBlock)
+_WIDE = (Script, Recording, Mjcf, Table, HtmlBlock)
 
 
 def _is_wide(block: Block) -> bool:

@@ -16,7 +16,6 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.model import (
-    Bench,
     Block,
     Callout,
     Document,
@@ -139,8 +138,6 @@ class PageContext(Struct, frozen=True):
                 return Markup() if joined else blocks.recording(self, block)
             case Mjcf():
                 return blocks.mjcf(self, block)
-            case Bench():
-                return _bench(self, block)
             case PlainCode():
                 return blocks.plain_code(self, block)
             case FeatureBlock():
@@ -169,12 +166,6 @@ class PageContext(Struct, frozen=True):
     def template(self, name: str, **values: object) -> Markup:
         """A filled-in template."""
         return self.tools.render(name, **values)
-
-
-def _bench(page: PageContext, block: Bench) -> Markup:
-    from coursebuild.core.pages.benches import bench  # which few lessons show
-
-    return bench(page, block)
 
 
 def _markup_words(words: Strings) -> Words:

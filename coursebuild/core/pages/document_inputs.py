@@ -11,7 +11,6 @@ from urllib.parse import urlsplit
 from msgspec import Struct
 
 from coursebuild.core.model import (
-    Bench,
     Block,
     Callout,
     Document,
@@ -31,7 +30,6 @@ from coursebuild.core.model import (
     document_blocks,
     local_file,
     resolve,
-    scenario_anchor,
     walk_inlines,
 )
 from coursebuild.core.model.results import Outcome, ScriptRun
@@ -40,12 +38,12 @@ from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import (
-    ShownBench,
     ShownCallout,
     ShownDocument,
     ShownRun,
     ShownVerdict,
 )
+from coursebuild.core.registry import kind_of_block
 
 
 def document_inputs(library: Library, place: urls.Place, document: Document) -> ShownDocument:
@@ -65,7 +63,7 @@ def document_inputs(library: Library, place: urls.Place, document: Document) -> 
         runs=page.runs(),
         verdicts=page.verdicts,
         trials=page.trials,
-        benches=page.benches,
+        blocks=page.blocks,
         keyframes=page.keyframes,
         address=urls.absolute(library.course, place.path),
     )
@@ -83,7 +81,7 @@ class _Page:
         self.callouts: dict[str, ShownCallout] = {}
         self.verdicts: dict[int, ShownVerdict] = {}
         self.trials: dict[int, Struct] = {}
-        self.benches: dict[int, ShownBench] = {}
+        self.blocks: dict[int, Struct] = {}
         self.keyframes: dict[str, tuple[str, ...]] = {}
         self.scripts: dict[str, set[int]] = {}
         """Paths of scripts, and the numbers of the lines that are quoted."""
@@ -95,8 +93,6 @@ class _Page:
                 self.scripts.setdefault(block.path, set())
             case Recording():
                 self._recording(block)
-            case Bench():
-                self.benches[block.span.start] = _shown_bench(self.library, self.place, block)
             case FeatureBlock():
                 self._feature(block)
             case Callout():
@@ -117,6 +113,9 @@ class _Page:
             self.verdicts[block.span.start] = ShownVerdict(verdict.status, verdict.comparison)
 
     def _feature(self, block: FeatureBlock) -> None:
+        values = kind_of_block(block).values
+        if values is not None:
+            self.blocks[block.span.start] = values(self.library, self.place, block)
         for script, line in block.quoted_lines():
             self.scripts.setdefault(script, set()).add(line)
         tried = self.library.tried.get((block.span.path, block.span.start))
@@ -154,26 +153,6 @@ def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
         for n in sorted(numbers)
     )
     return ShownRun(run.outcome, run.missing, tuple(asked))
-
-
-def _shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench:
-    """What the reports have for a block on a page."""
-    scene = library.reports.scenes.get(bench.model)
-    scenarios = () if scene is None else scene.scenarios
-    named = (one for one in scenarios if bench.scenario in (None, one.name))
-    report = next(named, None)
-    declared = {
-        one.name
-        for each in library.course.declarations
-        if each.model == bench.model
-        for one in each.scenarios
-    }
-    anchor = "measured"
-    if report is not None and report.name in declared:
-        anchor = scenario_anchor(report.name)
-    href = place.href(urls.model_page_path(bench.model), anchor)
-    machine = None if scene is None or report is None else scene.machine
-    return ShownBench(href, report, machine)
 
 
 def address(library: Library, place: urls.Place, path: str, target: Target) -> str:

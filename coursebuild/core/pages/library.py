@@ -17,7 +17,6 @@ from msgspec import Struct
 
 from coursebuild.core.features import PageKind, PublishedTrials
 from coursebuild.core.model import (
-    Bench,
     CalloutKind,
     Course,
     Document,
@@ -274,11 +273,12 @@ class NamedModels(Struct, frozen=True):
 def named_models(document: Document) -> NamedModels:
     """The models that a document may use."""
     blocks = tuple(document_blocks(document))
-    labs = {name for b in blocks if isinstance(b, FeatureBlock) for name in b.models()}
+    ours = [block for block in blocks if isinstance(block, FeatureBlock)]
+    labs = {name for block in ours for name in block.models()}
     scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
     targets = (i.target for i in document_inlines(document) if isinstance(i, Link))
     links = {target.name for target in targets if isinstance(target, ModelTarget)}
-    shown = {block.model for block in blocks if isinstance(block, Bench)}
+    shown = {name for block in ours for name in block.mentioned_models()}
     return NamedModels(frozenset(labs), frozenset(scripts), frozenset(links | shown))
 
 

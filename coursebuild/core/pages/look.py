@@ -12,7 +12,6 @@ from markupsafe import Markup
 from msgspec import Struct, field
 
 from coursebuild.core.model import (
-    Bench,
     Callout,
     FeatureBlock,
     Mjcf,
@@ -23,7 +22,7 @@ from coursebuild.core.model import (
     Target,
 )
 
-OwnBlock: TypeAlias = Bench | Callout | Mjcf | PlainCode | FeatureBlock | Recording | Script
+OwnBlock: TypeAlias = Callout | Mjcf | PlainCode | FeatureBlock | Recording | Script
 """The blocks that are more than Markdown."""
 
 

@@ -18,7 +18,6 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from coursebuild.core.model import (
-    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -192,7 +191,7 @@ class _Writer:
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case Table():
                 return self.table(block)
-            case Bench() | Callout() | Mjcf() | PlainCode():
+            case Callout() | Mjcf() | PlainCode():
                 return self.context.block(block)
             case Recording() | Script() | FeatureBlock():
                 return self.context.block(block)

@@ -20,7 +20,7 @@ from coursebuild.core.model import Comparison, Target
 from coursebuild.core.model.results import Outcome
 
 if TYPE_CHECKING:
-    from coursebuild.numerics.reports.bench import Machine, ScenarioReport
+    from coursebuild.numerics.reports.bench import ScenarioReport
 
 
 class ShownRun(Struct, frozen=True):
@@ -39,17 +39,6 @@ class ShownVerdict(Struct, frozen=True):
 
     status: Literal["verified", "drift", "volatile", "unchecked"]
     comparison: Comparison
-
-
-class ShownBench(Struct, frozen=True):
-    """What a page shows of a report."""
-
-    href: str
-    """Where the model's page shows the same."""
-    report: ScenarioReport | None
-    """`None` where none fits the course."""
-    machine: Machine | None
-    """Where it was measured."""
 
 
 class ShownCallout(Struct, frozen=True):
@@ -78,7 +67,8 @@ class ShownDocument(Struct, frozen=True):
     verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
     trials: Mapping[int, Struct] = field(default_factory=dict)
     """What features show of what was tried."""
-    benches: Mapping[int, ShownBench] = field(default_factory=dict)
+    blocks: Mapping[int, Struct] = field(default_factory=dict)
+    """What features show of the course beside their blocks."""
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
     address: str = ""

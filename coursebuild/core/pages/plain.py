@@ -12,7 +12,6 @@ from typing import assert_never
 from markupsafe import Markup
 
 from coursebuild.core.model import (
-    Bench,
     Callout,
     Document,
     ExampleTarget,
@@ -116,8 +115,6 @@ class PlainContext:
                 if isinstance(block.body, Table):
                     return caption + render_table(block.body, self, PLAIN)
                 return caption + self.code("text", block.body.text)
-            case Bench():
-                return Markup(f"<p>{escape(block.model)}</p>\n")
             case FeatureBlock():
                 return Markup(render_blocks(block.child_blocks(), self, PLAIN))
             case _:

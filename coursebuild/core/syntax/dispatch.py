@@ -1,31 +1,25 @@
 """What a fence becomes, by its kind.
 
-Entry point: `fence_block`. Scripts are read in `script`, and other fences by their features. Here
-are two kinds of the core:
+Entry point: `fence_block`. Scripts are read in `script`, and other fences by their features.
 
-- `mjcf`: a model or a fragment of one. Keys: `fragment="worldbody"` (where the fragment goes;
-  `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
-- `bench`: a recorded report on a model. The first word is the name of the model, as in a link
-  (`%20` is a space). Keys: `scenario=swing` (the first one without it), `show="plot,table"` (see
-  `SHOWN`).
+`mjcf` is a kind of the core, a model or a fragment of one. Keys: `fragment="worldbody"` (where the
+fragment goes; `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
 """
 
 from __future__ import annotations
 
 import re
-from urllib.parse import unquote
 
 from coursebuild.core.features import FenceKind
-from coursebuild.core.model import Bench, BenchPart, Block, CodeBlock, FeatureBlock, Mjcf, Script
+from coursebuild.core.model import Block, CodeBlock, FeatureBlock, Mjcf, Script
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import Fence, kind_doubts
-from coursebuild.core.syntax.info import FenceKeys, Word, kind_of
+from coursebuild.core.syntax.info import FenceKeys
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import stray_keys
 from coursebuild.core.syntax.script import parse_python
-from coursebuild.core.syntax.spans import trimmed
 from coursebuild.core.syntax.texts import TextParser
-from coursebuild.core.text.diagnostics import Note, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Note, diagnose
 
 _HEAD_RULES = frozenset(
     {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
@@ -45,8 +39,6 @@ def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block
             return fence.code()
         case "mjcf":
             return _mjcf(fence, session)
-        case "bench":
-            return _bench(fence, session)
         case name if (kind := fence_kind(name)) is not None:
             return _of_feature(kind, fence, session, texts)
         case _:
@@ -123,52 +115,3 @@ def _keys(
     keys = fence.keys(values=values, named=named)
     session.diagnostics += keys.diagnostics
     return keys.value, bool(keys.diagnostics)
-
-
-SHOWN: tuple[BenchPart, ...] = ("plot", "stable", "orders", "table")
-"""What of a report can be shown, in the order in which it is."""
-_DEFAULT: tuple[BenchPart, ...] = ("plot", "table")
-
-
-def _bench(fence: Fence, session: ParsingState) -> Bench | CodeBlock:
-    """A `bench` fence; one that says in a wrong way what to show is code."""
-    before = len(session.diagnostics)
-    keys, _ = _keys(fence, session, ("scenario", "show"), named=True)
-    if keys.name is None:
-        message = "a bench needs the name of a model"
-        help = "write `bench NAME`, with the name of a file in models/, without `.xml`"
-        place = kind_of(fence.info).span()
-        session.report(diagnose("fence-info", place, message, help=help))
-    show = keys.get("show")
-    shows = _DEFAULT if show is None else _shown(show, session)
-    body = trimmed(fence.body, " \t\n")
-    if body.text:
-        message = "a bench shows what was recorded, and has no text of its own"
-        help = "write the text before or after it"
-        place = body.span().first_line()
-        session.report(diagnose("bench-text", place, message, help=help))
-    if fence.nested:
-        return _nested(fence, session)
-    if keys.name is None or len(session.diagnostics) > before:
-        return fence.code()
-    return Bench(
-        fence.span,
-        unquote(keys.name.key),
-        keys.name.key_span,
-        keys.value("scenario"),
-        keys.place("scenario"),
-        shows,
-    )
-
-
-def _shown(show: Word, session: ParsingState) -> tuple[BenchPart, ...]:
-    """What to show, in the order of `SHOWN`."""
-    wanted = {part.text: part for part in reversed(show.parts()) if part.text}
-    for name, part in wanted.items():
-        if name not in SHOWN:
-            message, help = f"nothing of a report is called `{name}`", did_you_mean(name, SHOWN)
-            session.report(diagnose("fence-key-value", part.span(), message, help=help))
-    if not wanted:
-        message, help = "`show` names nothing", "for example `show=plot,table`"
-        session.report(diagnose("fence-key-value", show.value_span, message, help=help))
-    return tuple(name for name in SHOWN if name in wanted)

@@ -17,7 +17,6 @@ from collections.abc import Iterable
 from typing import Protocol, assert_never
 
 from coursebuild.core.model import (
-    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -125,7 +124,7 @@ def write_footnotes(footnotes: Iterable[Footnote], context: MarkdownContext) -> 
 
 
 _APART = (
-    *(HtmlBlock, Callout, PlainCode, Script, Recording, Mjcf, Bench, FeatureBlock),
+    *(HtmlBlock, Callout, PlainCode, Script, Recording, Mjcf, FeatureBlock),
     *(Table, MathBlock),
 )
 """Blocks that an empty line parts from others, even in a tight list."""
@@ -184,7 +183,7 @@ class _Writer:
                 return self._table(block)
             case Callout() | PlainCode() | Script() | Recording() | Mjcf():
                 return self.context.own(block)
-            case Bench() | FeatureBlock():
+            case FeatureBlock():
                 return self.context.own(block)
             case _:
                 assert_never(block)

@@ -12,10 +12,10 @@ import shlex
 from collections.abc import Callable
 from typing import assert_never
 
+from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.model import (
-    Bench,
     Block,
     Callout,
     FeatureBlock,
@@ -34,12 +34,12 @@ from coursebuild.core.pages.marks import (
     code_span,
     escaped,
     fence,
-    guarded,
     link,
     quoted,
 )
 from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.blocks import write_blocks, write_inlines
+from coursebuild.features.markdown.from_html import markdown_of
 
 
 class DocumentWriter(Struct, frozen=True):
@@ -90,8 +90,6 @@ class DocumentWriter(Struct, frozen=True):
                 return "" if joined else self.recording(block)
             case Mjcf():
                 return self._mjcf(block)
-            case Bench():
-                return self._bench(block)
             case FeatureBlock():
                 return kind_of_block(block).markdown(self, block)
             case _:
@@ -104,6 +102,10 @@ class DocumentWriter(Struct, frozen=True):
     def inlines(self, inlines: tuple[Inline, ...]) -> str:
         """Inlines as Markdown in one line."""
         return write_inlines(inlines, self)
+
+    def html(self, html: Markup) -> str:
+        """HTML of a template as Markdown."""
+        return markdown_of(str(html), self.locate)
 
     def words(self, key: str, **values: str | int | float) -> str:
         """A text of the interface, as Markdown."""
@@ -129,15 +131,6 @@ class DocumentWriter(Struct, frozen=True):
         if block.error is not None:
             receipt = f"*{self.words('mjcf.fails', engine=shown.engine)}* {code_span(block.error)}"
         return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
-
-    def _bench(self, block: Bench) -> str:
-        from coursebuild.core.pages.benches import bench_text  # few lessons show a report
-        from coursebuild.features.markdown.from_html import markdown_of
-
-        html, said = bench_text(self.page, block)
-        parts = [guarded(escaped(said))] if said else []
-        head, *rest = markdown_of(str(html), self.locate).split("\n\n")
-        return "\n\n".join((head, *parts, *rest))
 
     # --- scripts and outputs
 

@@ -65,9 +65,7 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
     if document is not None:
         known = inputs.shown or ShownDocument()
         labels = {kind: shown.label for kind, shown in known.callouts.items()}
-        reports = ((at, shown.report) for at, shown in known.benches.items())
-        measured = {at: one.title or one.name for at, one in reports if one is not None}
-        return document_sections(document, lead, labels, measured)
+        return document_sections(document, lead, labels, known.blocks)
     code = [v.text for v in inputs.values.values() if isinstance(v, Highlighted)]
     pieces = [SectionPiece("text", text) for text in lead if text]
     pieces += [SectionPiece("code", text) for text in code if text]

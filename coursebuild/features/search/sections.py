@@ -17,7 +17,6 @@ from typing import Literal, assert_never
 from msgspec import Struct
 
 from coursebuild.core.model import (
-    Bench,
     Block,
     BlockQuote,
     Callout,
@@ -84,7 +83,7 @@ def document_sections(
     document: Document,
     lead: Iterable[str],
     labels: Mapping[str, str],
-    measured: Mapping[int, str],
+    shown: Mapping[int, Struct],
 ) -> tuple[Section, ...]:
     """The sections of a document.
 
@@ -92,9 +91,9 @@ def document_sections(
         document: with its prose, not its summary.
         lead: paragraphs that stand above the document on its page.
         labels: of the kinds of callouts, by name.
-        measured: what the reports that it shows are about, by their offset.
+        shown: what features show of the course beside their blocks, by their offset.
     """
-    reader = SectionReader(labels, measured)
+    reader = SectionReader(labels, shown)
     for text in lead:
         reader.add("text", text)
     reader.blocks(document.blocks)
@@ -106,9 +105,9 @@ def document_sections(
 class SectionReader:
     """Collects the sections of a document."""
 
-    def __init__(self, labels: Mapping[str, str], measured: Mapping[int, str]) -> None:
+    def __init__(self, labels: Mapping[str, str], shown: Mapping[int, Struct]) -> None:
         self._labels = labels
-        self._measured = measured
+        self._shown = shown
         self._done: list[Section] = []
         self._begin("", "", 0)
 
@@ -132,6 +131,10 @@ class SectionReader:
     def also(self, name: str) -> None:
         """A name by which the section is found as well."""
         self._also[name] = None
+
+    def shown(self, block: FeatureBlock) -> Struct | None:
+        """What its page shows of the course beside a block."""
+        return self._shown.get(block.span.start)
 
     def blocks(self, blocks: Iterable[Block]) -> None:
         """Blocks in order."""
@@ -174,9 +177,6 @@ class SectionReader:
                     self._block(block.body)
                 else:
                     self.add("output", block.body.text)
-            case Bench():
-                self.also(block.model)
-                self.add("text", self._measured.get(block.span.start, ""))
             case FeatureBlock():
                 kind_of_block(block).index(self, block)
             case _:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.checks.benches import bench_findings, check_keyframes
-from coursebuild.core.model import Bench, document_blocks
+from coursebuild.features.bench.checks import check_benches, check_keyframes
 from coursebuild.numerics.reports.records import BENCH
 from support.made_courses import BOX, facts, make_course, said, told
 
@@ -15,7 +14,7 @@ def findings(info: str, declared: str = "", files: tuple[str, ...] = ()) -> list
     course = make_course(
         f"```bench {info}\n```\n", models={"box": BOX}, declared=named, files=files
     )
-    found = bench_findings(document_blocks(course.documents[0]), course)
+    found = tuple(check_benches(course, course.documents))
     return [f"{a}; {b}" for a, b in zip(told(found), said(found), strict=True)]
 
 
@@ -59,6 +58,5 @@ def test_keyframes_are_the_scenarios_of_a_model_that_declares_none(
     info: str, keyframes: tuple[str, ...], expected: list[str]
 ) -> None:
     course = make_course(f"```bench {info}\n```\n")
-    (bench,) = document_blocks(course.documents[0])
-    assert isinstance(bench, Bench)
-    assert told(check_keyframes(bench, facts(keyframes=keyframes))) == expected
+    found = check_keyframes(course, lambda _: facts(keyframes=keyframes))
+    assert told(found) == expected

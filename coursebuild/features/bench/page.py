@@ -1,6 +1,7 @@
 """A recorded report in a text: the plot of a scenario, its tables, and where it was measured.
 
-Entry points: `bench`, the block as HTML; `bench_text`, as what a Markdown file is made from.
+Entry points: `shown_bench`, what the page shows of the course; `draw_bench`, `bench_markdown`,
+`index_bench`.
 
 What is shown is what the page of the model shows. Where no report fits the course, the block says
 so, with the command that makes one.
@@ -14,14 +15,29 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import Bench, document_blocks
+from coursebuild.core.model import document_blocks, scenario_anchor
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.figures import Grid, again, where
-from coursebuild.core.pages.page_inputs import ShownBench
+from coursebuild.core.pages.marks import escaped, guarded
 from coursebuild.core.pages.scenarios import scenario_view
+from coursebuild.features.bench.model import Bench
 
 if TYPE_CHECKING:
+    from coursebuild.core.features import IndexReader, MarkdownWriter
     from coursebuild.core.pages.context import PageContext
-    from coursebuild.numerics.reports.bench import ScenarioReport
+    from coursebuild.core.pages.library import Library
+    from coursebuild.numerics.reports.bench import Machine, ScenarioReport
+
+
+class ShownBench(Struct, frozen=True):
+    """What a page shows of a report."""
+
+    href: str
+    """Where the model's page shows the same."""
+    report: ScenarioReport | None
+    """`None` where none fits the course."""
+    machine: Machine | None
+    """Where it was measured."""
 
 
 class BenchView(Struct, frozen=True):
@@ -42,26 +58,58 @@ class BenchView(Struct, frozen=True):
     where: str = ""
 
 
-def bench(page: PageContext, block: Bench) -> Markup:
-    """A recorded report."""
-    return page.template("blocks/bench.html", bench=_view(page, block), plots=_plots(page, block))
+def shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench:
+    """What the reports have for a block on a page."""
+    scene = library.reports.scenes.get(bench.model)
+    scenarios = () if scene is None else scene.scenarios
+    named = (one for one in scenarios if bench.scenario in (None, one.name))
+    report = next(named, None)
+    declared = {
+        one.name
+        for each in library.course.declarations
+        if each.model == bench.model
+        for one in each.scenarios
+    }
+    anchor = "measured"
+    if report is not None and report.name in declared:
+        anchor = scenario_anchor(report.name)
+    href = place.href(urls.model_page_path(bench.model), anchor)
+    machine = None if scene is None or report is None else scene.machine
+    return ShownBench(href, report, machine)
 
 
-def bench_text(page: PageContext, block: Bench) -> tuple[Markup, str]:
-    """The block without its plot, and what is to be seen in the plot."""
+def draw_bench(page: PageContext, block: Bench) -> Markup:
+    """The report on a page."""
+    return page.template("bench/bench.html", bench=_view(page, block), plots=_plots(page, block))
+
+
+def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
+    """The report without its plot, and what is to be seen in the plot."""
     from coursebuild.numerics.reports.points import chart, described, telling
 
-    report = _shown(page, block).report
+    page, report = writer.page, _shown(writer.page, block).report
     quantity = None if report is None or "plot" not in block.shows else telling(report)
-    said = ""
+    html = page.template("bench/bench.html", bench=_view(page, block), plots=())
+    head, *rest = writer.html(html).split("\n\n")
     if report is not None and quantity is not None:
         silent = replace(report, verdict=replace(report.verdict, text=""))  # the block says it
         said = ". ".join(described(silent, chart(report, quantity)))
-    return page.template("blocks/bench.html", bench=_view(page, block), plots=()), said
+        rest.insert(0, guarded(escaped(said)))
+    return "\n\n".join((head, *rest))
+
+
+def index_bench(reader: IndexReader, block: Bench) -> None:
+    """The model, and what happened to it."""
+    reader.also(block.model)
+    shown = reader.shown(block)
+    if isinstance(shown, ShownBench) and shown.report is not None:
+        reader.add("text", shown.report.title or shown.report.name)
 
 
 def _shown(page: PageContext, block: Bench) -> ShownBench:
-    return page.shown.benches[block.span.start]
+    shown = page.shown.blocks[block.span.start]
+    assert isinstance(shown, ShownBench)
+    return shown
 
 
 def _view(page: PageContext, block: Bench) -> BenchView:
@@ -92,7 +140,7 @@ def _plots(page: PageContext, block: Bench) -> tuple[Markup, ...]:
     """The plot, for wide and for narrow screens; their ids are numbered through the page."""
     from coursebuild.core.pages.draw import plots  # which draws pages, and so blocks
 
-    report: ScenarioReport | None = _shown(page, block).report
+    report = _shown(page, block).report
     if report is None or "plot" not in block.shows:
         return ()
     places = [b.span.start for b in document_blocks(page.document) if isinstance(b, Bench)]

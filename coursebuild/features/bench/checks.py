@@ -1,0 +1,65 @@
+"""Shown reports against the course: the model exists, has the scenario, and was measured.
+
+Entry points: `check_benches`; `check_keyframes`, for the scenarios of models that declare none,
+which are known where the compiled model is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+
+from coursebuild.core.model import Course, Document, FeatureBlock, document_blocks
+from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.model.scenarios import keyframe_scenarios
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.features.bench.model import Bench
+
+
+def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+    """What is wrong with the reports that documents show, as far as the course tells."""
+    for document in documents:
+        for block in document_blocks(document):
+            if isinstance(block, Bench):
+                yield from _check(block, course)
+
+
+def check_keyframes(
+    course: Course, facts_of: Callable[[FeatureBlock], ModelFacts | None]
+) -> Iterator[Diagnostic]:
+    """What is wrong with scenarios of models that declare none: their keyframes are scenarios."""
+    for document in course.documents:
+        for block in document_blocks(document):
+            if isinstance(block, Bench) and not _declared(course, block.model):
+                facts = facts_of(block)
+                if facts is not None:
+                    yield from _check_scenario(block, keyframe_scenarios(facts.keyframes))
+
+
+def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
+    from coursebuild.numerics.reports.records import BENCH  # which most courses do not need
+
+    models = [model.name for model in course.models]
+    if bench.model not in models:
+        message, help = f"no model `{bench.model}` in models/", did_you_mean(bench.model, models)
+        yield diagnose("bench-model", bench.model_span, message, help=help)
+        return
+    declared = _declared(course, bench.model)
+    if declared:
+        yield from _check_scenario(bench, declared)
+    if BENCH.path(bench.model) not in course.files:
+        message = f"nothing was recorded of the model `{bench.model}`, so the page says so"
+        help = f"measure it with `{BENCH.command(bench.model)}`"
+        yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
+
+
+def _declared(course: Course, model: str) -> tuple[str, ...]:
+    """The scenarios that stand beside a model, by name."""
+    found = (one for one in course.declarations if one.model == model)
+    return tuple(scenario.name for one in found for scenario in one.scenarios)
+
+
+def _check_scenario(bench: Bench, names: Collection[str]) -> Iterator[Diagnostic]:
+    if bench.scenario is not None and bench.scenario not in names:
+        message = f"the model `{bench.model}` has no scenario `{bench.scenario}`"
+        help = did_you_mean(bench.scenario, names)
+        yield diagnose("bench-scenario", bench.scenario_span or bench.span, message, help=help)

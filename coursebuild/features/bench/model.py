@@ -1,0 +1,33 @@
+"""A recorded report that a text shows."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from coursebuild.core.model import FeatureBlock
+from coursebuild.core.text.source import Span
+
+BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
+"""What of a report is shown."""
+PARTS: tuple[BenchPart, ...] = ("plot", "stable", "orders", "table")
+"""In the order in which they are shown."""
+
+
+class Bench(FeatureBlock, frozen=True):
+    """What was recorded of a model in one of its scenarios."""
+
+    model: str
+    model_span: Span
+    scenario: str | None
+    """`None`: the first."""
+    scenario_span: Span | None
+    shows: tuple[BenchPart, ...]
+    """In the order in which it is shown."""
+
+    def summary(self) -> Bench:
+        """All of it."""
+        return self
+
+    def mentioned_models(self) -> tuple[str, ...]:
+        """The one that was measured."""
+        return (self.model,)

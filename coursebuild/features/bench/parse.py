@@ -1,0 +1,53 @@
+"""From a `bench` fence to a `Bench`.
+
+Entry point: `parse_bench`. The first word is the name of the model, as in a link (`%20` is a
+space). Keys: `scenario=swing` (the first one without it), `show="plot,table"` (see `PARTS`).
+"""
+
+from __future__ import annotations
+
+from urllib.parse import unquote
+
+from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.info import Word, kind_of
+from coursebuild.core.syntax.spans import trimmed
+from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
+from coursebuild.features.bench.model import PARTS, Bench, BenchPart
+
+_DEFAULT: tuple[BenchPart, ...] = ("plot", "table")
+
+
+def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
+    """The block; none of a fence that says in a wrong way what to show."""
+    parsed = fence.keys(values=("scenario", "show"), named=True)
+    keys, wrong = parsed.value, list(parsed.diagnostics)
+    if keys.name is None:
+        message = "a bench needs the name of a model"
+        help = "write `bench NAME`, with the name of a file in models/, without `.xml`"
+        wrong.append(diagnose("fence-info", kind_of(fence.info).span(), message, help=help))
+    show = keys.get("show")
+    shows = _DEFAULT if show is None else _parts(show, wrong)
+    body = trimmed(fence.body, " \t\n")
+    if body.text:
+        message = "a bench shows what was recorded, and has no text of its own"
+        help = "write the text before or after it"
+        wrong.append(diagnose("bench-text", body.span().first_line(), message, help=help))
+    if keys.name is None or wrong:
+        return Parsed(None, tuple(wrong))
+    model, place = unquote(keys.name.key), keys.name.key_span
+    scenario, scenario_place = keys.value("scenario"), keys.place("scenario")
+    return Parsed(Bench(fence.span, model, place, scenario, scenario_place, shows))
+
+
+def _parts(show: Word, wrong: list[Diagnostic]) -> tuple[BenchPart, ...]:
+    """What to show, in the order of `PARTS`."""
+    wanted = {part.text: part for part in reversed(show.parts()) if part.text}
+    for name, part in wanted.items():
+        if name not in PARTS:
+            message, help = f"nothing of a report is called `{name}`", did_you_mean(name, PARTS)
+            wrong.append(diagnose("fence-key-value", part.span(), message, help=help))
+    if not wanted:
+        message, help = "`show` names nothing", "for example `show=plot,table`"
+        wrong.append(diagnose("fence-key-value", show.value_span, message, help=help))
+    return tuple(name for name in PARTS if name in wanted)
