@@ -51,6 +51,7 @@ _LIBRARIES = (
     "mdurl",
     "mini_racer",
     "msgspec",
+    "pint",
     "pygments",
     "segno",
     "selectolax",

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from msgspec import Struct
 
 from coursebuild.core.model import Label, Meaning
+from coursebuild.core.syntax.units import check_unit
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt
 
@@ -67,13 +68,13 @@ def folded(text: str) -> str:
 
 def _read(
     content: Excerpt, braces: Braces, keys: tuple[str, ...], rule: str, help: str
-) -> dict[str, str | None] | Diagnostic:
+) -> dict[str, Excerpt | None] | Diagnostic:
     """The values by key; `None` for a key alone."""
     place = content.span(braces.start, braces.end)
     if not braces.closed:
         return diagnose(rule, place, "the braces are never closed", help=help)
     text = content.text
-    found: dict[str, str | None] = {}
+    found: dict[str, Excerpt | None] = {}
     at, end = braces.start + 1, braces.end - 1
     while text[at:end].strip():
         pair = _PAIR.match(text, at, end)
@@ -86,8 +87,8 @@ def _read(
             return diagnose(rule, span, f"`{key}` is no key here", help=near or help)
         if key in found:
             return diagnose(rule, span, f"`{key}` is given twice", help=help)
-        value = pair[2] if pair[2] is not None else pair[3]
-        found[key] = None if value is None else folded(value)
+        value = pair.lastindex or 1
+        found[key] = content.slice(*pair.span(value)) if value > 1 else None
         at = pair.end()
     return found
 
@@ -98,12 +99,12 @@ def read_term(content: Excerpt, braces: Braces, report: Report) -> str | None:
     if isinstance(found, Diagnostic):
         report(found)
         return None
-    name = found.get("term")
-    if name == "":
+    given = found.get("term")
+    if given is not None and not given.text.strip():
         place = content.span(braces.start, braces.end)
         report(diagnose("term-attribute", place, "the name of the term is empty", help=_TERM_HELP))
         return None
-    return name or ""
+    return _text(given)
 
 
 def read_meaning(content: Excerpt, braces: Braces, report: Report) -> Meaning | None:
@@ -113,11 +114,18 @@ def read_meaning(content: Excerpt, braces: Braces, report: Report) -> Meaning | 
     if isinstance(found, Diagnostic):
         report(found)
         return None
-    if not found.get("symbol") or found.get("unit", "none") in (None, ""):
-        missing = "unit is empty" if found.get("symbol") else "meaning of the symbol is missing"
+    meaning, unit = _text(found.get("symbol")), _text(found.get("unit"))
+    if not meaning or ("unit" in found and not unit):
+        missing = "unit is empty" if meaning else "meaning of the symbol is missing"
         report(diagnose("symbol-attribute", place, f"the {missing}", help=_SYMBOL_HELP))
         return None
-    return Meaning(place, found["symbol"] or "", found.get("unit") or "")
+    for wrong in check_unit(found["unit"]) if unit and found["unit"] is not None else ():
+        report(wrong)
+    return Meaning(place, meaning, unit)
+
+
+def _text(value: Excerpt | None) -> str:
+    return "" if value is None else folded(value.text)
 
 
 def read_label(content: Excerpt, braces: Braces, report: Report) -> Label | None:

@@ -107,6 +107,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("term-repeated", "error", "Two places of the course define the same term."),
     ("symbol-attribute", "error", "What a symbol stands for cannot be read."),
     ("symbol-formula", "error", "Something is declared as a symbol that is not a single one."),
+    ("unit-unknown", "error", "The unit of a quiz's answer or of a symbol is none that there is."),
     ("symbol-repeated", "warning", "A text says twice what a symbol stands for."),
     (
         "table-cells",

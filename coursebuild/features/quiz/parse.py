@@ -23,6 +23,7 @@ from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
+from coursebuild.core.syntax.units import check_unit
 from coursebuild.core.syntax.wording import JSON
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span
@@ -142,6 +143,8 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
             if fields.answer == 0 and fields.tol is None:
                 message = "`tol` is missing: of an answer that is 0 it cannot be a share"
                 yield diagnose("field-missing", node.place("answer"), message)
+            if isinstance(unit := node.get("unit"), StringNode):
+                yield from check_unit(unit.excerpt)
         case OrderFields():
             yield from _check_distinct(node, "items", "two items are the same: `{}`")
         case _:

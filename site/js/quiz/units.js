@@ -60,6 +60,11 @@ const UNITS = {
   au: [149597870700, { m: 1 }, false],
   bar: [1e5, { kg: 1, m: -1, s: -2 }, true],
   atm: [101325, { kg: 1, m: -1, s: -2 }, false],
+  in: [0.0254, { m: 1 }, false],
+  ft: [0.3048, { m: 1 }, false],
+  mi: [1609.344, { m: 1 }, false],
+  lb: [0.45359237, { kg: 1 }, false],
+  psi: [6894.757293168361, { kg: 1, m: -1, s: -2 }, false],
   kgf: [9.80665, { kg: 1, m: 1, s: -2 }, false],
   cal: [4.184, { kg: 1, m: 2, s: -2 }, true],
   Å: [1e-10, { m: 1 }, false],
@@ -80,6 +85,7 @@ const NAMES = {
   sec: 's', secs: 's', second: 's', seconds: 's', minute: 'min', minutes: 'min', hour: 'h', hours: 'h', hr: 'h', day: 'd', days: 'd',
   newton: 'N', newtons: 'N', joule: 'J', joules: 'J', watt: 'W', watts: 'W', pascal: 'Pa', pascals: 'Pa', hertz: 'Hz',
   volt: 'V', volts: 'V', ampere: 'A', amperes: 'A', coulomb: 'C', coulombs: 'C', tesla: 'T', ohms: 'Ω', litre: 'l', liter: 'l',
+  inch: 'in', inches: 'in', foot: 'ft', feet: 'ft', mile: 'mi', miles: 'mi', pound: 'lb', pounds: 'lb',
   litres: 'l', liters: 'l', percent: '%', Kg: 'kg', KG: 'kg', hz: 'Hz', HZ: 'Hz', Rad: 'rad', Deg: '°', Nm: 'N m',
 }
 

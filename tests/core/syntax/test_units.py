@@ -1,0 +1,78 @@
+"""Units that there are, and those that an author surely did not mean."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+from coursebuild.core.syntax.units import COMMON, check_unit
+from coursebuild.core.text.source import Excerpt, Source
+
+USUAL = (
+    *(
+        "",
+        "1",
+        "1/s²",
+        "kg m^2",
+        "kg·m²",
+        "kg.m^2",
+        "N m/rad",
+        "m/s^{2}",
+        "m s^-2",
+        "m s⁻¹",
+        "m / s",
+    ),
+    *("J/(kg K)", "kg m²/(s K)", "m^(1/2)", "°", "°C", "%", "°/s", "kHz"),
+)
+SELDOM = (
+    "sec",
+    "metres",
+    "ft",
+    "psi",
+    "eV",
+    "Å",
+    "rev/min",
+    "rpm",
+    "turn",
+    "Nm",
+    "µm",
+    "\u2126",
+    "‰",
+)
+WRONG = ("(m", "m//s", "m^", "m**2", "2 m", "9**9**9 m", "m^99999999", "$", "m" * 200, "1/", "/")
+
+
+def told(unit: str) -> list[str]:
+    source = Source("lesson.md", unit)
+    return [f"{d.span.text}: {d.help}" for d in check_unit(Excerpt.of_span(source.span()))]
+
+
+def test_units_that_there_are() -> None:
+    assert {unit: told(unit) for unit in (*USUAL, *SELDOM) if told(unit)} == {}
+
+
+def test_what_is_no_unit_is_told_with_the_likely_one() -> None:
+    likely = {
+        **{"mtr": "m", "metr": "m", "radd/s": "rad", "rads": "rad", "KG": "kg", "hz": "Hz"},
+        **{"kgm²": "kg m", "secnd": "s", "Newtons": "N"},
+    }
+    for unit, meant in likely.items():
+        assert [one.partition(": ")[2] for one in told(unit)] == [f"did you mean `{meant}`?"], unit
+    assert told("strides") == ["strides: leave it out, and say in words what is counted"]
+    assert [unit for unit in WRONG if not told(unit)] == []
+
+
+def test_common_units_are_known_to_pint_which_is_not_asked() -> None:
+    from pint import UnitRegistry
+
+    registry = UnitRegistry()  # type: ignore[var-annotated]
+    assert [unit for unit in COMMON if unit not in registry] == []
+    code = (
+        "import json, sys\n"
+        "from coursebuild.core.syntax.units import check_unit\n"
+        "from coursebuild.core.text.source import Source\n"
+        "for unit in json.loads(sys.argv[1]): list(check_unit(Source('a', unit).excerpt()))\n"
+        "assert 'pint' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code, json.dumps([*USUAL, *COMMON])], check=True)
