@@ -123,6 +123,10 @@ class _Loader:
         )
         self.found += self.parser.check(course)
         self.found += _check_engine(course)
+        for package in course.packages:
+            if not (self.root / package.path).is_dir():
+                message = f"there is no folder `{package.path}`"
+                self.found.append(diagnose("field-value", package.span, message))
         return course
 
     def _map(self) -> Course | None:

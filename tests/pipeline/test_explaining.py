@@ -265,3 +265,54 @@ def test_explaining_changes_nothing_and_imports_little(course: Folder) -> None:
     assert done.stdout.splitlines()[-1] == "[]"
     after = {p: p.read_bytes() for p in course.root.rglob("*") if p.is_file()}
     assert after == before
+
+
+PACKAGED = """
+import os
+from pathlib import Path
+
+import mjcourse
+from pkg.part import word
+
+try:
+    import torch
+except ImportError:
+    pass
+Path("runs/a").mkdir(parents=True, exist_ok=True)
+Path("runs/a/word.txt").write_text(word)
+print(word, mjcourse.__name__, mjcourse.OWN, os.environ["FAST"])
+"""
+
+
+def test_scripts_import_from_the_folders_of_the_course(make: Make) -> None:
+    """Before ours; these count, like the variables that the course sets."""
+    output = "word mjcourse True 1"
+    folder = make("## A\n\n" + block("a.py", PACKAGED, output, info="writes=runs/ requires=pkg"))
+    folder.write("src/pkg/__init__.py", "")
+    folder.write("src/pkg/part.py", 'word = "word"\n')
+    folder.write("src/mjcourse/__init__.py", "OWN = True\n")
+    plain = folder.text("content/course.toml")
+    ours = plain.replace("[course]\n", '[course]\npackages = ["src", "gone"]\n')
+    folder.write("content/course.toml", f'{ours}\n[verify]\nenv = {{FAST = "1", PATH = "x"}}\n')
+    done = folder.main("check")
+    assert "there is no folder `gone`" not in done.out  # the map cannot be read yet
+    assert "`PATH` cannot be set for scripts" in done.out
+    folder.replace("content/course.toml", ', PATH = "x"', "")
+    assert "error[field-value]: there is no folder `gone`" in folder.main("check").out
+    folder.replace("content/course.toml", ', "gone"', "")
+    assert ran(folder) == ["a"]
+    assert folder.main("check").status == 0, folder.main("check").out
+    assert ran(folder) == []
+    for path, old, new in (
+        ("src/pkg/part.py", '"word"', '"word" ""'),
+        ("content/course.toml", 'FAST = "1"', 'FAST = "2"'),
+        ("content/course.toml", '["src"]', '["src/pkg", "src"]'),
+        ("content/lessons/1.1-one.md", "writes=runs/", "writes=runs,out"),
+    ):
+        folder.replace(path, old, new)
+        assert ran(folder) == ["a"], new
+        folder.replace(path, new, old)
+        assert ran(folder) == [], old
+    assert folder.text("runs/a/word.txt") == "word"
+    folder.replace(folder.lesson(), "writes=runs/ ", "")
+    assert ran(folder) == ran(folder) == ["a"], "it writes into the project"

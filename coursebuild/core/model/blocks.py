@@ -155,6 +155,8 @@ class Script(Struct, frozen=True):
     """Whether a simulation in it is to be lost."""
     deep: bool = False
     """Whether bodies in it are to lie deep in each other."""
+    writes: tuple[str, ...] = ()
+    """Folders of the project that it may write into."""
 
 
 class Mode(enum.Enum):

@@ -95,7 +95,7 @@ class Silence(Struct, frozen=True):
     path: str | None
 
 
-class CourseFeature(Struct, frozen=True):
+class NamedPath(Struct, frozen=True):
     """A feature of the course's own: a Python file of the project."""
 
     path: str
@@ -128,7 +128,11 @@ class Course(Struct, frozen=True):
     to the root."""
     declarations: tuple[Declarations, ...] = ()
     """What `models/NAME.toml` say, each of a model that is there."""
-    features: tuple[CourseFeature, ...] = ()
+    features: tuple[NamedPath, ...] = ()
+    packages: tuple[NamedPath, ...] = ()
+    """Folders that scripts import from before all others but their own."""
+    environment: tuple[tuple[str, str], ...] = ()
+    """Variables of the environment of scripts, sorted."""
     id: str = ""
     """Names the course where its title may change; see `key`."""
 

@@ -47,6 +47,12 @@ class ScriptJob(Struct, frozen=True):
     perturbation: int = 0
     """From 1: its initial states are moved a little, in one of several directions; 0: they are
     not."""
+    packages: tuple[str, ...] = ()
+    """Folders of the project that it imports from, after its own and before all others."""
+    environment: tuple[tuple[str, str], ...] = ()
+    """Variables that the course sets."""
+    writes: tuple[str, ...] = ()
+    """Folders of the project that it may write into."""
 
 
 class Sign(enum.Enum):

@@ -228,7 +228,7 @@ class _Work:
         self.root = root
         self.jobs = jobs
         self.tell = tell
-        self.environment = _environment(place)
+        self.environment = _environment(place) | dict(jobs[0].environment if jobs else ())
         self.library = library_folder() if place is None else place.packages
         self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
@@ -241,8 +241,10 @@ class _Work:
         self.done = 0
         self.told: set[int] = set()
         """The jobs whose start was told."""
-        paths = (self.root / jobs[index].path for index in self.waiting)
-        self.packages = wanted_packages(paths) if self.waiting else ()
+        folders = {self.root / folder for job in jobs for folder in job.packages}
+        files = [file for folder in folders for file in folder.rglob("*.py")]
+        files += [self.root / jobs[index].path for index in self.waiting]
+        self.packages = wanted_packages(files) if self.waiting else ()
 
     def next(self, worker: Worker) -> None:
         """Hand over the next job, if there is one."""
@@ -289,6 +291,8 @@ class _Work:
             "environment": self.environment,
             "scratch": self.scratch,
             "library": self.library,
+            "folders": [f"{self.root}/{folder}" for folder in job.packages],
+            "writes": [f"{self.root}/{folder}" for folder in job.writes],
             "perturbation": job.perturbation,
         }
         return json.dumps(request).encode()

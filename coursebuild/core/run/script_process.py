@@ -48,6 +48,10 @@ class Job(TypedDict):
     """Where the script's temporary folder is made; it goes when the last supervisor does."""
     library: str
     """A folder to import `mjcourse` from, where it is not installed."""
+    folders: list[str]
+    """Folders of the project to import from before."""
+    writes: list[str]
+    """Folders of the project that the script may write into."""
     perturbation: int
     """The direction in which initial states are moved (`initial_state_perturbation`); 0: none."""
 
@@ -214,7 +218,8 @@ class ScriptProcess:
         if "PYTHONPATH" in self._environment:
             installed += library_folders(self.job["root"], self.job["library"])
         root, temporary = self.job["root"], self._environment["TMPDIR"]
-        return Tracer(root, temporary, installed, self._notes, self._sink)
+        writable = self.job["writes"]
+        return Tracer(root, temporary, installed, self._notes, self._sink, writable)
 
 
 def report_error(error: BaseException) -> None:

@@ -137,7 +137,7 @@ class _Supervisor:
         self.reports = reports
         self.may_fork = may_fork
         self.preloaded = Preloaded()
-        self.has_library = not missing_modules(["mjcourse"], None, "")
+        self.has_library = not missing_modules(["mjcourse"], [], "")
         """Whether scripts find `mjcourse` without being told where."""
         self.awake, wake = os.pipe()
         os.set_blocking(self.awake, False)
@@ -164,14 +164,16 @@ class _Supervisor:
 
     def _serve(self, job: Job) -> tuple[ChildReport, bytes, bytes, bytes] | ScriptProcess:
         folder_of_script = Path(job["root"], job["path"]).parent
-        missing = missing_modules(job["requires"], folder_of_script, job["library"])
+        path = [str(folder_of_script), *job["folders"]]
+        missing = missing_modules(job["requires"], path, job["library"])
         if missing:
             return _report("missing", missing=missing), b"", b"", b""
         if not os.path.isfile(f"{job['root']}/{job['path']}"):  # noqa: PTH113 (here time counts)
             return _unstartable(f"there is no file {job['path']}\n")
         environment = dict(job["environment"])
-        if not self.has_library:
-            environment["PYTHONPATH"] = job["library"]
+        path = job["folders"] if self.has_library else [*job["folders"], job["library"]]
+        if path:
+            environment["PYTHONPATH"] = os.pathsep.join(path)
         if self.may_fork:
             self.preloaded.load(job["packages"])
         folder = ""
@@ -250,9 +252,12 @@ class _Supervisor:
 
 
 def _beside(job: Job) -> frozenset[str]:
-    """What stands in the script's folder, as names of modules."""
-    folder = os.path.dirname(f"{job['root']}/{job['path']}")  # noqa: PTH120 (here time counts)
-    return frozenset(name.partition(".")[0] for name in os.listdir(folder))  # noqa: PTH208
+    """What stands where the script looks first, as names of modules."""
+    found: set[str] = set()
+    for folder in (os.path.dirname(f"{job['root']}/{job['path']}"), *job["folders"]):  # noqa: PTH120
+        with contextlib.suppress(OSError):
+            found.update(name.partition(".")[0] for name in os.listdir(folder))  # noqa: PTH208
+    return frozenset(found)
 
 
 def _spawn(start: _Start, prepare: Callable[[], None]) -> int:
@@ -285,12 +290,12 @@ def _has_threads() -> bool:
     return True
 
 
-def missing_modules(names: Sequence[str], folder: Path | None, library: str) -> list[str]:
-    """Which of these modules a script in `folder` could not import; none is imported."""
+def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) -> list[str]:
+    """Which of these modules a script could not import that looks in `folders` first."""
     if not names:
         return []
     importlib.invalidate_caches()
-    path = [*([str(folder)] if folder else []), *sys.path, *([library] if library else [])]
+    path = [*folders, *sys.path, *([library] if library else [])]
     return [name for name in names if not _exists(name, path)]
 
 

@@ -35,6 +35,7 @@ import posix
 import site
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from importlib.machinery import PathFinder
 from types import FrameType
 from typing import Protocol
 
@@ -91,7 +92,7 @@ class Tracer:
 
     `root` and `temporary` are absolute; `installed` are the folders of Python and its packages.
     Records go to the sink; without one, and from processes that the script forks, to files in
-    `overflow`.
+    `overflow`. `writable` are folders that the script may write into.
     """
 
     def __init__(
@@ -101,6 +102,7 @@ class Tracer:
         installed: Iterable[str],
         overflow: str,
         sink: Sink | None,
+        writable: Iterable[str] = (),
     ) -> None:
         self.root = root.rstrip("/") + "/"
         self.temporary = temporary.rstrip("/") + "/"
@@ -118,6 +120,7 @@ class Tracer:
         self.has_mujoco = True
         """Whether MuJoCo tells of the files that it opens, if it is imported."""
         self._sink = sink
+        self._writable = tuple(f"{folder}/" for folder in writable)
         self._overflow = overflow
         self._pid = posix.getpid()
         self._busy = False
@@ -196,7 +199,7 @@ class Tracer:
             self._note(f"m{name}")
             if name == "mujoco" and not self.has_mujoco:
                 self.opaque(UNSEEN_MUJOCO)
-            if name in _READS_UNSEEN:
+            if name in _READS_UNSEEN and PathFinder.find_spec(name) is not None:
                 self.opaque(f"{name}, which it imports, opens files in native code")
 
     def write(self, path: object) -> None:
@@ -205,7 +208,7 @@ class Tracer:
         if at is None:
             return
         self._written.add(at)
-        if not self.by_import():
+        if not f"{at}/".startswith(self._writable or ("\0",)) and not self.by_import():
             self.opaque(WRITES if at.startswith(self.root) else WRITES_OUTSIDE)
 
     def library(self, path: object) -> None:

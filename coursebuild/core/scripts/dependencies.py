@@ -102,8 +102,14 @@ class Inputs(Struct, frozen=True):
 def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) -> Inputs:
     """What is known of a job whose file holds this text."""
     digest = hashlib.sha256(text).hexdigest()
+    more = [(f"environment variable {name}", value) for name, value in job.environment]
+    if job.packages:
+        more.append(("packages of the course", " ".join(job.packages)))
+    if job.writes:
+        more.append(("folders that it may write into", " ".join(job.writes)))
     if job.perturbation:
-        around = tuple(sorted((*around, (_PERTURBATION, str(job.perturbation)))))
+        more.append((_PERTURBATION, str(job.perturbation)))
+    around = tuple(sorted((*around, *more)))
     return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, around)
 
 

@@ -25,6 +25,8 @@ class Extraction(Struct, frozen=True):
     script: Script
     owner: str
     """The id of the lesson or page that it stands in."""
+    packages: tuple[str, ...] = ()
+    environment: tuple[tuple[str, str], ...] = ()
 
     @property
     def path(self) -> str:
@@ -70,9 +72,11 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     found: list[Diagnostic] = []
     files: dict[str, Extraction] = {}
     folders: dict[str, Extraction] = {}
+    packages = tuple(package.path for package in course.packages)
     for owner, document in owners(course):
         for script in document_scripts(document):
-            extraction, key = Extraction(script, owner), _key(script.path)
+            extraction = Extraction(script, owner, packages, course.environment)
+            key = _key(script.path)
             clash = _clash(extraction, files, folders)
             if clash is None:
                 files[key] = extraction
@@ -92,8 +96,18 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
     """What to run; with initial states moved, which takes longer, in the direction of a number."""
     patience = _PATIENCE if perturbation else 1.0
     return tuple(
-        ScriptJob(s.path, s.args, s.timeout * patience, s.requires, s.norun, perturbation)
-        for s in (extraction.script for extraction in extractions)
+        ScriptJob(
+            each.path,
+            each.script.args,
+            each.script.timeout * patience,
+            each.script.requires,
+            each.script.norun,
+            perturbation,
+            each.packages,
+            each.environment,
+            each.script.writes,
+        )
+        for each in extractions
     )
 
 

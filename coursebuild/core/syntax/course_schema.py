@@ -57,6 +57,13 @@ FeaturePath: TypeAlias = Annotated[
         extra={"expects": "a Python file in `features/`, as in `features/tabs.py`"},
     ),
 ]
+FolderPath: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^[\w-]+(/[\w-]+)*$",
+        extra={"expects": "a folder of the course, as in `src`"},
+    ),
+]
 
 
 class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -81,6 +88,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         tuple[FeaturePath, ...],
         Meta(description="features of the course's own, as files in `features/`"),
     ] = ()
+    packages: Annotated[
+        tuple[FolderPath, ...],
+        Meta(description="folders that scripts import from, before installed packages"),
+    ] = ()
 
 
 class FilterTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -103,6 +114,7 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
         False
     )
     filter: tuple[FilterTable, ...] = ()
+    env: Annotated[dict[str, str], Meta(description="variables of the environment of scripts")] = {}
 
 
 class CalloutTable(Struct, frozen=True, forbid_unknown_fields=True):

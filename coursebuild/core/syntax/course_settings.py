@@ -25,6 +25,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
 
+_VARIABLE = re.compile(r"(?!PYTHON|PATH$|TMPDIR$)[A-Za-z_][A-Za-z0-9_]*")
 _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
@@ -36,6 +37,12 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             yield from _check_verify(node, fields)
         for node, _ in decoding.each(verify.objects("filter"), FilterTable):
             yield from _check_filter(node)
+        variables = verify.get("env")
+        for member in variables.members if isinstance(variables, ObjectNode) else ():
+            if not _VARIABLE.fullmatch(member.key.value):
+                message = f"{named(member.key.value)} cannot be set for scripts"
+                help = "expected: a name of your own, as in `FAST`"
+                yield diagnose("field-value", member.key.span, message, help=help)
     callouts = root.get("callouts")
     for member in callouts.members if isinstance(callouts, ObjectNode) else ():
         if not _CALLOUT.fullmatch(member.key.value):

@@ -20,10 +20,10 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from coursebuild.core.model import (
     Course,
-    CourseFeature,
     Filter,
     Lesson,
     Level,
+    NamedPath,
     Page,
     Silence,
     Status,
@@ -112,14 +112,16 @@ def _course(
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
-        features=_features(table, about.features),
+        features=_paths(table, "features", about.features),
+        packages=_paths(table, "packages", about.packages),
+        environment=tuple(sorted(verify.env.items())),
     )
 
 
-def _features(table: Node | None, paths: tuple[str, ...]) -> tuple[CourseFeature, ...]:
-    array = table.get("features") if isinstance(table, ObjectNode) else None
+def _paths(table: Node | None, field: str, paths: tuple[str, ...]) -> tuple[NamedPath, ...]:
+    array = table.get(field) if isinstance(table, ObjectNode) else None
     items = array.items if isinstance(array, ArrayNode) else ()
-    return tuple(CourseFeature(p, item.span) for p, item in zip(paths, items, strict=True))
+    return tuple(NamedPath(p, item.span) for p, item in zip(paths, items, strict=True))
 
 
 # --------------------------------------------------------------------------- levels and lessons

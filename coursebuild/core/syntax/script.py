@@ -1,7 +1,7 @@
 """Python blocks: scripts that are extracted and run, and code that is only shown.
 
-Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun`, `diverges` of a
-script; `fragment` of code that need not parse.
+Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun`, `diverges`,
+`writes` of a script; `fragment` of code that need not parse.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ DEFAULT_TIMEOUT = 60.0
 LONGEST_TIMEOUT = 86400.0
 """Seconds."""
 
-_VALUES = ("timeout", "requires", "args")
+_VALUES = ("timeout", "requires", "args", "writes")
 _FLAGS = ("norun", "diverges", "deep")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
@@ -33,6 +33,8 @@ _SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"
     "test",
     "this",
 }
+_FOLDER = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
+_OURS = ("content", "models", "examples", "features", "public")
 _ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
@@ -71,6 +73,7 @@ def _script(
     timeout = _timeout(keys.get("timeout"), diagnostics)
     requires = _modules(keys.get("requires"), diagnostics)
     args = _arguments(keys.get("args"), diagnostics)
+    writes = _folders(keys.get("writes"), diagnostics)
     if wrong:
         return None
     return Script(
@@ -86,6 +89,7 @@ def _script(
         fence.body_span,
         keys.get("diverges") is not None,
         keys.get("deep") is not None,
+        writes,
     )
 
 
@@ -137,6 +141,20 @@ def _arguments(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, .
         message = f"the arguments cannot be split: {str(error).lower()}"
         diagnostics.append(diagnose("fence-key-value", word.value_span, message))
         return ()
+
+
+def _folders(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
+    folders = []
+    for part in () if word is None else word.parts():
+        folder = part.text.rstrip("/")
+        first = folder.partition("/")[0]
+        if _FOLDER.fullmatch(folder) and first not in _OURS:
+            folders.append(folder)
+            continue
+        message = f"`{part.text}` is not a folder that a script may write into"
+        help = "name a folder of the project that holds nothing else, for example `writes=runs/`"
+        diagnostics.append(diagnose("fence-key-value", part.span(), message, help=help))
+    return tuple(folders)
 
 
 def path_mistake(path: str) -> str:
