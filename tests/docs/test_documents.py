@@ -76,7 +76,7 @@ def test_the_mistake_of_the_readme(course: Folder) -> None:
     done = course.main("check")
     assert done.status == 1
     assert "error[binding-mismatch]" in done.out
-    assert "help: write `4.915`" in done.out
+    assert "the nearest printed value is 4.9148" in done.out
 
 
 def shell_lines(path: Path) -> list[str]:
