@@ -5,6 +5,7 @@
  *   boot('')            → ''             compiles and starts the engine; ends before the next call
  *   booted('')          → version        or throws why it did not start
  *   trial(requestJson)  → replyJson
+ *   lookUp(pathsJson)   → JSON           what of `data.qpos` and the like exists, with the model in 'mjb'
  *   trying('')          → JSON           for a trial that was stopped from outside: `stuck`, the entry whose code may never return, or
  *                                        `null`, and `trying`, the entry that was tried
  */
@@ -15,6 +16,7 @@ import { createEngine } from './lab/core/engine.js'
 import { current } from './lab/core/piece.js'
 import { fromBase64 } from './lab/trial/base64.js'
 import { Guard } from './lab/trial/guard.js'
+import { lookUp } from './lab/trial/names.js'
 import { runTrial, stuck } from './lab/trial/trial.js'
 
 const buffers = new Map()
@@ -56,5 +58,7 @@ globalThis.trial = (json) => {
   const reply = runTrial(engine, request, bytes, () => performance.now(), guard)
   return JSON.stringify({ ...reply, printed: printed.slice(0, 100) })
 }
+
+globalThis.lookUp = (json) => JSON.stringify(lookUp(engine, new Uint8Array(buffers.get('mjb')), JSON.parse(json)))
 
 globalThis.trying = () => JSON.stringify({ stuck: stuck(performance.now()), trying: current.trying ?? [] })

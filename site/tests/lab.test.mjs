@@ -264,7 +264,6 @@ test('errors of lab code name their entry', (t) => {
 test('values of the wrong kind are told', (t) => {
   for (const [value, kind] of [
     [undefined, 'undefined'],
-    [null, 'null'],
     [[1, 2], 'an array of 2'],
     [new Float64Array(3), 'an array of 3'],
     [{}, 'an object'],

@@ -54,3 +54,9 @@ test('cleared, it begins anew', () => {
   assert.equal(history.last, 0)
   assert.equal(filled(history, 10).length, 10)
 })
+
+test('a value that is no finite number interrupts its line', () => {
+  const history = new History(2, null)
+  ;[[1, 2], [NaN, 3], [Infinity, 4]].forEach((values, i) => history.push(i, values, 0))
+  assert.deepEqual(history.data(), [[0, 1, 2], [1, null, null], [2, 3, 4]])
+})

@@ -39,7 +39,7 @@ test('what is no number is said', () => {
   assert.equal(formatNumber(Infinity, 3), '∞')
   assert.equal(formatNumber(-Infinity, 3), '−∞')
   assert.equal(formatReadout('stuck', 3), 'stuck')
-  assert.equal(formatReadout(undefined, 3), '–')
+  for (const nothing of [undefined, null, NaN]) assert.equal(formatReadout(nothing, 3), '–')
 })
 
 test('labels, times, ratios', () => {

@@ -141,7 +141,7 @@ test('each way to be wrong, with its entry', () => {
     [{ readouts: READOUT }, { readouts: ['0 / 0'] }, [['readouts.0.expr', 'nan', 'is NaN', 0]]],
     [{ readouts: READOUT }, { readouts: ['1 / (0.1 - Math.min(0.1, data.time))'] }, [['readouts.0.expr', 'nan', 'is Infinity', 0.1]]],
     [{ plots: [plot(2)] }, { plots: [['1', '"x"']] }, [['plots.0.traces.1.expr', 'type', 'gives the text "x", not a number', 0]]],
-    [{ plots: [plot(1)] }, { plots: [['NaN']] }, [['plots.0.traces.0.expr', 'nan', 'is NaN', 0]]],
+    [{ plots: [plot(1)] }, { plots: [['Math.sqrt(-1)']] }, [['plots.0.traces.0.expr', 'nan', 'is NaN', 0]]],
     [
       { expect: [{ after: [], t: 1, min: 0, max: null }] },
       { expect: ['data.qpos[2]'] },
@@ -214,6 +214,34 @@ test('bodies deep in each other are noticed, of which MuJoCo does not warn', () 
 test('bodies that the author has put into each other are not remarked on before a step', () => {
   const inside = PRESS.replace('pos="0 0 .1"', 'pos="0 0 -.2"')
   assert.deepEqual(attempt(inside, {}, { setup: 'data.qpos[0] = -.1', controller: 'data.qpos[0] = 1' }, { seconds: 0.1 }).failures, [])
+})
+
+test('a value that is not there is `null`, or written as it is', () => {
+  const late = (value) => `data.time > 0.1 ? 1 : ${value}`
+  const reply = attempt(
+    PENDULUM,
+    { readouts: [...READOUT, ...READOUT, ...READOUT], plots: [plot(2)] },
+    { readouts: ['null', 'NaN', '-Infinity'], plots: [[late('null'), late('Infinity')]] },
+    { seconds: 0.2 },
+  )
+  assert.deepEqual(told(reply), [])
+  const { readouts } = JSON.parse(JSON.stringify(reply.main.pictures[1]))
+  assert.deepEqual(readouts, [null, null, '−∞'])
+  const [gap, infinite] = JSON.parse(JSON.stringify(reply.main.plots.plots))[0]
+  assert.deepEqual([gap[0], gap.at(-1), infinite[0], infinite.at(-1)], [null, 1, null, 1])
+})
+
+test('a lab that is to diverge proves it, and nothing of a time after it', () => {
+  const blow = 'data.qvel[0] *= 10 ** (1e6 * data.time)'
+  const claim = (t, diverges) => ({ after: [], t, min: diverges ? null : -1e300, max: null, diverges })
+  const expect = [claim(0, false), claim(1, true), claim(2, false)]
+  const reply = attempt(PENDULUM, { expect }, { setup: 'data.qvel[0] = 1', controller: blow, expect: ['data.time', '0', 'data.time'] })
+  const failures = told(reply).map(([entry, kind]) => [entry, kind])
+  assert.deepEqual(failures, [['', 'diverged'], ['expect.1', 'diverged'], ['expect.2', 'diverged']])
+  assert.ok(reply.main.diverged && reply.main.parity.steps > 0)
+  const sound = attempt(PENDULUM, { expect: [claim(0.1, true)] }, { expect: ['0'] })
+  assert.deepEqual(told(sound).map(([entry, kind]) => [entry, kind]), [['expect.0', 'expect']])
+  assert.equal(sound.main.diverged, false)
 })
 
 test('a state that is no number can be drawn, even in the first picture that has something to draw', () => {

@@ -242,14 +242,19 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     # labs
     ("lab-kind", "error", "A lab is of an unknown kind."),
     ("lab-model", "error", "A lab names a model that is not in models/."),
-    ("lab-name", "error", "A lab names a keyframe, site, control or button that does not exist."),
+    (
+        "lab-name",
+        "error",
+        "A lab or its code names something that does not exist, as a keyframe, a control or "
+        "`data.qps`.",
+    ),
     (
         "lab-code",
         "error",
         "A piece of a lab's code is no JavaScript.",
     ),
     ("lab-throws", "error", "A piece of a lab's code ends with an exception."),
-    ("lab-value", "error", "An expression of a lab gives no finite number and no string."),
+    ("lab-value", "error", "An expression of a lab gives no number, or none that is finite."),
     ("lab-warning", "error", "MuJoCo raised a warning while a lab was tried."),
     ("lab-diverged", "error", "The simulation of a lab diverges."),
     (

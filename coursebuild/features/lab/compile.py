@@ -86,7 +86,8 @@ def _pieces(lab: Lab) -> Iterator[LabCode]:
         for j, trace in enumerate(plot.traces):
             yield LabCode(("plots", i, "traces", j, "expr"), "expression", trace.expr)
     for i, claim in enumerate(lab.fields.expect):
-        yield LabCode(("expect", i, "expr"), "expression", claim.expr)
+        if claim.expr is not None:
+            yield LabCode(("expect", i, "expr"), "expression", claim.expr)
 
 
 def compile_lab(lab: Lab, name: str) -> LabModule:
@@ -110,7 +111,8 @@ def _members(lab: Lab) -> Iterator[tuple[str, str]]:
         for i, plot in enumerate(fields.plots)
     )
     yield "plots", _list(plots)
-    yield "expect", _list(functions["expect", i, "expr"] for i in range(len(fields.expect)))
+    claims = (functions.get(("expect", i, "expr"), "null") for i in range(len(fields.expect)))
+    yield "expect", _list(claims)
 
 
 def _list(items: Iterator[str]) -> str:
@@ -149,8 +151,8 @@ def config_json(lab: Lab, name: str) -> str:
         "readouts": [{"label": r.label, "digits": r.digits} for r in fields.readouts],
         "plots": [_plot_data(plot) for plot in fields.plots],
         "expect": [
-            {"after": claim.steps, "t": claim.t, "min": claim.min, "max": claim.max}
-            for claim in fields.expect
+            {"after": c.steps, "t": c.t, "min": c.min, "max": c.max, "diverges": c.diverges}
+            for c in fields.expect
         ],
     }
     data = to_builtins(config)

@@ -17,7 +17,7 @@ SIMLAB = "simlab"
 """The kind of a lab that names none."""
 Entry: TypeAlias = tuple[str | int, ...]
 """The way to a value inside the lab's JSON: `("controls", 2, "set")`."""
-_NAMED_BY = {"controls": ("set", "apply", "run", "label"), "expect": ("expr",)}
+_NAMED_BY = {"controls": ("set", "apply", "run", "label"), "expect": ("expr", "diverges")}
 """By which of its values an object in a list is pointed at."""
 
 
@@ -35,6 +35,8 @@ class Lab(FeatureBlock, frozen=True):
     xml: Excerpt | None = None
     places: tuple[tuple[Entry, Span], ...] = ()
     """Where each value of the JSON stands."""
+    code: tuple[tuple[Entry, Excerpt], ...] = ()
+    """The pieces of JavaScript in it."""
 
     @property
     def verify(self) -> Verify:

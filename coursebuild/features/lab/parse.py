@@ -27,6 +27,9 @@ from coursebuild.features.lab.model import SIMLAB, Entry, Lab
 from coursebuild.features.lab.relations import check_lab
 from coursebuild.features.lab.schema import CommonLab, SimLab
 
+_CODE = ("setup", "controller", "set", "apply", "run", "expr")
+"""Fields that hold JavaScript."""
+
 
 def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
     """The lab of a fence; its kind may stand after the word `lab`."""
@@ -81,11 +84,16 @@ def sim_lab(
         fields=fields,
         note=prose.blocks(node.get("note")),
         xml=xml.excerpt if isinstance(xml, StringNode) else None,
-        places=tuple(_places(node, ())),
+        places=tuple((way, value.mark) for way, value in _values(node, ())),
+        code=tuple(
+            (way, value.excerpt)
+            for way, value in _values(node, ())
+            if isinstance(value, StringNode) and way[-1] in _CODE
+        ),
     )
 
 
-def _places(node: Node, way: Entry) -> Iterator[tuple[Entry, Span]]:
+def _values(node: Node, way: Entry) -> Iterator[tuple[Entry, Node]]:
     """Every value inside a node, with the way to it."""
     parts: list[tuple[str | int, Node]] = []
     if isinstance(node, ObjectNode):
@@ -93,5 +101,5 @@ def _places(node: Node, way: Entry) -> Iterator[tuple[Entry, Span]]:
     elif isinstance(node, ArrayNode):
         parts = list(enumerate(node.items))
     for name, value in parts:
-        yield (*way, name), value.mark
-        yield from _places(value, (*way, name))
+        yield (*way, name), value
+        yield from _values(value, (*way, name))

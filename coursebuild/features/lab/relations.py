@@ -112,7 +112,13 @@ def _check_expect(
     claim = structs.get(node)
     if not isinstance(claim, Expect):
         return
-    yield from one_of(node, Expect, ("min", "max"), only=False)
+    yield from one_of(node, Expect, ("expr", "diverges"))
+    if claim.expr is not None:
+        yield from one_of(node, Expect, ("min", "max"), only=False)
+    elif claim.min is not None or claim.max is not None:
+        name = "min" if claim.min is not None else "max"
+        message = f"`{name}` bounds an `expr`, and this claim has none"
+        yield diagnose("field-value", node.place(name), message)
     if claim.min is not None and claim.max is not None and claim.min > claim.max:
         message = f"`max` must be at least `min`, which is {claim.min:g}"
         yield diagnose("field-value", node.place("max"), message)

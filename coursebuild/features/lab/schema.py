@@ -150,10 +150,16 @@ class Plot(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Expect(Struct, frozen=True, forbid_unknown_fields=True):
-    """A claim that the build proves: `expr` is at least `min` and at most `max` at the time `t`."""
+    """A claim that the build proves of the time `t`.
+
+    `expr` is at least `min` and at most `max`, or the simulation has diverged.
+    """
 
     t: Annotated[NotNegative, Meta(description="simulated time in seconds")]
-    expr: Annotated[Text, Meta(description="an expression that gives a number")]
+    expr: Annotated[Text | None, Meta(description="an expression that gives a number")] = None
+    diverges: Annotated[
+        bool, Meta(description="the simulation is to diverge, no later than at `t`")
+    ] = False
     after: Annotated[
         Step | Annotated[tuple[Step, ...], Meta(min_length=1)] | None,
         Meta(
@@ -170,6 +176,13 @@ class Expect(Struct, frozen=True, forbid_unknown_fields=True):
         if self.after is None:
             return ()
         return self.after if isinstance(self.after, tuple) else (self.after,)
+
+    @property
+    def controls(self) -> frozenset[str]:
+        """Labels of the controls that are used before."""
+        return frozenset(
+            label for step in self.steps for label in ((step,) if isinstance(step, str) else step)
+        )
 
 
 class Verify(Struct, frozen=True, forbid_unknown_fields=True):

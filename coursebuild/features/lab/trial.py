@@ -42,6 +42,7 @@ from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
 from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.models import LabModel, model_of_lab, saved_model
+from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import TrialReply, read_trial
 from coursebuild.features.lab.verdict import (
     Parity,
@@ -142,7 +143,7 @@ class _Attempt(Struct, frozen=True):
             reply = self._load(key)
             cached = reply is not None
             if reply is None:
-                mistakes = self._mistakes()
+                mistakes = self._mistakes(mjb)
                 if mistakes:
                     return self._failed(module, began), mistakes
                 reply = self._try(module, mjb, key)
@@ -190,15 +191,20 @@ class _Attempt(Struct, frozen=True):
         line = TrialLine(module.name, title, self.trial.owner, "failed", seconds)
         return TrialResult(self.lab.span, line, LabOutput(module.code, module.config))
 
-    def _mistakes(self) -> list[Diagnostic]:
-        """What no engine could run."""
-        code = pieces(self.lab)
-        wrong = self.engines.browser.mistakes([_to_parse(piece) for piece in code])
-        return [
+    def _mistakes(self, mjb: bytes) -> list[Diagnostic]:
+        """What no engine could run, and what the code names and is not there."""
+        browser, code = self.engines.browser, pieces(self.lab)
+        wrong = browser.mistakes([_to_parse(piece) for piece in code])
+        found = [
             code_diagnostic(self.lab, piece, text)
             for piece, text in zip(code, wrong, strict=True)
             if text is not None
         ]
+        if found:
+            return found
+        named = references(self.lab)
+        paths = [reference.path for reference in named]
+        return list(name_diagnostics(named, browser.look_up(paths, mjb, self.seconds)))
 
     def _load(self, key: str) -> dict[str, Any] | None:
         """The reply of an earlier trial."""
@@ -230,6 +236,8 @@ class _Attempt(Struct, frozen=True):
     def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
         """How the main run compares with native MuJoCo, or why it cannot be repeated."""
         run = main["parity"]
+        if main["diverged"]:
+            run["steps"] -= 1  # what is beyond all numbers may differ
         if run["steps"] == 0:
             return {"unrepeated": "it takes no step"}
         if run["modelChanged"]:

@@ -103,13 +103,30 @@ def trial_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
 
     What MuJoCo says of the main run it says again of every act; once is enough.
     """
-    always = {f.kind for f in trial.failures if f.entry == () and f.kind in _OF_MUJOCO}
-    failures = [f for f in trial.failures if f.entry == () or f.kind not in always]
-    return tuple(_failure(lab, failure) for failure in failures if failure.kind != _DEEP)
+    told = [f for f in trial.failures if f.kind != _DEEP and not _is_claimed(lab, f)]
+    always = {f.kind for f in told if f.entry == () and f.kind in _OF_MUJOCO}
+    failures = [f for f in told if f.entry == () or f.kind not in always]
+    return tuple(_failure(lab, failure) for failure in failures)
 
 
-_OF_MUJOCO = ("warning", "diverged")
-_DEEP = "deep"
+def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
+    """Whether the lab claims that it diverges there: with these controls, or as it starts."""
+    if failure.kind != _DIVERGED:
+        return False
+    claims = [claim for claim in lab.fields.expect if claim.diverges]
+    from_start = any(not claim.steps for claim in claims)
+    match failure.entry:
+        case ("expect", int(i), *_):
+            return lab.fields.expect[i].diverges
+        case ("controls", int(i), *_):
+            label = lab.fields.controls[i].label
+            return from_start or any(label in claim.controls for claim in claims)
+        case _:
+            return from_start
+
+
+_DEEP, _DIVERGED = "deep", "diverged"
+_OF_MUJOCO = ("warning", _DIVERGED)
 
 
 def deep_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
@@ -145,13 +162,19 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
         case "throws":
             return f"{name} throws{when}: {message}", ""
         case "nan":
-            return f"{name} {message}{when}", ""
+            help = (
+                "where there is to be no value, give `null`" if failure.entry[0] != "expect" else ""
+            )
+            return f"{name} {message}{when}", help
         case "type":
             return f"{name} {message}", ""
         case "warning":
             return f"MuJoCo warns{when}: {message}", ""
         case "diverged":
-            help = "try a smaller timestep, another integrator, or a narrower range"
+            help = (
+                "try a smaller timestep, another integrator, or a narrower range; if it is to "
+                'diverge, claim so: `"expect": [{"t": …, "diverges": true}]`'
+            )
             return f"the simulation diverges{when}: {message}", help
         case "deep":
             help = (
@@ -161,7 +184,9 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
             )
             return f"bodies lie deep in each other{when}: {message}", help
         case "expect":
-            return f"the claim does not hold: `{_claim(lab, failure.entry)}` {message}", ""
+            expr = lab.fields.expect[int(failure.entry[1])].expr
+            what = f"`{_short(expr)}` {message}" if expr is not None else message
+            return f"the claim does not hold: {what}", ""
         case "timeout" if message == "did not finish in time":
             return f"trying {name} takes too long", 'run less of it: `"verify": {"seconds": …}`'
         case "timeout":
@@ -173,14 +198,6 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
             return f"the browser's engine says: {message.replace('MuJoCo Error: ', '')}", ""
         case _:
             return message, ""
-
-
-def _claim(lab: Lab, entry: Entry) -> str:
-    match entry:
-        case ("expect", int(i), *_) if i < len(lab.fields.expect):
-            return _short(lab.fields.expect[i].expr)
-        case _:
-            return "the claim"
 
 
 def reset_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:

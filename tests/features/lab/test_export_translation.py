@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from coursebuild.features.lab.export.engine_names import ARRAYS, CALLS, SCALARS, SIZES
-from coursebuild.features.lab.export.javascript import UntranslatableError
 from coursebuild.features.lab.export.statements import translate_expression, translate_statements
 from coursebuild.features.lab.export.values import Code, Type
+from coursebuild.features.lab.javascript import UntranslatableError
 from support.lab_values import Bench, make_lab
 
 CONTEXT: dict[str, Type] = {"n": "num", "on": "bool", "v": "vector", "k": "nat"}

@@ -63,6 +63,21 @@ class LabEngine:
         found: list[str | None] = json.loads(isolate.call("parsePieces", request, _START_SECONDS))
         return found
 
+    def look_up(
+        self, paths: Sequence[tuple[str, ...]], mjb: bytes, seconds: float
+    ) -> list[dict[str, Any]]:
+        """What there is of what lab code names, given its model."""
+        isolate = self._ready()
+        isolate.fill("mjb", mjb)
+        try:
+            found: list[dict[str, Any]] = json.loads(
+                isolate.call("lookUp", json.dumps(paths), seconds)
+            )
+        except (LimitError, ScriptError):  # which its trial tells
+            self.close()
+            return [{} for _ in paths]
+        return found
+
     def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
         """The reply to a trial's request; `seconds` of processor time is what it may take.
 

@@ -14,7 +14,8 @@ from tree_sitter import Node
 
 from coursebuild.features.lab.export.engine_names import CALLS, RESULTS
 from coursebuild.features.lab.export.expressions import Expressions
-from coursebuild.features.lab.export.javascript import (
+from coursebuild.features.lab.export.values import Code, Type, as_float
+from coursebuild.features.lab.javascript import (
     UntranslatableError,
     arguments,
     array_items,
@@ -22,7 +23,6 @@ from coursebuild.features.lab.export.javascript import (
     is_name,
     text_of,
 )
-from coursebuild.features.lab.export.values import Code, Type, as_float
 
 Kind: TypeAlias = Literal["model", "data", "int", "size", "str", "float", "number", "which", "norm"]
 """What an argument is: `float` is a Python float, `number` any number, `size` an index, `which` a

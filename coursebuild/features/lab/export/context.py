@@ -11,14 +11,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from tree_sitter import Node
 
 from coursebuild.features.lab.export.engine_names import ARRAYS
-from coursebuild.features.lab.export.javascript import (
+from coursebuild.features.lab.export.values import NUMBERS, Type
+from coursebuild.features.lab.javascript import (
     UntranslatableError,
     children,
     dotted_name,
     field,
     text_of,
 )
-from coursebuild.features.lab.export.values import NUMBERS, Type
 
 
 def field_types(

@@ -65,10 +65,15 @@ def _apart(mine: Sequence[float], theirs: Sequence[float]) -> float:
     return max([0.0, *(abs(a - b) / largest for a, b in zip(mine, theirs, strict=True))])
 
 
+_INFINITE: dict[Any, str] = {math.inf: "∞", -math.inf: "−∞"}
+"""As the trial has them."""
+
+
 def _readouts(theirs: Any, mine: list[list[Any]], when: str) -> str | None:
     for (label, value), known in zip(mine, theirs or (), strict=False):
-        if known is None:  # not finite, which the trial reports
+        if known is None:  # not a number, which is a gap
             continue
+        value = _INFINITE.get(value, value)
         if isinstance(value, str) or isinstance(known, str):
             same = value == known
         else:

@@ -17,15 +17,6 @@ from msgspec import Struct
 from tree_sitter import Node
 
 from coursebuild.features.lab.export import engine_names as engine
-from coursebuild.features.lab.export.javascript import (
-    UntranslatableError,
-    array_items,
-    dotted_name,
-    field,
-    string_value,
-    template_parts,
-    text_of,
-)
 from coursebuild.features.lab.export.values import (
     AND,
     ARRAYS,
@@ -47,6 +38,15 @@ from coursebuild.features.lab.export.values import (
     literal,
     text_literal,
 )
+from coursebuild.features.lab.javascript import (
+    UntranslatableError,
+    array_items,
+    dotted_name,
+    field,
+    string_value,
+    template_parts,
+    text_of,
+)
 
 _CONSTANTS = {
     "PI": "math.pi",
@@ -58,6 +58,7 @@ _CONSTANTS = {
     "LOG2E": repr(1 / math.log(2)),
     "LOG10E": repr(1 / math.log(10)),
 }
+_UNBOUNDED = {"NaN": "math.nan", "Infinity": "math.inf"}
 _ROOTS = frozenset("model data mj sim ctx lib Math value".split())
 _SCALAR_TYPES: dict[str, Type] = {"float": "num", "int": "int", "size": "nat"}
 _COMPARISONS = {
@@ -168,7 +169,9 @@ class Expressions(ABC):
             case "binary_expression":
                 return self.binary(_operator(node), field(node, "left"), field(node, "right"))
             case "ternary_expression":
-                return self._conditional(node)
+                branches = (field(node, name) for name in ("consequence", "alternative"))
+                values = (self.value(branch, single=True) for branch in branches)
+                return self.conditional(field(node, "condition"), *values)
             case _:
                 raise UntranslatableError(f"`{text_of(node)}`")
 
@@ -180,6 +183,8 @@ class Expressions(ABC):
         variable = self.variable(name)
         if variable is not None:
             return variable.code
+        if name in _UNBOUNDED:
+            return Code(_UNBOUNDED[name], "num")
         if name == "value" and self.given is not None:
             return self.given
         raise UntranslatableError(f"`{name}`")
@@ -288,9 +293,8 @@ class Expressions(ABC):
             raise UntranslatableError(f"`{operator}` between {a.named} and {b.named}")
         return Code(f"{a.within(BITS)} {python} {b.within(BITS)}", "bool", COMPARISON)
 
-    def _conditional(self, node: Node) -> Code:
-        a = self.value(field(node, "consequence"), single=True)
-        b = self.value(field(node, "alternative"), single=True)
+    def conditional(self, test: Node, a: Code, b: Code) -> Code:
+        """One value or another."""
         type = a.type
         if a.type != b.type:
             if a.type not in NUMBERS or b.type not in NUMBERS:
@@ -300,7 +304,7 @@ class Expressions(ABC):
                 type, a, b = "num", as_float(a), as_float(b)
         if type not in (*NUMBERS, "bool", "str"):
             raise UntranslatableError(f"{a.named} that depends on a condition")
-        condition = self.test(field(node, "condition")).within(OR)
+        condition = self.test(test).within(OR)
         text = f"{a.within(OR)} if {condition} else {b.text}"
         return Code(text, type, CONDITIONAL)
 

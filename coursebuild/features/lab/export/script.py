@@ -22,7 +22,6 @@ from tree_sitter import Node
 from coursebuild.features.lab.export import text
 from coursebuild.features.lab.export.calls import INEXACT
 from coursebuild.features.lab.export.context import field_types
-from coursebuild.features.lab.export.javascript import UntranslatableError, parse_statements
 from coursebuild.features.lab.export.library import LIBRARY, helpers, imports, names_in
 from coursebuild.features.lab.export.statements import (
     RESERVED,
@@ -32,6 +31,7 @@ from coursebuild.features.lab.export.statements import (
 )
 from coursebuild.features.lab.export.text import ExportMetadata
 from coursebuild.features.lab.export.values import Code, Type
+from coursebuild.features.lab.javascript import UntranslatableError, parse_statements
 from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.schema import Button, Control, Select, Slider
 

@@ -18,7 +18,9 @@ from tree_sitter import Node
 from coursebuild.features.lab.export import engine_names as engine
 from coursebuild.features.lab.export.calls import Calls, check_single, refused_call
 from coursebuild.features.lab.export.expressions import Variable
-from coursebuild.features.lab.export.javascript import (
+from coursebuild.features.lab.export.library import LIBRARY
+from coursebuild.features.lab.export.values import NUMBERS, Code, Type, as_float
+from coursebuild.features.lab.javascript import (
     UntranslatableError,
     arguments,
     array_items,
@@ -29,8 +31,6 @@ from coursebuild.features.lab.export.javascript import (
     parse_statements,
     text_of,
 )
-from coursebuild.features.lab.export.library import LIBRARY
-from coursebuild.features.lab.export.values import NUMBERS, Code, Type, as_float
 
 _INDENT = "    "
 _NAME = re.compile(r"[A-Za-z_$][A-Za-z0-9_$]*")
@@ -77,7 +77,7 @@ def translate_expression(code: str, context: Mapping[str, Type]) -> Code:
     Raises:
         UntranslatableError: it cannot be translated, or gives something else.
     """
-    found = _Statements(context, None, button=False).value(parse_expression(code), single=True)
+    found = _Statements(context, None, button=False).shown(parse_expression(code))
     if found.type not in (*NUMBERS, "str"):
         raise UntranslatableError(f"{found.named} where a number or a text should be")
     return found
@@ -101,6 +101,15 @@ class _Statements(Calls):
         self.button = button
         self.taken: set[str] = set()
         self.returns = False
+
+    def shown(self, node: Node) -> Code:
+        """What a readout shows; `null`, where there is nothing to be shown, is no number."""
+        if node.type == "null":
+            return Code("math.nan", "num")
+        if node.type != "ternary_expression":
+            return self.value(node, single=True)
+        branches = (field(node, name) for name in ("consequence", "alternative"))
+        return self.conditional(field(node, "condition"), *map(self.shown, branches))
 
     def block(self, body: Iterable[Node]) -> Iterator[str]:
         """Statements in a scope of their own."""

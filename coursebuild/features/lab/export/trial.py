@@ -67,6 +67,8 @@ def exported(
     export = export_script(lab, metadata)
     if isinstance(export, str):
         return LabExport(None, export)
+    if main["diverged"]:
+        return LabExport(None, "its simulation diverges")
     if main.get("recorded") is None:
         return LabExport(None, "the lab makes no step")
     reason = _checked(context, native, lab, export, main, parity)

@@ -18,7 +18,7 @@ from typing import Literal, TypeAlias
 from msgspec import Struct
 
 from coursebuild.features.lab.export.engine_names import Element
-from coursebuild.features.lab.export.javascript import UntranslatableError
+from coursebuild.features.lab.javascript import UntranslatableError
 
 Type: TypeAlias = Literal["nat", "int", "num", "bool", "str", "vector", "rows", "energy", "nothing"]
 """Of a Python expression; `rows` is an array that has two dimensions there, and one in JavaScript.

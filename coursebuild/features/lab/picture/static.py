@@ -87,8 +87,6 @@ def _shown(value: Any, digits: int) -> str:
         return value
     if not isinstance(value, int | float):
         return "\u2013"
-    if not math.isfinite(value):
-        return "NaN" if math.isnan(value) else "\u221e" if value > 0 else "\u2212\u221e"
     if abs(value) >= _LARGE:
         mantissa, exponent = f"{value:.{max(2, digits)}e}".split("e")
         return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}".replace("-", "\u2212")

@@ -231,7 +231,7 @@ export class Lab {
     return this.data.time
   }
 
-  /** The readouts: a number or a text each. */
+  /** The readouts: a number or a text each, or `null`. */
   readouts() {
     const env = this.sync()
     return this.code.readouts.map((run, i) => {

@@ -33,13 +33,18 @@ export function call(entry, code) {
   }
 }
 
-/** A value for a person: a number or a text. */
+/** A value for a person: a number or a text, or `null` where there is none. */
 export function readable(entry, value) {
-  if (typeof value === 'number' || typeof value === 'string') return value
+  if (typeof value === 'number' || typeof value === 'string' || value === null) return value
   throw new LabError('type', entry, `gives ${describe(value)}, not a number or a text`)
 }
 
-/** A value for a plot or a claim: a number, which may be NaN. */
+/** A value for a plot: a number, or `null` for a gap. */
+export function plottable(entry, value) {
+  return value === null ? value : numeric(entry, value)
+}
+
+/** A value for a claim: a number, which may be NaN. */
 export function numeric(entry, value) {
   if (typeof value === 'number') return value
   throw new LabError('type', entry, `gives ${describe(value)}, not a number`)

@@ -5,7 +5,7 @@
  * the page and in the build, at any speed.
  */
 
-import { call, numeric } from './piece.js'
+import { call, plottable } from './piece.js'
 
 const PER_WINDOW = 600 // samples in the width of a plot
 const DEFAULT_WINDOW = 10 // s, for a plot that shows all of its time
@@ -44,9 +44,9 @@ export class Sampler {
     return this.active && steps % Math.max(1, Math.round(this.interval / timestep)) === 0
   }
 
-  /** The traces, evaluated now. */
+  /** The traces, evaluated now; a gap is NaN. */
   evaluate(env) {
-    return Float64Array.from(this.traces, ({ entry, run }) => call(entry, () => numeric(entry, run(env))))
+    return Float64Array.from(this.traces, ({ entry, run }) => call(entry, () => plottable(entry, run(env)) ?? NaN))
   }
 
   /** Add a sample; `env` is of data whose derived quantities are current. */

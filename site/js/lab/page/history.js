@@ -20,6 +20,7 @@ export class History {
     this.end = 0
     this.stride = 1
     this.skipped = 0
+    this.gaps = false
   }
 
   get length() {
@@ -36,7 +37,10 @@ export class History {
     if (this.skipped++ % this.stride !== 0) return
     if (this.end === this.columns[0].length) this.room()
     this.columns[0][this.end] = time
-    for (let i = 1; i < this.columns.length; i++) this.columns[i][this.end] = values[at + i - 1]
+    for (let i = 1; i < this.columns.length; i++) {
+      const value = (this.columns[i][this.end] = values[at + i - 1])
+      if (!Number.isFinite(value)) this.gaps = true
+    }
     this.end += 1
     if (this.window !== null) {
       // One sample before the window stays, so that the line reaches its edge.
@@ -67,8 +71,9 @@ export class History {
     this.skipped = 1
   }
 
-  /** The samples as uPlot takes them: times, then one array for each trace. */
+  /** The samples as uPlot takes them: times, then one array for each trace, with `null` for what interrupts its line. */
   data() {
-    return this.columns.map((column) => column.subarray(this.start, this.end))
+    const columns = this.columns.map((column) => column.subarray(this.start, this.end))
+    return this.gaps ? columns.map((column) => Array.from(column, (x) => (Number.isFinite(x) ? x : null))) : columns
   }
 }

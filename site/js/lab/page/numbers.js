@@ -6,12 +6,12 @@ const MINUS = '\u2212'
 /**
  * A readout's value.
  *
- * @param {number | string | {error: string}} value
+ * @param {number | string | null} value NaN and `null`: there is none
  * @param {number | null} digits after the point; null: six significant figures
  */
 export function formatReadout(value, digits) {
   if (typeof value === 'string') return value
-  if (typeof value !== 'number') return '–'
+  if (typeof value !== 'number' || Number.isNaN(value)) return '–'
   return formatNumber(value, digits)
 }
 

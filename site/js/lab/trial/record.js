@@ -3,12 +3,13 @@
 import { LabError } from '../core/piece.js'
 
 const POINTS = 1000 // of a recorded trace, at most
+const INFINITE = new Map([[Infinity, '∞'], [-Infinity, '−∞']])
 
-/** The moment: {time, frame, readouts}; readouts that fail are told elsewhere, and make it `null`. */
+/** The moment: {time, frame, readouts}; readouts that fail are told elsewhere, and make them `null`. JSON has no infinity. */
 export function picture(lab) {
   let readouts = null
   try {
-    if (lab.diverged === null) readouts = lab.readouts()
+    if (lab.diverged === null) readouts = lab.readouts().map((value) => INFINITE.get(value) ?? value)
   } catch (error) {
     if (!(error instanceof LabError) || error.kind === 'engine') throw error
   }

@@ -13,7 +13,7 @@
 import { EngineError } from '../core/engine.js'
 import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
-import { LabError, call, current, numeric, readable } from '../core/piece.js'
+import { LabError, call, current, numeric, plottable, readable } from '../core/piece.js'
 import { packed } from './base64.js'
 import { deepContact } from './deep.js'
 import { ParityRecorder } from './parity.js'
@@ -59,6 +59,8 @@ class Trial {
     this.told = new Set()
     this.code = null
     this.text = code
+    // What is not finite comes of a mistake, unless the lab's own code writes it.
+    this.meant = (value) => new RegExp(`\\b${Math.abs(value)}\\b`).test(code)
     this.steps = 0
     this.took = 0
   }
@@ -184,17 +186,17 @@ class Trial {
   /** Evaluate all that is shown; a wrong value does not keep the rest from being tried. */
   look(lab) {
     const env = lab.sync()
-    this.code.readouts.forEach((run, i) => this.value(['readouts', i, 'expr'], run, env, readable))
+    this.code.readouts.forEach((run, i) => this.value(['readouts', i, 'expr'], run, env, readable, this.meant))
     this.code.plots.forEach((traces, i) =>
-      traces.forEach((run, j) => this.value(['plots', i, 'traces', j, 'expr'], run, env, numeric)),
+      traces.forEach((run, j) => this.value(['plots', i, 'traces', j, 'expr'], run, env, plottable, this.meant)),
     )
   }
 
-  /** Evaluate an expression; `check` takes its entry and value, and gives the value or throws. */
-  value(entry, run, env, check) {
+  /** Evaluate an expression; `check` takes its entry and value, and gives the value or throws; `meant`: may be NaN or infinite. */
+  value(entry, run, env, check, meant = () => false) {
     try {
       const value = call(entry, () => check(entry, run(env)))
-      if (typeof value !== 'number' || Number.isFinite(value)) return value
+      if (typeof value !== 'number' || Number.isFinite(value) || meant(value)) return value
       this.fail(entry, 'nan', `is ${value}`, env.data.time)
     } catch (error) {
       this.failed(error, env.data.time)
@@ -269,6 +271,7 @@ class Trial {
       seconds: lab.time,
       steps: lab.steps,
       stopped,
+      diverged: lab.diverged !== null,
       timestep,
       scene: packed(withSmallTextures(lab.scene())),
       pictures,
@@ -324,12 +327,15 @@ class Trial {
 
   prove(lab, claims) {
     this.act(lab, claims[0].after)
-    for (const { i, t, min, max } of claims) {
+    for (const { i, t, min, max, diverges } of claims) {
       const entry = ['expect', i, 'expr']
       this.during.entry = current.trying = ['expect', i]
-      this.advance(lab, t)
+      if (lab.diverged === null) this.advance(lab, t)
+      else this.state(lab)
       this.deep(lab)
-      if (lab.diverged !== null) return
+      if (diverges && lab.diverged === null) this.fail(['expect', i], 'expect', `the simulation has not diverged at ${t} s`, lab.time)
+      if (lab.diverged !== null && !claims.some((claim) => claim.diverges)) return
+      if (diverges || lab.diverged !== null) continue
       const value = this.value(entry, this.code.expect[i], lab.sync(), numeric)
       if (value === null) continue
       if (min !== null && value < min) this.fail(entry, 'expect', `is ${value} at ${t} s, less than ${min}`, lab.time)

@@ -1,7 +1,8 @@
 """JavaScript of labs, parsed by tree-sitter.
 
-Entry points: `parse_statements(code)`, `parse_expression(code)`; for what is in a node `field`,
-`children`, `text_of`, `string_value`, `template_parts`, `dotted_name`.
+Entry points: `parse(code)`; `parse_statements(code)` and `parse_expression(code)`, for code that is
+to be translated; for what is in a node `walk`, `field`, `children`, `text_of`, `string_value`,
+`template_parts`, `dotted_name`.
 
 The code has been parsed by V8 before, so what is wrong JavaScript need not be explained here.
 """
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Iterator
 from itertools import pairwise
 
 import tree_sitter_javascript
@@ -35,7 +37,7 @@ _KNOWN = frozenset(
         update_expression sequence_expression parenthesized_expression unary_expression
         binary_expression ternary_expression member_expression subscript_expression call_expression
         arguments spread_element array identifier property_identifier number string string_fragment
-        escape_sequence template_string template_substitution true false
+        escape_sequence template_string template_substitution true false null
     """.split()
 )
 """Kinds of nodes that have a counterpart in Python, at least somewhere."""
@@ -46,29 +48,35 @@ def _parser() -> Parser:
     return Parser(Language(tree_sitter_javascript.language()))
 
 
+def parse(code: str) -> Node:
+    """A piece of code, whatever is wrong with it."""
+    return _parser().parse(code.encode("utf-8", "replace")).root_node
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """A node and all inside of it that has a name."""
+    yield node
+    for child in node.named_children:
+        yield from walk(child)
+
+
 def parse_statements(code: str) -> list[Node]:
     """The statements of a piece of code.
 
     Raises:
         UntranslatableError: the code cannot be parsed.
     """
-    try:
-        root = _parser().parse(code.encode()).root_node
-    except UnicodeEncodeError:
-        raise UntranslatableError("half of a character") from None
+    if any("\ud800" <= character <= "\udfff" for character in code):
+        raise UntranslatableError("half of a character")
+    root = parse(code)
     if root.has_error:
         raise UntranslatableError("code that cannot be read")
-    _check_known(root)
+    for node in walk(root):
+        if node.type not in _KNOWN:
+            # Named by what makes it what it is: `=>`, `new`, `switch`.
+            signs = (child.type for child in node.children if not child.is_named)
+            raise UntranslatableError(f"`{next(signs, text_of(node))}`")
     return children(root)
-
-
-def _check_known(node: Node) -> None:
-    if node.type not in _KNOWN:
-        # Named by what makes it what it is: `=>`, `new`, `switch`.
-        sign = next((child.type for child in node.children if not child.is_named), text_of(node))
-        raise UntranslatableError(f"`{sign}`")
-    for child in node.named_children:
-        _check_known(child)
 
 
 def parse_expression(code: str) -> Node:
@@ -125,14 +133,19 @@ def text_of(node: Node) -> str:
     return node.text.decode()
 
 
-def dotted_name(node: Node) -> tuple[str, ...]:
+def dotted_names(node: Node) -> tuple[Node, ...]:
     """The names of `model.opt.timestep`, one by one; nothing where a node is something else."""
     if node.type == "identifier":
-        return (text_of(node),)
-    if node.type != "member_expression":
+        return (node,)
+    if node.type != "member_expression" or node.child_by_field_name("optional_chain") is not None:
         return ()
-    whole = dotted_name(field(node, "object"))
-    return (*whole, text_of(field(node, "property"))) if whole else ()
+    whole = dotted_names(field(node, "object"))
+    return (*whole, field(node, "property")) if whole else ()
+
+
+def dotted_name(node: Node) -> tuple[str, ...]:
+    """The same as texts."""
+    return tuple(map(text_of, dotted_names(node)))
 
 
 def is_name(node: Node, name: str) -> bool:

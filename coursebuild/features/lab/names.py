@@ -1,0 +1,99 @@
+"""What the code of a lab names: `data.qps`, `math.sin` or `data.qpos[5]`, and is not there.
+
+Entry points: `references(lab)`; `name_diagnostics(references, found)`, once the engine has looked
+them up (`site/js/lab/trial/names.js`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from msgspec import Struct
+from tree_sitter import Node
+
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.features.lab.compile import pieces
+from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
+from coursebuild.features.lab.model import Lab
+
+_FREE = ("ctx", "value", "globalThis")
+"""What may have any names."""
+_SIZES = {"qpos": "nq", "qvel": "nv", "qacc": "nv", "ctrl": "nu", "act": "na"}
+"""Arrays whose length is a size of the model."""
+
+
+class Reference(Struct, frozen=True):
+    """A name with dots in the code of a lab, or an element of what it names."""
+
+    path: tuple[str, ...]
+    places: tuple[Span, ...]
+    """Of each part of the path."""
+    index: int | None = None
+    """The number in brackets behind it."""
+    element: Span | None = None
+    """Of all of it, brackets included."""
+
+
+def references(lab: Lab) -> list[Reference]:
+    """All that the pieces of a lab name outside of themselves."""
+    code = dict(lab.code)
+    return [one for piece in pieces(lab) for one in _references(code[piece.entry])]
+
+
+def _references(code: Excerpt) -> Iterator[Reference]:
+    written = code.text.encode("utf-8", "replace")
+    nodes = list(walk(parse(code.text)))
+    own = {text_of(name) for node in nodes for name in _declared(node)}
+
+    def place(node: Node) -> Span:
+        start, end = (len(written[:at].decode()) for at in (node.start_byte, node.end_byte))
+        return code.span(start, end)
+
+    for node in nodes:
+        parts = dotted_names(node) if node.type == "member_expression" else ()
+        path = tuple(map(text_of, parts))
+        outer = node.parent
+        if len(path) < 2 or path[0] in (*own, *_FREE) or _is_part(node, outer):
+            continue
+        places = tuple(map(place, parts))
+        index = outer.child_by_field_name("index") if outer is not None else None
+        if outer is not None and index is not None and text_of(index).isdecimal():
+            yield Reference(path, places, int(text_of(index)), place(outer))
+        else:
+            yield Reference(path, places)
+
+
+def _declared(node: Node) -> Iterator[Node]:
+    """The names that a node gives to something of its own."""
+    if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
+        yield from node.named_children
+    for field in ("name", "parameter", "left"):
+        child = node.child_by_field_name(field)
+        if child is not None and child.type == "identifier":
+            yield child
+
+
+def _is_part(node: Node, outer: Node | None) -> bool:
+    """Whether a name goes on behind a dot."""
+    return outer is not None and outer.type == "member_expression"
+
+
+def name_diagnostics(
+    named: Sequence[Reference], found: Sequence[dict[str, Any]]
+) -> Iterator[Diagnostic]:
+    """What does not exist; `found` is what the engine says of each."""
+    for reference, one in zip(named, found, strict=True):
+        path, length, at = reference.path, one.get("length"), one.get("at")
+        if at is not None:
+            owner = ".".join(path[:at])
+            what = f"`{owner}` has no `{path[at]}`" if owner else f"there is no `{path[0]}`"
+            help = did_you_mean(path[at], one["names"])
+            yield diagnose("lab-name", reference.places[at], what, help=help)
+        elif length is not None and reference.index is not None and reference.index >= length:
+            assert reference.element is not None
+            size = _SIZES.get(path[-1]) if path[0] == "data" else None
+            has = f"`{size}` is {length}" if size else f"the array has {length} numbers"
+            what = f"`{'.'.join(path)}[{reference.index}]` does not exist: {has}"
+            yield diagnose("lab-name", reference.element, what, help="numbers count from 0")

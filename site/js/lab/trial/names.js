@@ -1,0 +1,42 @@
+/**
+ * What a lab's code names, looked up: names that there are none of, and how long arrays are.
+ *
+ *   lookUp(engine, bytes, [['data', 'qpos'], ['lib', 'enrgy']]) → [{length: 1}, {at: 1, names: ['energy', …]}]
+ *
+ * `at` is the first part of a path that does not exist, `names` are those that could stand there.
+ */
+
+import { environment } from '../core/environment.js'
+
+const GLOBALS = ['Math', 'Number', 'Array', 'Object', 'String', 'JSON']
+const OF_BINDINGS = /^[_$]|^(constructor|clone|delete|deleteLater|isAliasOf|isDeleted|toString)$/
+
+export function lookUp(engine, bytes, paths) {
+  const handles = engine.load(bytes)
+  const { model, data } = handles
+  try {
+    const env = environment({ engine, model, ctx: {}, scratch: {} }, data, true)
+    return paths.map((path) => found(env, path))
+  } finally {
+    handles.dispose()
+  }
+}
+
+function found(env, path) {
+  const [root] = path
+  if (!(root in env || root in globalThis)) return { at: 0, names: [...Object.keys(env), ...GLOBALS] }
+  if (!(root in env) && root !== 'Math') return {} // what is done to others is a matter of what labs share
+  let owner = env[root] ?? Math
+  for (let at = 1; at < path.length; at++) {
+    if (owner === null || !['object', 'function'].includes(typeof owner)) return {}
+    if (!(path[at] in owner)) return { at, names: namesOf(owner) }
+    owner = owner[path[at]]
+  }
+  return ArrayBuffer.isView(owner) ? { length: owner.length } : {}
+}
+
+function namesOf(owner) {
+  const names = []
+  for (let o = owner; o !== null && o !== Object.prototype; o = Object.getPrototypeOf(o)) names.push(...Object.getOwnPropertyNames(o))
+  return names.filter((name) => !OF_BINDINGS.test(name))
+}
