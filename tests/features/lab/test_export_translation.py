@@ -81,6 +81,7 @@ def translated(code: str, *, button: bool = False) -> str:
         ("ctx.n = ctx.k - (1 - ctx.k)", "ctx.n = float(ctx.k - (1 - ctx.k))"),
         ("ctx.n = 2 * 3 * ctx.n", "ctx.n = 2 * 3 * ctx.n"),
         ("ctx.n = -ctx.k * -3", "ctx.n = -float(ctx.k) * -3"),
+        ("ctx.n = ctx.on ? NaN : -Infinity", "ctx.n = math.nan if ctx.on else -math.inf"),
         ("ctx.n = 1 / 3 - .5e1", "ctx.n = 1 / 3 - 0.5e1"),
         ("ctx.n = ctx.on ? 1 : 2.5", "ctx.n = 1.0 if ctx.on else 2.5"),
         ("ctx.n = a\n/* b */ // c\n".replace("a", "0x10"), "ctx.n = float(0x10)"),
@@ -129,7 +130,8 @@ data.qpos[0] = 5 & ctx.n
 data.qpos[0] = 1 << 2
 data.qpos[0] = ctx.n = 1, f()
 data.qpos[0] = 10n
-data.qpos[0] = NaN
+data.qpos[0] = null
+ctx.n = ctx.on ? 1 : null
 data.qpos[0] = parseFloat('1')
 data.qpos[0] = 'ab'.length
 data?.qpos
@@ -247,6 +249,7 @@ def test_a_refusal_says_what_has_no_counterpart(code: str, message: str) -> None
             "mj.mj_name2id(model, mj.mjtObj.mjOBJ_BODY.value, 'b')",
             'mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, "b")',
         ),
+        ("ctx.on ? ctx.n : null", "ctx.n if ctx.on else math.nan"),
     ],
 )
 def test_expressions_become_those_of_python(code: str, python: str) -> None:
