@@ -151,7 +151,7 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
 
     def draws() -> list[Draft]:
         fold.cache_clear()
-        return [draw(inputs, document, tools) for inputs, document in drawn]
+        return [draw(inputs, document, tools)[0] for inputs, document in drawn]
 
     def modules() -> list[frozenset[str]]:
         imported.cache_clear()

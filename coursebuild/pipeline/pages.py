@@ -22,7 +22,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage
-from coursebuild.core.pages.frame import Frames, Names
+from coursebuild.core.pages.frame import Frame, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import has
 from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
@@ -118,16 +118,16 @@ class Pages:
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
-        frame = self._frame(names)
-        frames = Frames(self._library, names)
+        key = self._frame_key(names)
+        frame = Frame(self._library, names)
         for path, page in self._pages.items():
-            make = functools.partial(self._framed, path, frames)
-            yield CachedFile(path, key_of(page.key, frame), make)
+            make = functools.partial(self._framed, path, frame)
+            yield CachedFile(path, key_of(page.key, key), make)
 
-    def _framed(self, path: str, frames: Frames) -> bytes:
-        return framed(self._drawn(path), frames)
+    def _framed(self, path: str, frame: Frame) -> bytes:
+        return framed(self._drawn(path), frame)
 
-    def _frame(self, names: Names) -> str:
+    def _frame_key(self, names: Names) -> str:
         """The key of all that a frame shows besides its page."""
         course, results = self._library.course, self._library.results
         return step_key(
@@ -225,11 +225,10 @@ def _decoded(data: bytes) -> PageRecord:
     return record
 
 
-def framed(page: DrawnPage, frames: Frames) -> bytes:
+def framed(page: DrawnPage, frame: Frame) -> bytes:
     """A page as it is published."""
     record = page.record
-    before, after = frames.around(record.draft, record.parts)
-    return before.encode() + page.body + after.encode()
+    return frame.around(record.draft, record.parts, page.body.decode()).encode()
 
 
 def text_of(entry: PageEntry, library: Library) -> Text | None:

@@ -239,14 +239,14 @@ class PageReader:
     def draw(self, request: PageRequest) -> DrawnPage:
         """A page, its body, and what is noted of it."""
         from coursebuild.core.pages.added_files import page_notes
-        from coursebuild.core.pages.draw import draw_whole
+        from coursebuild.core.pages.draw import draw
 
         inputs = decode(request.packed, PageInputs)
         assert inputs is not None, "what was just encoded can be decoded"
         with self._lock:
             whole = None if request.text is None else self._whole(request.text)
             document = None if whole is None else whole.document
-            draft, context = draw_whole(inputs, document, self._tools_for(request.language, whole))
+            draft, context = draw(inputs, document, self._tools_for(request.language, whole))
             found, body = record(draft, request.base_url)
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())

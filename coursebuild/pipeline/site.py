@@ -12,6 +12,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from html import escape
 from typing import TYPE_CHECKING
 
 from msgspec import Struct, field
@@ -267,9 +268,9 @@ def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnosti
     everything = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
     for broken in check_links(everything, base_url):
         page = Source(f"public/{broken.page}", pages[broken.page].decode())
-        start = page.line_starts[broken.line - 1]
-        at = page.text.find(broken.url, start)
-        span = page.span(at, at + len(broken.url)) if at >= 0 else page.span(start, start)
+        written = escape(broken.url)
+        at = max(page.text.find(f'"{written}"') + 1, 0)
+        span = page.span(at, at + len(written) if at else 0)
         help = f"did you mean `{broken.near}`?" if broken.near else ""
         message = f"`{broken.url}` leads nowhere: {broken.reason}"
         yield diagnose("link-broken", span, message, help=help)

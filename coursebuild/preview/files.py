@@ -21,7 +21,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import OutputFile, SiteFile
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.frame import Frames
+from coursebuild.core.pages.frame import Frame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
@@ -39,7 +39,7 @@ _SITES = 3
 class ServedPage(Struct, frozen=True):
     """The text of a page, and what it was made from."""
 
-    frames: Frames
+    frame: Frame
     """Others where the course or what pages share is another."""
     key: str
     page: DrawnPage
@@ -66,7 +66,7 @@ class Files:
         self._pages: dict[str, ServedPage] = {}
         self._last_good: dict[str, str] = {}
         """Keys of pages as they are in the site that was made last, by site path."""
-        self._frames: Frames | None = None
+        self._frame: Frame | None = None
         self._sites: list[tuple[Site, Mapping[str, SiteFile]]] = []
         self._feature_files: Mapping[str, OutputFile] = {}
         """Files of features that pages already show, though no site was made with them yet."""
@@ -80,7 +80,7 @@ class Files:
         self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
         if not self._sites:  # whatever characters pages will have
             self._serve(self._maker(library).made((), whole_fonts=True))
-        self._frame(library)
+        self._set_frame(library)
 
     def make(
         self, library: Library, broken: Collection[str], pause: Callable[[], None]
@@ -108,12 +108,12 @@ class Files:
         self._sites = [*self._sites[1 - _SITES :], (site, files)]
         self._last_good |= {p: key for p, key in site.keys.items() if p in self._entries}
         if self._library is not None:
-            self._frame(self._library)
+            self._set_frame(self._library)
 
-    def _frame(self, library: Library) -> None:
+    def _set_frame(self, library: Library) -> None:
         names = self._sites[-1][0].names
         assert names is not None
-        self._frames = Frames(library, names)
+        self._frame = Frame(library, names)
 
     # --- what may be asked
 
@@ -152,9 +152,9 @@ class Files:
 
     def _page(self, path: str) -> bytes | None:
         """A page as it is now, or as it was when it had no mistake."""
-        library, frames, known = self._library, self._frames, self._pages.pop(path, None)
-        assert library is not None and frames is not None
-        if known is None or known.frames is not frames:
+        library, frame, known = self._library, self._frame, self._pages.pop(path, None)
+        assert library is not None and frame is not None
+        if known is None or known.frame is not frame:
             document = self.document(path)
             if document is None or self._is_sound(document):
                 request = page_request(self._entries[path], library)
@@ -162,12 +162,12 @@ class Files:
                     page = self._documents.page(request.key, lambda: request)
                 else:
                     page = known.page
-                known = ServedPage(frames, request.key, page, framed(page, frames))
+                known = ServedPage(frame, request.key, page, framed(page, frame))
             elif known is None:
                 files = self._sites[-1][1]
                 return _data(files[path]) if path in files else None
             else:
-                known = replace(known, frames=frames, text=framed(known.page, frames))
+                known = replace(known, frame=frame, text=framed(known.page, frame))
         self._pages[path] = known  # as the one that was asked for last
         if len(self._pages) > _DRAWN:
             del self._pages[next(iter(self._pages))]

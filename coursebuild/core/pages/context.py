@@ -93,7 +93,7 @@ class PageContext(Struct, frozen=True):
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, which scrolls inside itself where it is too wide."""
         mathml = self.tools.mathml(tex, True)
-        html = self.tools.enclose("blocks/formula.html", "mathml", mathml)
+        html = self.template("blocks/formula.html", mathml=mathml)
         known = self.equations.get(start)
         if known is None:
             return html

@@ -1,6 +1,6 @@
 """Drawing a page: its inputs and its document through the templates.
 
-Entry points: `draw(inputs, document, tools)`; `draw_whole`, with the document's context as well.
+Entry point: `draw(inputs, document, tools)`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from coursebuild.core.model import Document, Paragraph, plain_text
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.article import article, contents
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.draft import Draft as Draft
+from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.listings import numbered
 from coursebuild.core.pages.page_inputs import Graphed, Highlighted, PageInputs, Plotted
@@ -24,15 +24,13 @@ if TYPE_CHECKING:
     from coursebuild.numerics.reports.bench import ScenarioReport
 
 
-def draw(inputs: PageInputs, document: Document | None, tools: Tools) -> Draft:
-    """The page without its frame; the same values give the same page."""
-    return draw_whole(inputs, document, tools)[0]
-
-
-def draw_whole(
+def draw(
     inputs: PageInputs, document: Document | None, tools: Tools
 ) -> tuple[Draft, PageContext | None]:
-    """The page without its frame, and the context of its document."""
+    """The page without its frame, and the context of its document.
+
+    The same values give the same page.
+    """
     page: PageContext | None = None
     values = {name: _drawn(value, tools) for name, value in inputs.values.items()}
     description = inputs.description

@@ -1,8 +1,6 @@
 """A page without its frame, and the frame: head, site navigation, foot.
 
-Entry points: `Draft`, what the modules of the single kinds of page make; `frame(library, draft,
-names)`, the finished text; `frame_around`, what stands before and after the body; `Frames`, the
-same for many pages.
+Entry point: `Frame`, what stands around the body of each page.
 
 Pages are drawn in two steps because a page's head names the style sheet by its content, and the
 style sheet holds the fonts' names, which depend on every character of every page.
@@ -12,17 +10,15 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import re
-from collections.abc import Mapping
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.features import PagePart
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
-from coursebuild.core.pages.draft import Draft as Draft
+from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_title
 from coursebuild.core.registry import features, page_copies, page_kind
@@ -99,15 +95,6 @@ def place_of(library: Library, path: str) -> urls.Place:
     return urls.Place(path, urls.base_path(library.course) if path == urls.NOT_FOUND else None)
 
 
-def frame(library: Library, draft: Draft, names: Names) -> str:
-    """The finished text of a page."""
-    before, after = frame_around(library, draft, names, parts_of(draft.body, draft.kind))
-    return before + visible(draft.body) + after
-
-
-_HERE = Markup("<!--here-->")
-
-
 def known_parts() -> dict[str, PagePart]:
     """What scripts bring to life, by its mark."""
     return {part.mark: part for feature in features() for part in feature.parts}
@@ -122,24 +109,24 @@ def parts_of(body: str, kind: str) -> tuple[str, ...]:
     )
 
 
-def frame_around(
-    library: Library, draft: Draft, names: Names, parts: tuple[str, ...]
-) -> tuple[str, str]:
-    """What stands before and after the body of a page with these parts; see `parts_of`."""
-    own = _own_values(library, draft)
-    shared = _shared_values(library, draft, names, parts)
-    return _cut(library.render("base.html", **own, **shared))
+class Frame(Struct, frozen=True):
+    """What stands around every page of a site."""
+
+    library: Library
+    names: Names
+
+    def around(self, draft: Draft, parts: tuple[str, ...], body: str) -> str:
+        """The text of a page that has this body, and these parts; see `parts_of`."""
+        values = _values(self.library, self.names, draft, parts)
+        html = self.library.render("base.html", body=Markup(body), **values)
+        return f"{visible(html)}\n"
 
 
-def _cut(html: str) -> tuple[str, str]:
-    # Nothing else has angle brackets there: texts are escaped, and so is the structured data.
-    before, _, after = visible(html).partition(_HERE)
-    return before, f"{after}\n"
-
-
-def _own_values(library: Library, draft: Draft) -> dict[str, object]:
-    """What the frame of one page shows, and none of another."""
+def _values(
+    library: Library, names: Names, draft: Draft, parts: tuple[str, ...]
+) -> dict[str, object]:
     course, known = library.course, page_kind(draft.kind)
+    place = place_of(library, draft.path)
     return {
         "policy": policy(draft.json_ld, form=known is not None and known.form),
         "head_title": meta.head_title(course, draft.title, draft.kind),
@@ -148,25 +135,7 @@ def _own_values(library: Library, draft: Draft) -> dict[str, object]:
         "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
         "json_ld": draft.json_ld,
         "copies": _copies(draft.path),
-    }
-
-
-def _copies(page: str) -> tuple[tuple[str, str], ...]:
-    """Media types and addresses of the copies that every page has."""
-    every = (copy for copy in page_copies() if not copy.lessons and urls.has_copies(page))
-    place = urls.Place(page)
-    return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in every)
-
-
-def _shared_values(
-    library: Library, draft: Draft, names: Names, parts: tuple[str, ...]
-) -> dict[str, object]:
-    """What the frames of pages of one kind in one folder show, where no menu has these pages."""
-    course = library.course
-    place = place_of(library, draft.path)
-    return {
         "kind": draft.kind,
-        "body": _HERE,
         "language": course.language or "en",
         "direction": direction(course.language or "en"),
         "course_key": course.key,
@@ -191,6 +160,13 @@ def _shared_values(
     }
 
 
+def _copies(page: str) -> tuple[tuple[str, str], ...]:
+    """Media types and addresses of the copies that every page has."""
+    every = (copy for copy in page_copies() if not copy.lessons and urls.has_copies(page))
+    place = urls.Place(page)
+    return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in every)
+
+
 def _part_scripts(
     place: urls.Place, names: Names, parts: tuple[str, ...]
 ) -> tuple[tuple[str, str], ...]:
@@ -201,62 +177,6 @@ def _part_scripts(
             part = known[mark]
             found[place.href(path)] = part.bundled.removesuffix(".js") if part.late else ""
     return tuple((name, href) for href, name in found.items())
-
-
-_ALIKE = ("lesson", "stub", "level", "model")
-"""Kinds of pages that no menu has, so that their frames differ in their own values alone."""
-_SLOT = re.compile("\ue000([a-z_]+[0-9]*)\ue001")
-
-
-class Frames:
-    """The frames of many pages: those that are alike are put together from the same pieces."""
-
-    def __init__(self, library: Library, names: Names) -> None:
-        self._library = library
-        self._names = names
-        self._pieces: dict[object, tuple[list[str], list[str]]] = {}
-
-    def around(self, draft: Draft, parts: tuple[str, ...]) -> tuple[str, str]:
-        """See `frame_around`."""
-        if draft.kind not in _ALIKE:
-            return frame_around(self._library, draft, self._names, parts)
-        own = _own_values(self._library, draft)
-        slots, filled = _slots(own)
-        folder = draft.path.rpartition("/")[0]
-        key = (draft.kind, folder, draft.indexed, parts, repr(slots))
-        if key not in self._pieces:
-            shared = _shared_values(self._library, draft, self._names, parts)
-            before, after = _cut(self._library.render("base.html", **slots, **shared))
-            self._pieces[key] = _SLOT.split(before), _SLOT.split(after)
-        before, after = (_joined(pieces, filled) for pieces in self._pieces[key])
-        return before, after
-
-
-def _slots(own: Mapping[str, object]) -> tuple[dict[str, object], dict[str, str]]:
-    """Values that stand for those of one page, and what goes in their places, as HTML."""
-    slots: dict[str, object] = {}
-    filled: dict[str, str] = {}
-
-    def slot(name: str, value: object) -> Markup | str:
-        if not value:
-            return ""
-        filled[name] = visible(escape(value))
-        return Markup(f"\ue000{name}\ue001")
-
-    for name, value in own.items():
-        if isinstance(value, tuple):
-            slots[name] = tuple(
-                (key, slot(f"{name}{number}", text)) for number, (key, text) in enumerate(value)
-            )
-        else:
-            slots[name] = slot(name, value)
-    return slots, filled
-
-
-def _joined(pieces: list[str], filled: Mapping[str, str]) -> str:
-    """Every second piece is the name of a slot, or an author's between the same characters."""
-    texts = (p if n % 2 == 0 else filled.get(p, f"\ue000{p}\ue001") for n, p in enumerate(pieces))
-    return "".join(texts)
 
 
 def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from coursebuild.core.model import Document, Lesson, Status
+from coursebuild.core.model import Document, Lesson, Status, document_scripts
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.graph import neighbourhood
-from coursebuild.core.pages.library import Library, document_scripts
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.owners import owner_links
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.registry import page_copies

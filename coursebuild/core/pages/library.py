@@ -33,9 +33,9 @@ from coursebuild.core.model import (
     Term,
     document_blocks,
     document_inlines,
+    document_scripts,
     resolve,
 )
-from coursebuild.core.model import document_scripts as document_scripts
 from coursebuild.core.model.results import (
     CompileResult,
     Formula,

@@ -1,10 +1,9 @@
 """Every internal link, anchor, image and script of the built pages leads somewhere.
 
-Entry points: `check_links(files, base_url)`, which gives what is broken, sorted by page and place;
-`ids_and_addresses`, `references` and `all_lead_somewhere`, by which it is known beforehand that
-nothing is.
+Entry points: `check_links(files, base_url)`, which gives what is broken, sorted by page;
+`ids_and_addresses`, `references` and `has`, by which it is known beforehand that nothing is.
 
-1. Each page is read once by a real parser: its ids, and the addresses in it with their lines.
+1. Each page is read once by a real parser: its ids, and the addresses in it.
 2. Each address is resolved as a browser would, from the page that has it; those on other hosts are
    left alone.
 3. It must be a file of the site, and its fragment an id of that page. What is nearest is proposed.
@@ -13,8 +12,7 @@ nothing is.
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping
-from html.parser import HTMLParser
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
 
@@ -62,24 +60,12 @@ class BrokenLink(Struct, frozen=True):
 
     page: str
     """Site path of the page."""
-    line: int
-    """Its line in the page, from 1."""
     url: str
     """As it is written there."""
     reason: str
     """What is wrong, lower case, no full stop."""
     near: str | None
     """The nearest file or id that is there."""
-
-
-class _Address(Struct, frozen=True):
-    url: str
-    line: int
-
-
-class _Page(Struct, frozen=True):
-    ids: frozenset[str]
-    addresses: tuple[_Address, ...]
 
 
 class _Base(Struct, frozen=True):
@@ -102,19 +88,20 @@ class _Base(Struct, frozen=True):
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
     """What is broken in a site that is served at `base_url`."""
     contents = {file.path: file.data for file in files}
-    pages = {path: _read(data.decode()) for path, data in contents.items() if _is_page(path)}
+    pages = {
+        path: ids_and_addresses(data.decode())
+        for path, data in contents.items()
+        if path.endswith(".html")
+    }
+    ids = {path: found for path, (found, _) in pages.items()}
     base = _Base.of(base_url)
     broken = (
         problem
-        for path, page in pages.items()
-        for address in page.addresses
-        if (problem := _problem(path, address, contents.keys(), pages, base)) is not None
+        for path, (_, addresses) in pages.items()
+        for url in addresses
+        if (problem := _problem(path, url, contents.keys(), ids, base)) is not None
     )
-    return tuple(sorted(broken, key=lambda b: (b.page, b.line, b.url)))
-
-
-def _is_page(path: str) -> bool:
-    return path.endswith(".html")
+    return tuple(sorted(broken, key=lambda one: (one.page, one.url)))
 
 
 def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
@@ -138,16 +125,6 @@ def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[
         if target is not None:
             found.add(target if isinstance(target, tuple) else ("", target))
     return frozenset(found)
-
-
-def all_lead_somewhere(
-    references: Iterable[Reference], files: Container[str], ids: Mapping[str, Collection[str]]
-) -> bool:
-    """Whether references lead to files and, in pages, to ids; `check_links` says which do not."""
-    return all(
-        path in files and (anchor in ("", "top") or path not in ids or has(ids[path], anchor))
-        for path, anchor in references
-    )
 
 
 def has(ids: Collection[str], anchor: str) -> bool:
@@ -203,15 +180,15 @@ def _target(path: str, url: str, base: _Base) -> Reference | str | None:
 
 def _problem(
     path: str,
-    address: _Address,
+    url: str,
     files: Collection[str],
-    pages: Mapping[str, _Page],
+    ids: Mapping[str, Collection[str]],
     base: _Base,
 ) -> BrokenLink | None:
     def broken(reason: str, near: str | None = None) -> BrokenLink:
-        return BrokenLink(path, address.line, address.url, reason, near)
+        return BrokenLink(path, url, reason, near)
 
-    found = _target(path, address.url, base)
+    found = _target(path, url, base)
     if found is None:
         return None
     if isinstance(found, str):
@@ -219,9 +196,9 @@ def _problem(
     target, anchor = found
     if target not in files:
         return broken(f"no file `{target}` in the site", nearest(target, files, cutoff=0.7))
-    if anchor in ("", "top") or target not in pages or has(pages[target].ids, anchor):
+    if anchor in ("", "top") or target not in ids or has(ids[target], anchor):
         return None
-    return broken(f"`{target}` has no anchor `#{anchor}`", nearest(anchor, pages[target].ids))
+    return broken(f"`{target}` has no anchor `#{anchor}`", nearest(anchor, ids[target]))
 
 
 def _srcset(value: str) -> Iterator[str]:
@@ -237,31 +214,3 @@ def attribute_targets(tag: str, name: str, value: str) -> tuple[tuple[str, ...],
     if name not in _ADDRESSES.get(tag, ()):
         return (), ()
     return (), (tuple(_srcset(value)) if name == "srcset" else (value,))
-
-
-class _StartTags(HTMLParser):
-    """Notes where elements begin: a name, attributes, and a line from 1."""
-
-    found: list[tuple[str, list[tuple[str, str | None]], int]]
-
-    def reset(self) -> None:
-        super().reset()
-        self.found = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found.append((tag, attrs, self.getpos()[0]))
-
-
-def _read(html: str) -> _Page:
-    reader = _StartTags(convert_charrefs=True)
-    reader.feed(html)
-    reader.close()
-    ids: set[str] = set()
-    addresses: list[_Address] = []
-    for tag, attributes, line in reader.found:
-        for name, value in attributes:
-            if value is not None:
-                named, urls = attribute_targets(tag, name, value)
-                ids.update(named)
-                addresses += (_Address(url, line) for url in urls)
-    return _Page(frozenset(ids), tuple(addresses))

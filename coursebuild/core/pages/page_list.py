@@ -8,17 +8,15 @@ documents change, and its pages stay as long as the course map does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from msgspec import Struct
 
 from coursebuild.core.features import PageKind
 from coursebuild.core.model import Document
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
-from coursebuild.core.pages.tools import Tools
 from coursebuild.core.registry import page_kind
 
 
@@ -47,19 +45,6 @@ class PageEntry(Struct, frozen=True):
                 return library.pages[self.id].document
             case _:
                 return None
-
-    def draft(
-        self,
-        library: Library,
-        whole: Callable[[Document], Document] = lambda document: document,
-        tools: Tools | None = None,
-    ) -> Draft:
-        """The page drawn; `whole` gives a document with its text, `tools` are the library's."""
-        from coursebuild.core.pages.draw import draw  # with all that it takes to draw
-
-        document = self.document(library)
-        shown = None if document is None else whole(document)
-        return draw(self.inputs(library), shown, tools or library.tools)
 
 
 def page_list(library: Library) -> Iterator[PageEntry]:

@@ -1,6 +1,10 @@
 """A drawn page, ready for its frame, and what the rest of the site must know of it.
 
 Entry point: `record(draft, base_url)`.
+
+1. Formulas are set to what stands beside them (`formulas.glue`), styles in single elements become
+   classes (`styles.hoist`), and forbidden characters are made visible (`characters.visible`).
+2. Of what is left, the characters, the anchors and the addresses are noted.
 """
 
 from __future__ import annotations
@@ -9,12 +13,12 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.pages import fonts
+from coursebuild.core.pages import fonts, formulas, styles
+from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.frame import parts_of
-from coursebuild.core.pages.links import Reference, references, without_lines
-from coursebuild.core.pages.postprocess import postprocess_html
-from coursebuild.core.pages.shared import PageFacts
+from coursebuild.core.pages.links import Reference, ids_and_addresses, references, without_lines
+from coursebuild.core.pages.shared import page_characters
 
 
 class PageRecord(Struct, frozen=True):
@@ -36,24 +40,21 @@ class PageRecord(Struct, frozen=True):
     notes: tuple[tuple[str, str], ...] = ()
     """What features noted of the page: the feature's name and a digest; see `added_files`."""
 
-    @property
-    def facts(self) -> PageFacts:
-        """What the shared files must know."""
-        return PageFacts(
-            frozenset(self.text), frozenset(self.mathematics), frozenset(self.declarations)
-        )
-
 
 def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
     """The record of a page that was just drawn, and its body as it will be published."""
-    made = postprocess_html(str(draft.body))
+    # Text: what is put into `Markup` would be escaped.
+    html, declarations = styles.hoist(formulas.glue(str(draft.body)))
+    text, mathematics = page_characters(html)
+    html = visible(html)
+    ids, addresses = ids_and_addresses(html)
     found = PageRecord(
         draft=replace(draft, body=Markup()),
-        parts=parts_of(made.html, draft.kind),
-        text="".join(sorted(made.text.union(draft.title) - fonts.BASE)),
-        mathematics="".join(sorted(made.mathematics)),
-        declarations=tuple(sorted(made.declarations)),
-        ids=tuple(sorted(without_lines(made.ids))),
-        references=tuple(sorted(references(draft.path, made.addresses, base_url))),
+        parts=parts_of(html, draft.kind),
+        text="".join(sorted(text.union(draft.title) - fonts.BASE)),
+        mathematics="".join(sorted(mathematics)),
+        declarations=tuple(sorted(declarations)),
+        ids=tuple(sorted(without_lines(ids))),
+        references=tuple(sorted(references(draft.path, addresses, base_url))),
     )
-    return found, made.html
+    return found, html

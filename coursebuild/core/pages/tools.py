@@ -29,9 +29,6 @@ def known_mathml(formulas: Mapping[Formula, str | MathError]) -> Mathml:
     return mathml
 
 
-_SLOT = "\ue000"
-"""Stands for a value; no template has it."""
-
 Mark: TypeAlias = Callable[[str, str], tuple[Markup, ...]]
 """Gives the lines of code in a language, their tokens marked."""
 
@@ -51,8 +48,6 @@ class Tools(Struct, frozen=True):
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
     mark: Mark = mark_now
     """How code is marked: whoever calls may keep what was marked before."""
-    around: dict[str, tuple[str, str]] = field(default_factory=dict)
-    """What templates write around their only value, as far as it is known."""
 
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template, without its last line end.
@@ -65,15 +60,6 @@ class Tools(Struct, frozen=True):
     def text(self, text: str) -> Markup:
         """Text of an author that is not Markdown, with its quantities kept together."""
         return text_html(text, direction(self.words.language))
-
-    def enclose(self, template: str, name: str, html: Markup) -> Markup:
-        """The same for a template that writes one value, once and as it is, whatever it may be."""
-        if template not in self.around:
-            whole = str(self.render(template, **{name: Markup(_SLOT)}))
-            before, _, after = whole.partition(_SLOT)
-            self.around[template] = (before, after)
-        before, after = self.around[template]
-        return Markup(f"{before}{html}{after}")
 
     def highlight(self, language: str, code: str) -> Markup:
         """Code with its tokens marked."""

@@ -16,10 +16,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Script
+from coursebuild.core.model import Course, Script, document_scripts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library, document_scripts, models_named, owners
+from coursebuild.core.pages.library import Library, models_named, owners
 from coursebuild.core.text.source import Excerpt
 
 _NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}

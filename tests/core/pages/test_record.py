@@ -1,8 +1,9 @@
-"""What the shared files must know of a page."""
+"""What is changed in a page that was just drawn, and what is noted of it."""
 
 from __future__ import annotations
 
 import re
+import sys
 from html import unescape
 
 from hypothesis import given
@@ -10,9 +11,11 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.pages import formulas
+from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.fonts import BASE
 from coursebuild.core.pages.record import PageRecord, record
+from coursebuild.core.pages.styles import class_name
 
 PIECES = [
     *("<math><mi>x</mi><mo>&lt;</mo></math>", '<math display="block"><mi>α</mi></math>', "<math>"),
@@ -85,3 +88,37 @@ def test_the_facts_of_a_page_are_its_characters(body: str) -> None:
 def test_a_long_page_is_looked_through_once() -> None:
     """With something left to look at after the last character that counts, at each place."""
     assert recorded("λ" + "a > b & c " * 40_000)[0].text == "íλ"
+
+
+def test_formula_style_and_forbidden_character_are_changed_and_noted() -> None:
+    made, html = recorded(
+        '<p id="a&amp;b">é <math><mtd style="padding: 0"/><mi id="m">ẋ</mi></math>, \x07</p>'
+        '<a href="x.html#y" name="n">&lambda;</a><img src="a.png" srcset="b.png 2x, c.png">'
+        '<b title="id=no" data-x="no">x</b><!-- <i id="no"> --><title id="t">a</title>'
+    )
+    padding = class_name("padding: 0")
+    assert html.startswith(
+        f'<p id="a&amp;b">é <span class="held"><math><mtd class="{padding}"/>'
+        '<mi id="m">ẋ</mi></math>,</span> ␇</p>'
+    )
+    assert made.declarations == ("padding: 0",)
+    assert made.ids == ("a&b", "m", "n", "t")
+    assert made.references == (("a.png", ""), ("b.png", ""), ("c.png", ""), ("x.html", "y"))
+    assert (made.text, made.mathematics) == ("íλ", " ẋ")
+
+
+@given(st.text() | st.text(alphabet="<>/=\"' bidstyle-!&;#\n\u00a0m", max_size=60))
+def test_any_text_is_recorded_and_markup_is_taken_as_text(html: str) -> None:
+    """What is put into `Markup` would be escaped."""
+    assert type(recorded(html)[1]) is str
+
+
+def test_visible_replaces_what_html_forbids_and_nothing_else() -> None:
+    every = "".join(map(chr, range(sys.maxunicode + 1)))
+    allowed = "\t\n -~\u00a0-\ud7ff\ue000-\ufdcf\ufdf0-\ufffd"
+    planes = "".join(f"{chr(p << 16)}-{chr((p << 16) + 0xFFFD)}" for p in range(1, 17))
+    kept = re.compile(f"[{allowed}{planes}]")
+    for start in range(0, len(every), 4096):
+        part = every[start : start + 4096]
+        changed = [a for a, b in zip(part, visible(part), strict=True) if a != b]
+        assert changed == [c for c in part if not kept.match(c)]
