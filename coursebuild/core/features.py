@@ -1,7 +1,7 @@
 """The interface of features: how kinds of fences and pages, files of a site and exports enter.
 
-Entry point: `Feature`, with `FenceKind`, `PageKind`, `PagePart`, `PageCopy`, `Trials` and
-`Exporter`, which say what a feature has.
+Entry point: `Feature`, with `FenceKind`, `PageKind`, `ModelPart`, `PagePart`, `PageCopy`,
+`Trials` and `Exporter`, which say what a feature has.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeAlias, Ty
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline, Target
+from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline, MjcfModel, Target
 from coursebuild.core.model.results import (
     CompileResult,
     ModelFacts,
@@ -155,6 +155,17 @@ class PageKind(Struct, frozen=True, kw_only=True):
         return f"{self.name}/index.html"
 
 
+class ModelPart(Struct, frozen=True, kw_only=True):
+    """What a feature adds to the page of every model that compiles."""
+
+    facts: Callable[[Library, MjcfModel], Iterable[tuple[str, str]]]
+    """More of what the model is, as pairs of words."""
+    values: Callable[[Library, Place, MjcfModel], Struct]
+    """All else that it shows of the course: the page is drawn again where this is another."""
+    draw: Callable[[Tools, Any], Markup]
+    """What stands below the facts, made of these values."""
+
+
 class PageCopy(Struct, frozen=True, kw_only=True):
     """A file beside a page that says the same in another form."""
 
@@ -276,6 +287,7 @@ class Feature(Struct, frozen=True, kw_only=True):
     summary: Callable[[Document, Mathml], Parsed[Struct | None]] | None = None
     """What other pages show of a document, from all its text; nothing where that says nothing.
     It goes with the document's summary (`Library.summaries`). And what is wrong in it."""
+    model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
     """Mistakes that it can name, in addition to the catalogue (`coursebuild.core.text.rules`)."""
     check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None

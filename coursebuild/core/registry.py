@@ -24,6 +24,7 @@ from coursebuild.core.features import (
     Feature,
     FenceKind,
     Mathml,
+    ModelPart,
     PageCopy,
     PageKind,
     PublishedTrials,
@@ -49,6 +50,7 @@ CORE_FENCES = ("mjcf", "python", "text")
 """The kinds of fences that the core reads."""
 
 _INSTALLED_BY = {
+    "bench": "coursebuild with its recorded reports",
     "io": "coursebuild with its io cards",
     "lab": "coursebuild with its labs",
     "mermaid": "`plugins/mermaid` of coursebuild",
@@ -153,6 +155,12 @@ def page_kinds() -> tuple[PageKind, ...]:
 def page_kind(name: str) -> PageKind | None:
     """The page of a name that a feature adds."""
     return next((kind for kind in page_kinds() if kind.name == name), None)
+
+
+def model_parts() -> dict[str, ModelPart]:
+    """What features add to the pages of models, by the name of the feature."""
+    parts = ((feature.name, feature.model_part) for feature in features())
+    return {name: part for name, part in parts if part is not None}
 
 
 def page_copies() -> tuple[PageCopy, ...]:

@@ -5,8 +5,6 @@ Entry point: `draw(inputs, document, tools)`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from markupsafe import Markup
 
 from coursebuild.core.model import Document, Paragraph, plain_text
@@ -16,12 +14,9 @@ from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.listings import numbered
-from coursebuild.core.pages.page_inputs import Graphed, Highlighted, PageInputs, Plotted
+from coursebuild.core.pages.page_inputs import AddedParts, Graphed, Highlighted, PageInputs
 from coursebuild.core.pages.tools import Tools
-from coursebuild.core.registry import page_kind
-
-if TYPE_CHECKING:
-    from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.core.registry import model_parts, page_kind
 
 
 def draw(
@@ -62,21 +57,12 @@ def _drawn(value: object, tools: Tools) -> object:
             return numbered(tools.mark(value.language, value.text), value.path)
         case Graphed():
             return drawings(value, tools.words)
-        case Plotted():
-            return tuple(plots(f"_plot-{n}", one) for n, one in enumerate(value.reports, 1))
+        case AddedParts():
+            parts = model_parts()
+            drawn = (parts[name].draw(tools, shown) for name, shown in value.values.items())
+            return Markup("").join(drawn)
         case _:
             return value
-
-
-def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:
-    """The plot of a scenario for wide and narrow screens; `name` is that of no other one there."""
-    from coursebuild.numerics.reports.plot import plot_svg  # which few pages need
-
-    drawn = (
-        plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
-        for kind in ("wide", "narrow")
-    )
-    return tuple(Markup(svg) for svg in drawn if svg)
 
 
 def _first_sentences(document: Document) -> str:

@@ -11,16 +11,13 @@ course (where a link leads, what a script printed) stands in it as the answer.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from markupsafe import Markup
 from msgspec import Struct, field
 
 from coursebuild.core.model import Comparison, Target
 from coursebuild.core.model.results import Outcome
-
-if TYPE_CHECKING:
-    from coursebuild.numerics.reports.bench import ScenarioReport
 
 
 class ShownRun(Struct, frozen=True):
@@ -84,10 +81,10 @@ class Highlighted(Struct, frozen=True):
     """By which its lines are linked to."""
 
 
-class Plotted(Struct, frozen=True):
-    """Work–precision plots, drawn when the page is: two of each, for wide and narrow screens."""
+class AddedParts(Struct, frozen=True):
+    """What features add to the page, drawn when the page is: by the name of the feature."""
 
-    reports: tuple[ScenarioReport, ...]
+    values: Mapping[str, Struct]
 
 
 class GraphNode(Struct, frozen=True):
@@ -123,7 +120,7 @@ class PageInputs(Struct, frozen=True):
     description: str
     template: str
     values: Mapping[str, object]
-    """For the template; `Highlighted`, `Plotted` and `Graphed` among them are drawn first."""
+    """For the template; `Highlighted`, `AddedParts` and `Graphed` among them are drawn first."""
     json_ld: Markup = Markup()
     og_type: str = "website"
     indexed: bool = True

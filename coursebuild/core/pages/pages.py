@@ -17,9 +17,9 @@ from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
 from coursebuild.core.pages.lesson import LessonHead, LessonLink, edit_address, lesson_link
 from coursebuild.core.pages.library import Library, ModelUse
-from coursebuild.core.pages.measured import measured_view
-from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, Plotted
+from coursebuild.core.pages.page_inputs import AddedParts, Highlighted, PageInputs
 from coursebuild.core.pages.quantities import number
+from coursebuild.core.registry import model_parts
 
 
 class LevelView(Struct, frozen=True):
@@ -119,7 +119,9 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
     place = urls.Place(urls.model_page_path(model.name))
     compiled = library.models.get(model.name)
     title = library.words("model.title", name=model.name)
-    scene = library.reports.scenes.get(model.name)
+    facts = None if compiled is None else compiled.facts
+    parts = {} if facts is None else model_parts()
+    more = [fact for part in parts.values() for fact in part.facts(library, model)]
     values = {
         "home": place.href(urls.HOME),
         "name": model.name,
@@ -127,11 +129,11 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "anchor": listing_anchor(model.source.path),
         "title": title,
         "href": place.href(urls.model_file_path(model.name)),
-        "facts": _facts(library, compiled.facts) if compiled is not None and compiled.facts else (),
+        "facts": () if facts is None else (*_facts(library, facts), *more),
         "code": Highlighted("xml", model.source.text.rstrip(), model.source.path),
-        "measured": measured_view(library, place, model),
-        "plots": Plotted(() if scene is None else scene.scenarios),
-        "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
+        "added": AddedParts(
+            {name: part.values(library, place, model) for name, part in parts.items()}
+        ),
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
     return PageInputs(place.path, "model", title, "", "model.html", values)

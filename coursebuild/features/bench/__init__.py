@@ -1,13 +1,15 @@
-"""Recorded reports in a text: what was measured of a model in one of its scenarios.
+"""Recorded reports: what was measured of models, on their pages and in texts.
 
-A `bench` fence names a model (`parse`). `checks` compares it with the course, `page` shows what the
-page of the model shows.
+`measured` is the part of a model's page, of `scenarios` and of what the model can be without. A
+`bench` fence in a text names a model (`parse`): `checks` compares it with the course, `page` shows
+a scenario as the page of the model does.
 """
 
 from __future__ import annotations
 
-from coursebuild.core.features import Feature, FenceKind
+from coursebuild.core.features import Feature, FenceKind, ModelPart
 from coursebuild.features.bench.checks import check_benches, check_keyframes
+from coursebuild.features.bench.measured import draw_measured, measured_facts, measured_view
 from coursebuild.features.bench.model import Bench
 from coursebuild.features.bench.page import bench_markdown, draw_bench, index_bench, shown_bench
 from coursebuild.features.bench.parse import parse_bench
@@ -24,6 +26,7 @@ KIND = FenceKind(
 FEATURE = Feature(
     name="bench",
     fences=(KIND,),
+    model_part=ModelPart(facts=measured_facts, values=measured_view, draw=draw_measured),
     check=check_benches,
     check_models=check_keyframes,
 )

@@ -17,10 +17,10 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import document_blocks, scenario_anchor
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.figures import Grid, again, where
 from coursebuild.core.pages.marks import escaped, guarded
-from coursebuild.core.pages.scenarios import scenario_view
+from coursebuild.features.bench.figures import Grid, again, where
 from coursebuild.features.bench.model import Bench
+from coursebuild.features.bench.scenarios import plots, scenario_view
 
 if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter
@@ -138,8 +138,6 @@ def _view(page: PageContext, block: Bench) -> BenchView:
 
 def _plots(page: PageContext, block: Bench) -> tuple[Markup, ...]:
     """The plot, for wide and for narrow screens; their ids are numbered through the page."""
-    from coursebuild.core.pages.draw import plots  # which draws pages, and so blocks
-
     report = _shown(page, block).report
     if report is None or "plot" not in block.shows:
         return ()

@@ -8,6 +8,7 @@ from coursebuild.features.numerics.page import numerics_values
 
 FEATURE = Feature(
     name="numerics",
+    needs=("bench",),
     pages=(
         PageKind(
             name="numerics",

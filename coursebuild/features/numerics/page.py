@@ -10,7 +10,9 @@ from collections.abc import Sequence
 from msgspec import Struct
 
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.figures import (
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.strings import Strings
+from coursebuild.features.bench.figures import (
     FigurePart,
     Grid,
     about_reference,
@@ -22,9 +24,7 @@ from coursebuild.core.pages.figures import (
     power,
     sentence,
 )
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.scenarios import ORDERS, largest, lost_runs
-from coursebuild.core.pages.strings import Strings
+from coursebuild.features.bench.scenarios import ORDERS, largest, lost_runs
 from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
 from coursebuild.numerics.reports.points import FLOORS, integrator_rank, seconds_text, status_text
 from coursebuild.numerics.reports.records import STABILITY

@@ -1,7 +1,7 @@
 """What was measured on a model, as its page shows it.
 
-Entry point: `measured_view(library, place, name)`. What was not measured is said to be so, with the
-command that measures it.
+Entry points: `measured_view(library, place, model)`, `draw_measured`; `measured_facts`. What was
+not measured is said to be so, with the command that measures it.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from msgspec import Struct
 
 from coursebuild.core.model import MjcfModel, scenario_anchor
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.figures import again, factor, power, sentence, size, where, whole
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.scenarios import ScenarioView, scenario_view
 from coursebuild.core.pages.strings import Strings
-from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.core.pages.tools import Tools
+from coursebuild.features.bench.figures import again, factor, power, sentence, size, where, whole
+from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
+from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
 from coursebuild.numerics.reports.records import BENCH, DIET
 
@@ -48,8 +49,6 @@ class DietView(Struct, frozen=True):
 class MeasuredView(Struct, frozen=True):
     """All of it."""
 
-    card: tuple[tuple[str, str], ...]
-    """More of the model's facts, as pairs of words."""
     scenarios: tuple[ScenarioView, ...]
     waiting: tuple[tuple[str, str], ...]
     """Of scenarios that are declared, where nothing was measured: id and title."""
@@ -61,6 +60,10 @@ class MeasuredView(Struct, frozen=True):
     """The address of the report; empty where there is none."""
     diet: DietView | None
     diet_command: str
+    numerics: str
+    """The address of the hard cases; empty where there are none."""
+    reports: tuple[ScenarioReport, ...]
+    """Of the scenarios, for their plots."""
 
 
 def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasuredView:
@@ -71,7 +74,6 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
     declared = _declared(library, name)
     anchors = {one: scenario_anchor(one) for one in declared}
     return MeasuredView(
-        card=_card(words, model, scene),
         scenarios=tuple(
             scenario_view(words, one, anchors.get(one.name, f"_scenario-{n}"))
             for n, one in enumerate(scenarios, 1)
@@ -86,7 +88,15 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
         file="" if scene is None else place.href(urls.file_path(BENCH.path(name))),
         diet=None if diet is None else _diet(words, place, diet),
         diet_command=again("diet", name, "--record"),
+        numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
+        reports=scenarios,
     )
+
+
+def draw_measured(tools: Tools, view: MeasuredView) -> Markup:
+    """The part of the page."""
+    drawn = tuple(plots(f"_plot-{n}", one) for n, one in enumerate(view.reports, 1))
+    return tools.render("bench/measured.html", measured=view, plots=drawn)
 
 
 def _declared(library: Library, model: str) -> dict[str, str]:
@@ -95,9 +105,9 @@ def _declared(library: Library, model: str) -> dict[str, str]:
     return {one.name: one.title or one.name for each in found for one in each.scenarios}
 
 
-def _card(
-    words: Strings, model: MjcfModel, scene: SceneReport | None
-) -> tuple[tuple[str, str], ...]:
+def measured_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str], ...]:
+    """What the model is made of, and how fast it runs, as pairs of words."""
+    words, scene = library.words, library.reports.scenes.get(model.name)
     missing = words("measured.not")
     text = len(model.source.text.encode())
     card = None if scene is None else scene.card

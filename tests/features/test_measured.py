@@ -7,7 +7,15 @@ import re
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.pages.figures import bounded, exact, factor, percent, power, sentence, size
+from coursebuild.features.bench.figures import (
+    bounded,
+    exact,
+    factor,
+    percent,
+    power,
+    sentence,
+    size,
+)
 from coursebuild.numerics.reports import Reports
 from support.model_reports import box, case, diet, finding, reports, row, scenario, scene
 from support.rendered_course import Make

@@ -1,16 +1,18 @@
 """A scenario that was measured, as pages show it: of a model's page, and of a lesson's `bench`.
 
-Entry point: `scenario_view(words, report, anchor)`; `largest`, a largest stable timestep in words;
-`lost_runs`.
+Entry points: `scenario_view(words, report, anchor)`, `plots`; `largest`, a largest stable timestep
+in words; `lost_runs`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
+from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.pages.figures import (
+from coursebuild.core.pages.strings import Strings
+from coursebuild.features.bench.figures import (
     Grid,
     about_reference,
     bounded,
@@ -21,7 +23,6 @@ from coursebuild.core.pages.figures import (
     said,
     sentence,
 )
-from coursebuild.core.pages.strings import Strings
 from coursebuild.numerics.reports.bench import (
     OrderRow,
     ScenarioReport,
@@ -205,3 +206,14 @@ def largest(words: Strings, value: float | None, searched: tuple[float, float]) 
     if value == 0:
         return words("measured.stable_none", time=seconds_text(searched[0]))
     return seconds_text(value)
+
+
+def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:
+    """The plot of a scenario for wide and narrow screens; `name` is that of no other one there."""
+    from coursebuild.numerics.reports.plot import plot_svg  # which few pages need
+
+    drawn = (
+        plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
+        for kind in ("wide", "narrow")
+    )
+    return tuple(Markup(svg) for svg in drawn if svg)
