@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 
 from coursebuild.core.model import Course, Silence
 from coursebuild.core.model.results import Outcome, Results, TrialLine
+from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary
 
@@ -82,7 +83,7 @@ def depends_on(course: Course, results: Results) -> tuple[str, ...] | None:
 
     `None` where nobody can know them all, as where a script starts other programs.
     """
-    files: set[str] = {page.path for page in course.pages}
+    files = {*(page.path for page in course.pages), *shown_files(course)}
     for run in results.runs:
         if run.outcome in (Outcome.NORUN, Outcome.SKIPPED):
             continue  # what is installed is looked at in any case

@@ -23,6 +23,7 @@ from coursebuild.core.files.read import read_course, read_sources
 from coursebuild.core.model import Course, Declarations, Document, Lesson, Level, Page, Status
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.run.versions import engine_version
+from coursebuild.core.scripts.source_parts import check_source_parts
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source
 
@@ -123,11 +124,22 @@ class _Loader:
         )
         self.found += self.parser.check(course)
         self.found += _check_engine(course)
+        self.found += check_source_parts(course, self._text)
         for package in course.packages:
             if not (self.root / package.path).is_dir():
                 message = f"there is no folder `{package.path}`"
                 self.found.append(diagnose("field-value", package.span, message))
         return course
+
+    def _text(self, path: str) -> str | None:
+        """The text of a file of the project; `None` where there is none."""
+        file = (self.root / path).resolve()
+        if not file.is_file() or not file.is_relative_to(self.root.resolve()):
+            return None
+        try:
+            return file.read_text("utf-8")
+        except (OSError, UnicodeDecodeError):
+            return None
 
     def _map(self) -> Course | None:
         if self.files.map is None:

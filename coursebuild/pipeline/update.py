@@ -73,6 +73,9 @@ def _update(
         first = run(scripts, options, progress, run_all=run_all)
         again = _again(course, chosen, scripts, first, options, progress, run_all)
     edits, refused = _edits(course, chosen, first, again, _repeated(extracted))
+    for told in loaded.diagnostics:
+        if told.rule == "source-part" and told.span.path in (chosen.documents or [told.span.path]):
+            edits.setdefault(told.span.source, []).extend(told.edits)
     for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
         edits = {source: changes for source, changes in edits.items() if source.path != path}
     remarks, unwritten = _write(options, edits, dry_run=dry_run)

@@ -33,6 +33,7 @@ from coursebuild.core.registry import publish_trials
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
+from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
@@ -126,9 +127,11 @@ class Session:
             return (*static, *self.found_by_running)
 
     def files_elsewhere(self) -> frozenset[str]:
-        """The files of lessons and pages, which may lie outside of `content/`."""
+        """The files of lessons and pages, and what they show of others."""
         course = self.course
-        return frozenset() if course is None else frozenset(o.path for o in owners(course))
+        if course is None:
+            return frozenset()
+        return shown_files(course) | {one.path for one in owners(course)}
 
     def base(self) -> str:
         """The path under which the published site will be, with a slash at both ends."""

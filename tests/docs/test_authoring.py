@@ -40,10 +40,19 @@ MESSAGES = [(a, b) for a, b in pairwise(FENCES) if b.is_("prints")]
 """Each message on the page, after the example that it stands below."""
 SECOND = "content/lessons/1.2-large-swings.md"
 
+SWING = '''
+import math
+
+
+def period(length: float) -> float:
+    """Of a small swing, s."""
+    return 2 * math.pi * math.sqrt(length / 9.81)
+'''
+
 
 @pytest.fixture(scope="session")
 def checked_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
-    """The course that the guide begins with, and the two files that one example shows.
+    """The course that the guide begins with, and the files that examples show.
 
     It has been checked, so that in copies of it only what a test changes is run.
     """
@@ -54,6 +63,8 @@ def checked_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Pa
         '<svg xmlns="http://www.w3.org/2000/svg" width="40" height="40"><path d="M0 0V40"/></svg>'
     )
     (root / "content/measurements.csv").write_text("length,period\n0.5,1.419\n")
+    (root / "src").mkdir()
+    (root / "src/swing.py").write_text(SWING)
     assert main(["-C", str(root), "check", "--quiet"]) == 0
     return root
 

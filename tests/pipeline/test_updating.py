@@ -270,3 +270,22 @@ def test_an_update_of_a_course_with_other_mistakes(make: Make) -> None:
     assert "error[file-encoding]: byte 0xe9 is not UTF-8" in done.out
     assert folder.read(folder.lesson(1)) == latin
     assert "hello 3.14159\n" in folder.text(folder.lesson(2))
+
+
+def test_update_writes_the_parts_of_files_that_a_lesson_shows(make: Make) -> None:
+    fence = "   ```python show=src/ball.py#Ball.fall\n{}   ```\n"
+    folder = make("## One\n\n1. It falls:\n\n" + fence.format("") + "\n" + GOOD)
+    folder.write(
+        "src/ball.py", "class Ball:\n    @property\n    def fall(self):\n\n        return 1\n"
+    )
+    done = folder.main("check")
+    assert (done.status, done.out.count("error[")) == (1, 1)
+    assert "this is not what `src/ball.py` holds" in done.out
+    assert folder.main("update").status == 0
+    shown = "   @property\n   def fall(self):\n\n       return 1\n"
+    assert fence.format(shown) in folder.text(folder.lesson())
+    assert folder.main("build").status == 0
+    assert "src/ball.py" in folder.text("public/lessons/1.1-one.html")
+    folder.replace("src/ball.py", "return 1", "return 2")
+    done = folder.main("build")
+    assert "it has `return 2` here" in done.out

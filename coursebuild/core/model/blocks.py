@@ -234,12 +234,26 @@ class Mjcf(Struct, frozen=True):
     error_span: Span | None
 
 
+class SourcePart(Struct, frozen=True):
+    """A part of a file of the project that a block shows: `show=src/x.py#function`."""
+
+    path: str
+    part: str
+    """The name of a function, class or method; empty for the whole file."""
+    place: Span
+    """Where the fence names it."""
+    body_span: Span
+    prefix: str
+    """What stands before each line in the lesson."""
+
+
 class PlainCode(Struct, frozen=True):
     """A Python block without `file=`: shown, not run; `fragment` says that it need not parse."""
 
     span: Span
     code: Excerpt
     fragment: bool
+    source: SourcePart | None = None
 
 
 class FeatureBlock(Struct, frozen=True):

@@ -79,6 +79,8 @@ def _kept_of(block: Block) -> Iterator[Block]:
             yield from _text(block.span, _inlines(block))
         case Callout():
             yield replace(block, title=_inlines(block), blocks=())
+        case PlainCode() if block.source is not None:
+            yield block
         case BlockQuote() | ListBlock() | CodeBlock() | PlainCode() | ThematicBreak() | MathBlock():
             pass
         case _:

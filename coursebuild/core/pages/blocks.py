@@ -85,7 +85,10 @@ def code(page: PageContext, language: str, text: str) -> Markup:
 
 def plain_code(page: PageContext, block: PlainCode) -> Markup:
     """Python that is shown and not run."""
-    return code(page, "python", block.code.text)
+    shown = code(page, "python", block.code.text)
+    if block.source is None:
+        return shown
+    return page.template("blocks/source_part.html", path=block.source.path, code=shown)
 
 
 def callout(page: PageContext, block: Callout) -> Markup:

@@ -228,7 +228,7 @@ def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic
             "the output has a line that would close this fence",
             f"open and close it with {longest + 1} {marks}, then update again",
         )
-    return _whole_lines(recording.body_span, recording.prefix, lines)
+    return whole_lines(recording.body_span, recording.prefix, lines)
 
 
 def adopted(script: Script, data: bytes) -> Edit | Diagnostic:
@@ -251,7 +251,7 @@ def adopted(script: Script, data: bytes) -> Edit | Diagnostic:
         return impossible("one of its lines would close the fence")
     if "\0" in text:
         return impossible("it holds a NUL")
-    return _whole_lines(script.body_span, script.prefix, lines)
+    return whole_lines(script.body_span, script.prefix, lines)
 
 
 def block_text(data: bytes) -> str | None:
@@ -281,7 +281,7 @@ def _longest_closing(lines: Sequence[str], fence: str) -> int:
     return max((len(one[1]) for one in found if one), default=0)
 
 
-def _whole_lines(body: Span, prefix: str, lines: Sequence[str]) -> Edit:
+def whole_lines(body: Span, prefix: str, lines: Sequence[str]) -> Edit:
     """New lines in a fence, with the line ends of the lesson and what stands before each line."""
     before = body.source.text[: body.start]
     line_end = "\r\n" if before.endswith("\r\n") else "\r" if before.endswith("\r") else "\n"

@@ -76,7 +76,7 @@ class _Lessons:
         for found in frames if dump >= 0 else reversed(frames):
             extraction, span = self._find(found)
             if extraction is not None and span is not None:
-                return extraction, _without_indentation(span)
+                return extraction, without_indentation(span)
         return None
 
     def translated(self, text: str) -> str:
@@ -103,7 +103,8 @@ class _Lessons:
         return None, None
 
 
-def _without_indentation(span: Span) -> Span:
+def without_indentation(span: Span) -> Span:
+    """A line from its first letter on."""
     lead = len(span.text) - len(span.text.lstrip())
     return Span(span.source, span.start + lead, span.end)
 
@@ -284,7 +285,7 @@ def _place(found: Divergence, by_path: Mapping[str, Extraction]) -> Span | None:
     """The lesson's line where it was noticed."""
     where = by_path.get(found.path)
     span = None if where is None else where.line_span(found.line)
-    return None if span is None else _without_indentation(span)
+    return None if span is None else without_indentation(span)
 
 
 def _noticed(found: Divergence) -> str:

@@ -1,7 +1,8 @@
 """Python blocks: scripts that are extracted and run, and code that is only shown.
 
 Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun`, `diverges`,
-`writes` of a script; `fragment` of code that need not parse.
+`writes` of a script; `fragment` of code that need not parse; `show` of code that is
+that of a file.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 
-from coursebuild.core.model import PlainCode, Script
+from coursebuild.core.model import PlainCode, Script, SourcePart
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import FenceKeys, Word, words_of
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
@@ -33,14 +34,14 @@ _SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"
     "test",
     "this",
 }
-_FOLDER = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
+_PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
 _OURS = ("content", "models", "examples", "features", "public")
 _ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
 def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     """A `python` fence: a `Script` where it has a proper `file=`, else `PlainCode`."""
-    keys = fence.keys(values=("file", *_VALUES), flags=(*_FLAGS, "fragment"))
+    keys = fence.keys(values=("file", "show", *_VALUES), flags=(*_FLAGS, "fragment"))
     diagnostics = list(keys.diagnostics)
     file, fragment = keys.value.get("file"), keys.value.get("fragment")
     has_file = any(word.key == "file" for word in words_of(fence.info).value)
@@ -53,11 +54,28 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     if fragment is not None and has_file:
         message = "a block with `file` is run, so it cannot be a `fragment`"
         diagnostics.append(diagnose("fence-key-value", fragment.span, message))
-    if fragment is None or has_file:
+    show = keys.value.get("show")
+    if show is not None and (has_file or fragment is not None):
+        message = "a block shows a part of a file, or it is a script or a fragment of its own"
+        diagnostics.append(diagnose("fence-key-value", show.span, message))
+    elif show is None and (fragment is None or has_file):
         diagnostics += _syntax_mistake(fence.body, script=has_file)
     script = None if file is None else _script(fence, file, keys.value, diagnostics)
-    code = PlainCode(fence.span, fence.body, fragment is not None and file is None)
+    source = None if show is None or has_file else _source_part(fence, show, diagnostics)
+    code = PlainCode(fence.span, fence.body, fragment is not None and file is None, source)
     return Parsed(script or code, tuple(diagnostics))
+
+
+def _source_part(fence: Fence, show: Word, diagnostics: list[Diagnostic]) -> SourcePart | None:
+    path, _, part = (show.value or "").partition("#")
+    if _PATH.fullmatch(path) and not fence.nested:
+        return SourcePart(path, part, show.value_span, fence.body_span, fence.prefix)
+    message = f"`{path}` is not the path of a file of the project"
+    if fence.nested:
+        message = "a text of a quiz or lab cannot show a file"
+    help = "name it from the project's folder, as in `show=src/pkg/x.py#function`"
+    diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
+    return None
 
 
 def _script(
@@ -148,7 +166,7 @@ def _folders(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...
     for part in () if word is None else word.parts():
         folder = part.text.rstrip("/")
         first = folder.partition("/")[0]
-        if _FOLDER.fullmatch(folder) and first not in _OURS:
+        if _PATH.fullmatch(folder) and first not in _OURS:
             folders.append(folder)
             continue
         message = f"`{part.text}` is not a folder that a script may write into"

@@ -161,6 +161,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "A block with a `file` is not of kind `python`, so that nothing runs it.",
     ),
+    ("source-part", "error", "A block does not show what the file that it names holds."),
     ("script-repeated", "error", "Two blocks are extracted to the same path."),
     ("python-syntax", "error", "A Python block does not parse."),
     (
