@@ -50,7 +50,8 @@ MISTAKES = [
      '"setup": ‸"if (ctx.p > 0.9) null.x"}'),
     ("a button that throws", "lab-throws",
      '{"model": "ball", "controls": [{"type": "button", "label": "fine", "run": "ctx.a = 1"},\n'
-     '{"type": "button", "label": "b",\n"run": ‸"data.qvell[0] = 1"}]}'),
+     '{"type": "button", "label": "b",\n"run": ‸"lib.bodyPos(9)"}]}'),
+    ("a misspelt name", "lab-name", '{"model": "ball", "setup": "data.‸qvell[0] = 1"}'),
     ("a button that does not parse", "lab-code",
      '{"model": "ball", "controls": [{"type": "button", "label": "b",\n"run": ‸"if ("}]}'),
     ("a setup that throws", "lab-throws", '{"model": "ball",\n\n"setup": ‸"undeclared = 1"}'),
