@@ -33,14 +33,21 @@ Rule = Callable[[], Iterator[tuple[str, int]]]
 
 
 @cache
+def texts() -> dict[str, str]:
+    """The tests' modules, by path."""
+    paths = (path for path in sorted(HERE.rglob("*.py")) if path != Path(__file__))
+    return {path.relative_to(HERE).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+
+
 def trees(containing: str) -> dict[str, ast.Module]:
-    """The tests' modules in which a pattern is found, by path."""
-    found = {}
-    for path in sorted(HERE.rglob("*.py")):
-        text = path.read_text(encoding="utf-8")
-        if re.search(containing, text) and path != Path(__file__):
-            found[path.relative_to(HERE).as_posix()] = ast.parse(text)
-    return found
+    """The modules in which a pattern is found."""
+    found = (path for path, text in texts().items() if re.search(containing, text))
+    return {path: tree(path) for path in found}
+
+
+@cache
+def tree(path: str) -> ast.Module:
+    return ast.parse(texts()[path])
 
 
 def called_name(node: ast.Call) -> str:

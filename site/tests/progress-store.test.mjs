@@ -403,7 +403,7 @@ test('answers find their questions again by key, else by number and kind', () =>
 
 test('random histories of tabs and devices end in the same state everywhere', () => {
   const draw = random(11)
-  for (let round = 0; round < 60; round++) {
+  for (let round = 0; round < 30; round++) {
     const devices = [0, 1].map((n) => {
       const browser = new Browser()
       const now = clock(Date.UTC(2026 + 3 * n, 0, 1))

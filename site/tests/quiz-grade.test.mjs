@@ -125,7 +125,7 @@ test('a slip is found whatever the number, and what is right is never called one
     return seed / 0x7fffffff
   }
   const slips = { sign: (x) => -x, ten: (x) => x * 1e3, two: (x) => x / 2, reciprocal: (x) => 1 / x, turn: (x) => x * 2 * Math.PI }
-  for (let i = 0; i < 5000; i++) {
+  for (let i = 0; i < 1000; i++) {
     const answer = (random() + 0.1) * 10 ** Math.floor(random() * 12 - 6) * (random() < 0.5 ? -1 : 1)
     const asked = { answer, tolerance: 0.001 * Math.abs(answer), unit: '' }
     assert.equal(say(String(answer * (1 + (random() - 0.5) * 0.0019)), asked), 'right')
@@ -221,7 +221,7 @@ test('any text is right for itself', () => {
     return (seed >> 8) % n
   }
   const pieces = [...'01.-+e[](),:= \t"\'ab', 'é', '💥', '\u0000', '1.5', '-2', 'nan', '1e-06', '\ud800']
-  for (let i = 0; i < 5000; i++) {
+  for (let i = 0; i < 1000; i++) {
     const text = Array.from({ length: random(14) }, () => pieces[random(pieces.length)]).join('')
     for (const rule of ['exact', 'digits', 'rtol=1e-06 atol=0.0',
       '']) assert.equal(printed(text, text, rule), 'right', JSON.stringify(text))

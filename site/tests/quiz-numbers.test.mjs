@@ -161,7 +161,7 @@ test('any text at all is read or refused', () => {
   const random = chance(7)
   const pieces = [...'0123456789.,+-*/^() eE\'°πx√', 'sqrt(', 'pi', 'kg', 'm²', '10^-', ' ', '·', '−', '1 200', '1,200', '\u0000', 'ß',
     '{', '}', '=', 'log', 'deg', '½']
-  for (let i = 0; i < 20000; i++) {
+  for (let i = 0; i < 5000; i++) {
     const text = Array.from({ length: 1 + Math.floor(random() * 14) }, () => pieces[Math.floor(random() * pieces.length)]).join('')
     const read = readQuantity(text)
     assert.ok(read.problem ? typeof read.problem === 'string' : Number.isFinite(read.value), text)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import subprocess
 import sys
@@ -190,11 +189,6 @@ def test_the_folders_are_those_of_the_architecture() -> None:
 
 def defined(place: Path) -> set[str]:
     """The names of top-level functions, classes and constants in a module or a package."""
-    found: set[str] = set()
-    for path in [place] if place.is_file() else place.rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                found.add(node.name)
-            elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-                found.add(node.target.id)
-    return found
+    top = re.compile(r"^(?:def |class |(?=\w+: ))(\w+)", re.MULTILINE)
+    paths = [place] if place.is_file() else place.rglob("*.py")
+    return {name for path in paths for name in top.findall(path.read_text(encoding="utf-8"))}

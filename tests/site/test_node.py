@@ -1,4 +1,4 @@
-"""The tests of the browser's half that need no browser: Node runs them, one file at a time."""
+"""The tests of the browser's half that need no browser: Node runs them."""
 
 from __future__ import annotations
 
@@ -14,42 +14,31 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "site" / "tests").glob("*.test.mjs"))
-ENGINE = "from './helpers.mjs'"
-"""What a file imports whose tests start a lab engine."""
+ENGINE = [path for path in FILES if "from './helpers.mjs'" in path.read_text("utf-8")]
+"""Files whose tests start a lab engine."""
+PLAIN = [path for path in FILES if path not in ENGINE]
 
 
-@pytest.fixture(scope="session")
-def node() -> tuple[str, ...]:
+@pytest.mark.parametrize(
+    "files", [pytest.param(ENGINE, marks=pytest.mark.engine), PLAIN], ids=["engine", "plain"]
+)
+def test_files_pass_under_node(files: list[Path]) -> None:
+    """All in one process, which starts and warms up once."""
     if not (ROOT / "site" / "node_modules" / "@mujoco" / "mujoco").is_dir():
         pytest.fail("site/node_modules is not installed: run python site/bundle.py packages")
-    found: tuple[str, ...] = runpy.run_path(str(ROOT / "site" / "bundle.py"))["find_node"]().node
-    return found
-
-
-def test_there_are_files_with_and_without_an_engine() -> None:
-    engine = [path for path in FILES if ENGINE in path.read_text("utf-8")]
-    assert len(FILES) > len(engine) + 8 > 12
-
-
-def case(path: Path) -> Any:
-    marks = [pytest.mark.engine] if ENGINE in path.read_text("utf-8") else []
-    return pytest.param(path, marks=marks, id=path.name.removesuffix(".test.mjs"))
-
-
-@pytest.mark.parametrize("path", [case(path) for path in FILES])
-def test_file_passes_under_node(path: Path, node: tuple[str, ...]) -> None:
+    node = runpy.run_path(str(ROOT / "site" / "bundle.py"))["find_node"]().node
     done = subprocess.run(
-        [*node, "--test", "--test-reporter=tap", str(path)],
+        [*node, "--test-reporter=tap", "--input-type=module"],
+        input="".join(f"import {json.dumps(path.as_uri())}\n" for path in files),
         cwd=ROOT,
         env={**os.environ, "NODE_OPTIONS": ""},
-        stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         timeout=600,
     )
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
     counts = dict(line[2:].split(" ", 1) for line in done.stdout.splitlines() if line[:2] == "# ")
-    assert int(counts["pass"]) > 0
+    assert int(counts["pass"]) > 2 * len(files) > 10
     assert (counts["fail"], counts["skipped"], counts["todo"], counts["cancelled"]) == ("0",) * 4
 
 

@@ -16,29 +16,31 @@ const KINDS = ['mcq', 'several', 'predict', 'numeric', 'open', 'output', 'order'
  * @returns {string}
  */
 export function packed(answers, read) {
-  const kept = [...answers].sort((a, b) => (a.at < b.at ? 1 : -1)).map((answer) => ({ ...answer }))
-  let text = written(kept, read)
-  while (text.length > LONGEST && kept.some(({ given }) => given !== null)) {
-    const sizes = kept.map(({ given }) => JSON.stringify(given ?? null).length)
-    const largest = Math.max(...sizes.filter((_, n) => kept[n].given !== null))
-    kept[kept.findIndex(({ given }, n) => given !== null && sizes[n] === largest)].given = null
-    text = written(kept, read)
+  const kept = [...answers].sort((a, b) => (a.at < b.at ? 1 : -1))
+  const size = ({ given }) => JSON.stringify(given).length
+  const entered = kept.filter(({ given }) => given !== null).sort((a, b) => size(b) - size(a))
+  const without = (count) => {
+    const bare = new Set(entered.slice(0, count))
+    const left = kept.slice(0, kept.length - Math.max(0, count - entered.length))
+    return written(left.map((answer) => (bare.has(answer) ? { ...answer, given: null } : answer)), read)
   }
-  while (text.length > LONGEST) {
-    kept.pop()
-    text = written(kept, read)
+  let [fewest, most] = [0, entered.length + kept.length]
+  while (fewest < most) {
+    const middle = Math.floor((fewest + most) / 2)
+    if (without(middle).length <= LONGEST) most = middle
+    else fewest = middle + 1
   }
-  return text
+  return without(fewest)
 }
 
 function written(answers, read) {
-  const quizzes = new Map()
+  const q = Object.create(null) // a quiz can have any name
   for (const { quiz, key, kind, given, right, tries, hints, number, at } of answers) {
     const entry = [KINDS.indexOf(kind), right === null ? 2 : Number(right), tries, hints, number, Math.floor(Date.parse(at) / 1000)]
     if (given !== null) entry.push(given)
-    quizzes.set(quiz, [...(quizzes.get(quiz) ?? []), [key, entry]])
+    q[quiz] ??= Object.create(null)
+    q[quiz][key] = entry
   }
-  const q = Object.fromEntries([...quizzes].map(([quiz, entries]) => [quiz, Object.fromEntries(entries)]))
   return JSON.stringify({ v: VERSION, r: Number(read), q })
 }
 
