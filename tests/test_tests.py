@@ -159,8 +159,7 @@ ADVICE: dict[Rule, str] = {
 }
 TO_MEND: dict[Rule, str] = {
     assertions_that_look_once: (
-        "browser/test_offline.py browser/test_quiz_pages.py browser/test_touch.py "
-        "core/pages/test_browser.py"
+        "browser/test_offline.py browser/test_quiz_pages.py browser/test_touch.py"
     ),
     waits_for_time: "core/engine/test_workers.py",
     patches_of_private_names: (

@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, Route, expect
 
+from support.axe import violations
+from support.built_sites import Site
 from support.lab_course import PAGE
 from support.lab_page import (
     ALL,
@@ -36,11 +38,9 @@ from support.lab_page import (
     time_of,
     watched,
 )
-from support.scratch_course import ROOT, Folder
 
 pytestmark = pytest.mark.browser
 
-AXE = ROOT / "site" / "node_modules" / "axe-core" / "axe.min.js"
 PICTURES = """(n) => new Promise((done) => {
   const next = () => (n-- > 0 ? requestAnimationFrame(next) : done())
   next()
@@ -102,7 +102,7 @@ def pictures(page: Page, count: int) -> None:
     page.evaluate(PICTURES, count)
 
 
-def native(course: Folder, steps: int, angle: float, gravity: float = -9.8) -> np.ndarray:
+def native(course: Site, steps: int, angle: float, gravity: float = -9.8) -> np.ndarray:
     """The state of the pendulum after so many steps, of native MuJoCo."""
     model = mujoco.MjModel.from_xml_path(str(course.root / "models/pendulum.xml"))
     model.opt.gravity[2] = gravity
@@ -128,7 +128,7 @@ def test_engine_is_fetched_once_and_only_when_a_lab_is_near(lesson: Lesson, swin
     assert names.count("mujoco.wasm") == 1
 
 
-def test_state_is_that_of_native_mujoco(lesson: Lesson, swing: Locator, course: Folder) -> None:
+def test_state_is_that_of_native_mujoco(lesson: Lesson, swing: Locator, course: Site) -> None:
     page = lesson.page
     press(swing, "Play")
     comes(page, lambda: time_of(swing) > 0.4)
@@ -143,7 +143,7 @@ def test_state_is_that_of_native_mujoco(lesson: Lesson, swing: Locator, course: 
     comes(page, lambda: time_of(swing) == pytest.approx(expected[0], abs=0.006))
 
 
-def test_controls_do_what_they_say(lesson: Lesson, swing: Locator, course: Folder) -> None:
+def test_controls_do_what_they_say(lesson: Lesson, swing: Locator, course: Site) -> None:
     page = lesson.page
     swing.get_by_label("start").select_option("low")
     expect(swing.locator(".lab-live dd").first).to_contain_text("0.500")
@@ -269,10 +269,7 @@ def test_running_lab_has_no_accessibility_fault(lesson: Lesson, swing: Locator) 
     page = lesson.page
     press(swing, "Play")
     reach(page, SWING, "playing")
-    session = page.context.new_cdp_session(page)
-    session.send("Runtime.evaluate", {"expression": AXE.read_text(encoding="utf-8")})
-    faults = page.evaluate("async () => (await axe.run('.lab')).violations.map((v) => v.id)")
-    assert faults == []
+    assert violations(page, ".lab") == []
 
 
 # ------------------------------------------------------------------------- the other labs
@@ -406,9 +403,9 @@ def test_without_webgl_everything_else_works(browsers: Mapping[str, Browser], ba
         comes(page, lambda: time_of(swing) > 0)
 
 
-def test_from_disk_the_recorded_form_stays(context: BrowserContext, course: Folder) -> None:
+def test_from_disk_the_recorded_form_stays(context: BrowserContext, course: Site) -> None:
     page, said = watched(context)
-    page.goto((course.root / "public" / PAGE).as_uri())
+    page.goto((course.public / PAGE).as_uri())
     swing = page.locator(".lab").first
     expect(swing.locator(".lab-message")).to_contain_text("http.server")
     expect(swing.locator(".lab-static")).to_be_visible()

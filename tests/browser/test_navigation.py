@@ -8,45 +8,18 @@ from collections.abc import Iterator, Mapping
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from support.built_sites import BuiltCourses, lesson_files
-from support.folder_server import served
+from support.built_sites import Site
 from support.lab_page import becomes, comes, until
 
 pytestmark = pytest.mark.browser
 
-WIDE = "a + " * 60 + "a"
-SECTIONS = "".join(
-    f"## Part {n}\n\n{'Words. ' * 150}\n\n" + (f"### Part {n}.1\n\n{'Words. ' * 90}\n\n" * (n % 3))
-    for n in range(1, 31)
-)
-FIRST = f"""## Formulas
-
-The [force]{{term}} is $F${{symbol="force" unit="N"}}.
-
-$$F = m a$$ {{#eq:newton}}
-
-$$E = {WIDE}$$
-
-By [](#eq:newton) it is so.
-
-> [!derivation]- Folded
-> $$p = m v$$ {{#eq:momentum}}
-
-{SECTIONS}"""
-SECOND = "By [](lesson:1.1#eq:momentum) a [force](term:force) acts, see Lesson 1.3.\n"
 FORMULAS, LAST = "lessons/1.1-one.html", "lessons/1.3-three.html"
 
 
 @pytest.fixture(scope="session")
-def base(built_courses: BuiltCourses) -> Iterator[str]:
+def base(sites: Mapping[str, Site]) -> str:
     """The address of a course of three lessons."""
-    files = lesson_files(FIRST, SECOND, "Text, and [two](lesson:1.2).\n")
-    head, *lessons = str(files["content/course.toml"]).split("[[level.lesson]]")
-    needs = ("", 'prerequisites = ["1.1"]\n\n', 'prerequisites = ["1.1", "1.2"]\n')
-    parts = [lesson + need for lesson, need in zip(lessons, needs, strict=True)]
-    files["content/course.toml"] = "[[level.lesson]]".join([head, *parts])
-    with served(built_courses.of_files("navigation", files).root / "public") as address:
-        yield address
+    return sites["navigation"].url()
 
 
 @pytest.fixture
@@ -97,12 +70,15 @@ def test_references_lead_to_their_formula(page: Page, base: str) -> None:
 
 def test_a_wide_formula_scrolls_inside_itself(page: Page, base: str) -> None:
     page.goto(base + FORMULAS)
-    formula = page.locator(".equation > .formula").nth(1)
+    formulas = page.locator(".equation > .formula")
+    formula = formulas.nth(1)
     number = page.locator(f"{NEWTON} > .equation-number")
     for width in (320, 700, 1300):
         page.set_viewport_size({"width": width, "height": 700})
         until(page, "w => document.documentElement.scrollWidth === w", width)
         becomes(page, lambda: formula.evaluate("f => f.scrollWidth > f.clientWidth"), True)
+        stops = "all => all.slice(0, 2).map(f => f.tabIndex)"
+        becomes(page, lambda: formulas.evaluate_all(stops), [-1, 0])  # noqa: B023
         expect(number).to_be_visible()
         end = "n => n.getBoundingClientRect().right <= innerWidth"
         becomes(page, lambda: number.evaluate(end), True)  # noqa: B023
@@ -176,6 +152,25 @@ def test_the_nodes_of_a_drawing_are_links(page: Page, base: str) -> None:
     comes(page, lambda: large_enough(narrow.get_by_role("link").first))
     narrow.get_by_role("link", name="1.1 Lesson one (Complete)").click()
     page.wait_for_url("**/1.1-one.html")
+
+
+def test_the_keyboard_gets_past_the_head_at_once(page: Page, base: str) -> None:
+    page.goto(base + FORMULAS)
+    page.keyboard.press("Tab")
+    expect(page.locator(".skip")).to_be_focused()
+    expect(page.locator(".skip")).to_be_in_viewport()
+    page.keyboard.press("Enter")
+    expect(page).to_have_url(re.compile("#_main$"))
+
+
+def test_page_for_missing_addresses_leads_back_from_any_depth(
+    page: Page, sites: Mapping[str, Site]
+) -> None:
+    page.goto(sites["full"].url("no/such/page.html"))
+    expect(page.locator("h1")).to_have_text("Page not found")
+    expect(page.locator("body")).to_have_css("display", "flex")  # it has its style
+    page.get_by_role("link", name="Go to the course map").click()
+    page.wait_for_url(sites["full"].url())
 
 
 def test_from_a_term_to_the_glossary_and_back(page: Page, base: str) -> None:

@@ -16,6 +16,7 @@ from coursebuild.core.pages.assets import page_script
 from coursebuild.pipeline.options import Options
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
+from support.built_sites import Site
 from support.lab_course import PAGE
 from support.lab_page import comes, lab, until, watched
 from support.scratch_course import Folder
@@ -338,9 +339,9 @@ HAS_ENGINE = f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))"
 
 
 def test_labs_run_without_a_network_once_they_were_used(
-    context: BrowserContext, tmp_path: Path, course: Folder
+    context: BrowserContext, tmp_path: Path, course: Site
 ) -> None:
-    shutil.copytree(course.root / "public", tmp_path / "site")
+    shutil.copytree(course.public, tmp_path / "site")
     host = Host(tmp_path / "site")
     try:
         page, _ = opened(context, host, PAGE)
@@ -356,9 +357,9 @@ def test_labs_run_without_a_network_once_they_were_used(
 
 
 def test_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
-    context: BrowserContext, tmp_path: Path, course: Folder
+    context: BrowserContext, tmp_path: Path, course: Site
 ) -> None:
-    shutil.copytree(course.root / "public", tmp_path / "site")
+    shutil.copytree(course.public, tmp_path / "site")
     host = Host(tmp_path / "site")
     try:
         page, _ = watched(context)

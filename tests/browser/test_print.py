@@ -13,7 +13,6 @@ from pypdf import PdfReader
 
 from support.built_sites import Site
 from support.lab_page import becomes, settled
-from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 
@@ -30,15 +29,13 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
 
 
 @pytest.fixture
-def nasty(hosts: Mapping[str, Host]) -> str:
+def nasty(sites: Mapping[str, Site]) -> str:
     """The address of a lesson of what is hard to fit."""
-    return hosts["nasty"].url + LESSON
+    return sites["nasty"].url(LESSON)
 
 
-def printed(page: Page, url: str, paper: str = "A4") -> list[str]:
+def printed(page: Page, paper: str = "A4") -> list[str]:
     """The text of each sheet."""
-    page.goto(url)
-    settled(page)
     reader = PdfReader(io.BytesIO(page.pdf(format=paper)))
     return [sheet.extract_text() for sheet in reader.pages]
 
@@ -51,22 +48,26 @@ FURNITURE = re.compile(r"\d+ / \d+|.*· Simulation with MuJoCo|")
 HEADINGS = ".prose :is(h2, h3), .callout-head, .lab-title"
 
 
-@pytest.mark.parametrize("paper", ["A4", "Letter"])
-def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page, paper: str) -> None:
-    url = sites["real"].host.url + REAL
-    sheets = printed(page, url, paper)
-    assert 10 < len(sheets) < 30
+def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
+    page.goto(sites["real"].url(REAL))
+    settled(page)
     headings = page.locator(HEADINGS).evaluate_all(
         "all => all.map(h => h.innerText.replace('#', '').trim())"
     )
     assert len(headings) > 20
     known = {words(heading).casefold() for heading in headings}
+    for paper in ("A4", "Letter"):
+        is_a_handout(printed(page, paper), known)
+
+
+def is_a_handout(sheets: list[str], headings: set[str]) -> None:
+    assert 10 < len(sheets) < 30
     for number, sheet in enumerate(sheets, 1):
         assert f"{number} / {len(sheets)}" in sheet
         assert ("Mass and inertia · Simulation with MuJoCo" in sheet) == (number > 1)
         lines = [line.strip() for line in sheet.splitlines()]
         lines = [line for line in lines if not FURNITURE.fullmatch(line)]
-        assert words(lines[-1]).casefold() not in known, f"a heading ends sheet {number}"
+        assert words(lines[-1]).casefold() not in headings, f"a heading ends sheet {number}"
     text = words(" ".join(sheets))
     address = "example.org/mujoco-course/lessons/4.2-mass-and-inertia.html"
     for lab in (1, 2, 3):
@@ -79,7 +80,9 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page, paper: str
 
 def test_what_is_folded_is_open_and_links_say_where_they_lead(nasty: str, page: Page) -> None:
     page.set_viewport_size({"width": 1440, "height": 900})
-    text = words(" ".join(printed(page, nasty)))
+    page.goto(nasty)
+    settled(page)
+    text = words(" ".join(printed(page)))
     for there in ("Hidden at first.", "return one(x) + 13", "So.", "A note whose mark is folded"):
         assert there in text, there
     solid = text.replace(" ", "")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-import subprocess
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from support.course_folders import course_copy
+from support.axe import violations
+from support.built_sites import Site, course_copy
 from support.lab_page import comes, until, watched
 from support.preview_process import serving
 from support.quiz_page import (
@@ -39,8 +37,6 @@ from support.quiz_page import (
 
 pytestmark = pytest.mark.browser
 
-MODULES = Path(__file__).resolve().parents[2] / "site" / "node_modules"
-
 
 @pytest.fixture
 def page(context: BrowserContext, quizzes: str) -> Iterator[Page]:
@@ -52,57 +48,17 @@ TOO_SMALL = """elements => elements.filter((element) => {
   const box = (element.closest('label') ?? element).getBoundingClientRect()
   return box.height < 24 || box.width < 24
 }).map((element) => element.outerHTML)"""
-AXE = """axe.run('.quiz', {rules: {"color-contrast-enhanced": {enabled: true}}}).then(found =>
-    found.violations.map(v => [v.id, v.nodes[0].html, v.nodes[0].failureSummary]))"""
 
 
-def test_axe_finds_nothing_in_any_state(browsers: Mapping[str, Browser], quizzes: str) -> None:
-    with browsers["webgl"].new_context(bypass_csp=True) as context:
-        page, said = watched(context)
-        visit(page, quizzes + PATH)
-        page.evaluate((MODULES / "axe-core" / "axe.min.js").read_text(encoding="utf-8"))
-        looks: tuple[tuple[int, Any], ...] = ((320, "light"), (1440, "dark"))
-        for answered in (False, True):
-            if answered:
-                answer_all(page)
-            for width, scheme in looks:
-                page.set_viewport_size({"width": width, "height": 800})
-                page.emulate_media(color_scheme=scheme)
-                assert page.evaluate(AXE) == [], (answered, width, scheme)
-                assert page.evaluate("document.documentElement.scrollWidth") <= width
-                assert page.locator(CAN_BE_PRESSED).evaluate_all(TOO_SMALL) == []
-        assert said == []
-
-
-REFERENCES = """() => {
-  const ids = [...document.querySelectorAll('[id]')].map((element) => element.id)
-  const twice = ids.filter((id, i) => ids.indexOf(id) !== i)
-  const named = ['for', 'aria-describedby', 'aria-labelledby'].flatMap((name) =>
-    [...document.querySelectorAll(`[${name}]`)].flatMap((element) =>
-      element.getAttribute(name).split(' ')))
-  return [twice, named.filter((id) => !ids.includes(id))]
-}"""
-"""Ids that are there twice, and references to none."""
-
-
-def test_live_page_is_valid_and_its_ids_are_unique(page: Page, tmp_path: Path) -> None:
-    answer_all(page)
-    assert page.evaluate(REFERENCES) == [[], []]
-    html = page.locator("main").evaluate("element => element.outerHTML")
-    file = tmp_path / "live.html"
-    head = '<!DOCTYPE html><html lang="en"><head><title>Live</title></head><body>'
-    file.write_text(f"{head}{html}</body></html>", encoding="utf-8")
-    java = shutil.which("java")
-    assert java is not None, "no java: install Debian's package `default-jre-headless`"
-    jar = MODULES / "vnu-jar" / "build" / "dist" / "vnu.jar"
-    command = [java, "-jar", str(jar), "--format", "json", "--stdout", "--exit-zero-always"]
-    done = subprocess.run([*command, str(file)], capture_output=True, text=True, check=True)
-    messages = [
-        (message["message"], message["extract"])
-        for message in json.loads(done.stdout)["messages"]
-        if "question" in message.get("extract", "") or "quiz" in message.get("extract", "")
-    ]
-    assert messages == []
+def test_axe_finds_nothing_in_any_state(page: Page) -> None:
+    for answered in (False, True):
+        if answered:
+            answer_all(page)
+        for width in (320, 1440):
+            page.set_viewport_size({"width": width, "height": 800})
+            assert violations(page, ".quiz") == [], (answered, width)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert page.locator(CAN_BE_PRESSED).evaluate_all(TOO_SMALL) == []
 
 
 # ----------------------------------------------------------------------- what is kept of it
@@ -179,10 +135,12 @@ def test_quizzes_work_where_nothing_can_be_kept(
     assert said == []
 
 
-def test_quizzes_work_from_a_disk(browsers: Mapping[str, Browser], quiz_files: Path) -> None:
+def test_quizzes_work_from_a_disk(
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
+) -> None:
     with browsers["plain"].new_context() as context:
         page = context.new_page()
-        visit(page, f"file://{quiz_files / PATH}")
+        visit(page, f"file://{sites['quizzes'].public / PATH}")
         question(page, NUMBER).get_by_label("Your answer").fill("0.08")
         press(page, NUMBER)
         expect(verdict(page, NUMBER)).to_contain_text("Right.")
@@ -260,10 +218,10 @@ def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> 
 
 
 def test_script_of_quizzes_comes_when_a_quiz_comes_near(
-    browsers: Mapping[str, Browser], quiz_files: Path, tmp_path: Path
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site], tmp_path: Path
 ) -> None:
     far = tmp_path / "far"
-    shutil.copytree(quiz_files, far)
+    shutil.copytree(sites["quizzes"].public, far)
     page_file = far / PATH
     text = page_file.read_text(encoding="utf-8")
     page_file.write_text(text.replace("<section class=", "<p>Much.</p>" * 400 + "<section class="))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -11,8 +12,8 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from support.axe import violations
+from support.built_sites import Site
 from support.lab_page import becomes, comes, settled, until
-from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 
@@ -21,23 +22,20 @@ OpenPage = Callable[..., Page]
 
 
 @pytest.fixture
-def open_page(browsers: Mapping[str, Browser]) -> Iterator[OpenPage]:
-    """Open an address in a window of a width."""
-    contexts = []
+def open_page(browsers: Mapping[str, Browser], sites: Mapping[str, Site]) -> Iterator[OpenPage]:
+    """Open the lesson of a course, at a fragment of it, in a window of a width."""
+    with contextlib.ExitStack() as stack:
 
-    def open_page(url: str, width: int = 1440, **options: Any) -> Page:
-        viewport: Any = {"width": width, "height": 900}
-        context = browsers["plain"].new_context(viewport=viewport, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.goto(url)
-        if options.get("java_script_enabled", True):
-            settled(page)
-        return page
+        def open_page(name: str = "nasty", at: str = "", width: int = 1440, **options: Any) -> Page:
+            viewport: Any = {"width": width, "height": 900}
+            made = browsers["plain"].new_context(viewport=viewport, **options)
+            page = stack.enter_context(made).new_page()
+            page.goto(sites[name].url(LESSON) + at)
+            if options.get("java_script_enabled", True):
+                settled(page)
+            return page
 
-    yield open_page
-    for context in contexts:
-        context.close()
+        yield open_page
 
 
 OPEN_ALL = "document.querySelectorAll('details').forEach(d => d.open = true)"
@@ -46,31 +44,33 @@ FITS = "document.documentElement.scrollWidth <= innerWidth"
 
 @pytest.mark.parametrize("name", ["nasty", "arabic"])
 def test_no_page_is_wider_than_its_window(
-    hosts: Mapping[str, Host], open_page: OpenPage, name: str
+    sites: Mapping[str, Site], open_page: OpenPage, name: str
 ) -> None:
-    host = hosts[name]
-    page = open_page(host.url)
-    for path in sorted(host.folder.rglob("*.html")):
-        page.goto(host.url + path.relative_to(host.folder).as_posix())
+    page = open_page(name)
+    for path in sites[name].pages():
+        page.goto(sites[name].url(path))
         page.evaluate(OPEN_ALL)
-        widths = (320, 360, 700, 1000, 1200, 1300) if path.match(LESSON) else (320, 360)
+        widths = (320, 360, 700, 1000, 1200, 1300) if path == LESSON else (320, 360)
         for width in widths:
             page.set_viewport_size({"width": width, "height": 900})
             until(page, FITS)
 
 
-def test_wide_things_scroll_in_themselves(hosts: Mapping[str, Host], open_page: OpenPage) -> None:
-    page = open_page(hosts["nasty"].url + LESSON, 360)
+def test_wide_things_scroll_in_themselves(open_page: OpenPage) -> None:
+    page = open_page(width=360)
     for selector in (".formula", ".formula-inline", ".table", ".script pre", ".output pre"):
         box = page.locator(selector).first
         room = box.evaluate("b => [b.scrollWidth - b.clientWidth, b.tabIndex]")
         assert room[0] > 0 and room[1] == 0, selector
+    output = page.locator(".output pre").first
+    output.focus()
+    page.keyboard.press("End")
+    page.keyboard.press("ArrowRight")
+    comes(page, lambda: output.evaluate("b => b.scrollLeft") > 0)
 
 
-def test_code_in_a_callout_is_as_wide_as_elsewhere(
-    hosts: Mapping[str, Host], open_page: OpenPage
-) -> None:
-    page = open_page(hosts["nasty"].url + LESSON)
+def test_code_in_a_callout_is_as_wide_as_elsewhere(open_page: OpenPage) -> None:
+    page = open_page()
 
     def ends(*selectors: str) -> bool:
         boxes = [page.locator(selector).first.bounding_box() for selector in selectors]
@@ -83,10 +83,8 @@ def test_code_in_a_callout_is_as_wide_as_elsewhere(
         comes(page, lambda: ends(".callout-solution > p >> nth=1", ".prose > p"))
 
 
-def test_formulas_of_usual_height_leave_lines_where_they_are(
-    hosts: Mapping[str, Host], open_page: OpenPage
-) -> None:
-    page = open_page(hosts["nasty"].url + LESSON)
+def test_formulas_of_usual_height_leave_lines_where_they_are(open_page: OpenPage) -> None:
+    page = open_page()
     item = page.locator("li:has(msqrt)")
     height = "e => e.getBoundingClientRect().height"
     without = item.locator("xpath=following-sibling::li[1]")
@@ -94,6 +92,29 @@ def test_formulas_of_usual_height_leave_lines_where_they_are(
     end = "getBoundingClientRect().right"
     gap = item.locator("msqrt").evaluate(f"e => e.{end} - e.querySelector('mi').{end}")
     assert gap < 2, "nothing behind a root"
+
+
+def test_text_code_and_formulas_are_set_in_the_fonts_of_the_site(open_page: OpenPage) -> None:
+    found = "[...document.fonts].filter(f => f.status === 'loaded').map(f => f.family)"
+    loaded = {name.strip('"') for name in open_page().evaluate(found)}
+    assert loaded >= {"Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"}
+
+
+def test_colours_are_kept_and_set_before_anything_is_drawn(open_page: OpenPage) -> None:
+    page = open_page()
+    background = "getComputedStyle(document.documentElement).backgroundColor"
+    light = page.evaluate(background)
+    page.get_by_label("Colours").select_option("dark")
+    expect(page.locator("html")).not_to_have_css("background-color", light)
+    dark = page.evaluate(background)
+    early = "() => { window.early = document.documentElement.dataset.theme }"
+    page.add_init_script(f"addEventListener('DOMContentLoaded', {early})")
+    page.reload()
+    until(page, "window.early === 'dark'")
+    expect(page.locator("html")).to_have_css("background-color", dark)
+    expect(page.get_by_label("Colours")).to_have_value("dark")
+    page.get_by_label("Colours").select_option("auto")
+    until(page, "localStorage.length === 0")
 
 
 # ------------------------------------------------------------------------------- line links
@@ -104,36 +125,31 @@ def marked(page: Page) -> list[str]:
     return found
 
 
-def test_a_line_in_a_fold_is_shown_and_marked(
-    hosts: Mapping[str, Host], open_page: OpenPage
-) -> None:
-    url = hosts["nasty"].url + LESSON
-    page = open_page(f"{url}#sub/wide.L60-L62")
+def test_a_line_in_a_fold_is_shown_and_marked(open_page: OpenPage) -> None:
+    page = open_page(at="#sub/wide.L60-L62")
     becomes(page, lambda: marked(page), ["sub/wide.L60", "sub/wide.L61", "sub/wide.L62"])
     expect(page.locator("[id='sub/wide.L60']")).to_be_in_viewport()
     page.evaluate("location.hash = '#sub/wide.L4'")
     becomes(page, lambda: marked(page), ["sub/wide.L4"])
 
 
-def test_a_long_line_is_shown_from_its_beginning(
-    hosts: Mapping[str, Host], open_page: OpenPage
-) -> None:
-    page = open_page(f"{hosts['nasty'].url}{LESSON}#sub/wide.L5", 800)
+def test_a_long_line_is_shown_from_its_beginning(open_page: OpenPage) -> None:
+    page = open_page(at="#sub/wide.L5", width=800)
     becomes(page, lambda: marked(page), ["sub/wide.L5"])
     box = page.locator("pre:has([id='sub/wide.L5'])")
     shown = "b => [b.scrollWidth > b.clientWidth, b.scrollLeft]"
     becomes(page, lambda: box.evaluate(shown), [True, 0])
 
 
-def test_a_line_is_reached_without_scripts(hosts: Mapping[str, Host], open_page: OpenPage) -> None:
-    page = open_page(f"{hosts['nasty'].url}{LESSON}#sub/wide.L60", java_script_enabled=False)
+def test_a_line_is_reached_without_scripts(open_page: OpenPage) -> None:
+    page = open_page(at="#sub/wide.L60", java_script_enabled=False)
     line = page.locator("[id='sub/wide.L60']")
     expect(line).to_be_visible()  # the browser opens the fold
     expect(line).not_to_have_css("background-color", "rgba(0, 0, 0, 0)")
 
 
-def test_an_address_of_no_line_does_no_harm(hosts: Mapping[str, Host], open_page: OpenPage) -> None:
-    page = open_page(f"{hosts['nasty'].url}{LESSON}#sub/wide.L3")
+def test_an_address_of_no_line_does_no_harm(open_page: OpenPage) -> None:
+    page = open_page(at="#sub/wide.L3")
     for address in ("#sub/wide.L0", "#sub/wide.L9999", "#%", "#x.L1-L99999999"):
         page.evaluate("location.hash = '#sub/wide.L3'")
         becomes(page, lambda: marked(page), ["sub/wide.L3"])
@@ -145,10 +161,8 @@ def test_an_address_of_no_line_does_no_harm(hosts: Mapping[str, Host], open_page
     expect(page.locator(".lines").first).to_be_visible()
 
 
-def test_lines_are_marked_by_pointer_and_by_keys(
-    hosts: Mapping[str, Host], open_page: OpenPage
-) -> None:
-    page = open_page(hosts["nasty"].url + LESSON)
+def test_lines_are_marked_by_pointer_and_by_keys(open_page: OpenPage) -> None:
+    page = open_page()
     column = page.locator(".script > pre > .lines").first
     column.scroll_into_view_if_needed()
     first = int(column.get_attribute("aria-valuemin"))
@@ -168,15 +182,15 @@ def test_lines_are_marked_by_pointer_and_by_keys(
 
 
 def test_numbers_are_neither_copied_nor_selected(
-    hosts: Mapping[str, Host], open_page: OpenPage
+    sites: Mapping[str, Site], open_page: OpenPage
 ) -> None:
-    page = open_page(hosts["nasty"].url + LESSON)
+    page = open_page()
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     script = page.locator(".script[data-script]").first
     script.get_by_role("button", name="Copy").click()
     script.get_by_role("button", name="Copied").wait_for()
     text = page.evaluate("navigator.clipboard.readText()")
-    assert text == (hosts["nasty"].folder / "examples/sub/wide.py").read_text()
+    assert text == (sites["nasty"].public / "examples/sub/wide.py").read_text()
     chosen = page.evaluate(
         "() => { const chosen = getSelection()\n"
         "chosen.selectAllChildren(document.querySelector('.script pre'))\n"
@@ -219,17 +233,13 @@ def misplaced(page: Page, from_right: bool) -> list[Any]:
 
 
 @pytest.mark.parametrize("name", ["nasty", "arabic"])
-def test_notes_stand_in_the_margin_and_on_nothing(
-    hosts: Mapping[str, Host], open_page: OpenPage, name: str
-) -> None:
-    page = open_page(hosts[name].url + LESSON)
+def test_notes_stand_in_the_margin_and_on_nothing(open_page: OpenPage, name: str) -> None:
+    page = open_page(name)
     becomes(page, lambda: misplaced(page, name == "arabic"), [])
 
 
-def test_each_note_is_there_once_and_folded_ones_wait(
-    hosts: Mapping[str, Host], open_page: OpenPage
-) -> None:
-    page = open_page(hosts["nasty"].url + LESSON)
+def test_each_note_is_there_once_and_folded_ones_wait(open_page: OpenPage) -> None:
+    page = open_page()
     until(page, "document.querySelector('.footnotes .aside') !== null")
     folded = page.locator(".footnotes li", has_text="folded away")
     expect(page.get_by_text("A note whose mark is folded away.")).to_have_count(1)
@@ -251,10 +261,8 @@ def test_each_note_is_there_once_and_folded_ones_wait(
 # ------------------------------------------------------------------------- from the right
 
 
-def test_a_page_from_the_right_is_mirrored_and_its_code_is_not(
-    hosts: Mapping[str, Host], open_page: OpenPage
-) -> None:
-    page = open_page(hosts["arabic"].url + LESSON)
+def test_a_page_from_the_right_is_mirrored_and_its_code_is_not(open_page: OpenPage) -> None:
+    page = open_page("arabic")
 
     def box(selector: str) -> dict[str, float]:
         found = page.locator(selector).first.bounding_box()
@@ -296,8 +304,8 @@ QUANTITIES = {
 }
 
 
-def test_quantities_read_from_the_left(hosts: Mapping[str, Host], open_page: OpenPage) -> None:
-    page = open_page(hosts["arabic"].url + LESSON)
+def test_quantities_read_from_the_left(open_page: OpenPage) -> None:
+    page = open_page("arabic")
     for selector, text in QUANTITIES.items():
         found = page.evaluate(POSITIONS, selector)
         assert "".join(letter for letter, _ in found) == text
@@ -309,15 +317,15 @@ def test_quantities_read_from_the_left(hosts: Mapping[str, Host], open_page: Ope
 
 
 @pytest.mark.parametrize("name", ["nasty", "arabic"])
-def test_axe_finds_nothing(hosts: Mapping[str, Host], open_page: OpenPage, name: str) -> None:
-    page = open_page(hosts[name].url + LESSON + ("#sub/wide.L6-L9" if name == "nasty" else ""))
+def test_axe_finds_nothing(open_page: OpenPage, name: str) -> None:
+    page = open_page(name, "#sub/wide.L6-L9" if name == "nasty" else "")
     page.evaluate(OPEN_ALL)
     assert violations(page) == []
 
 
-def test_colours_of_the_reader_are_kept(hosts: Mapping[str, Host], open_page: OpenPage) -> None:
+def test_colours_of_the_reader_are_kept(open_page: OpenPage) -> None:
     """High contrast: what is told by a colour of ours is told by one of the system's."""
-    page = open_page(f"{hosts['nasty'].url}{LESSON}#sub/wide.L6", forced_colors="active")
+    page = open_page(at="#sub/wide.L6", forced_colors="active")
     becomes(page, lambda: marked(page), ["sub/wide.L6"])
     line, other = (page.locator(f"[id='sub/wide.L{n}']") for n in (6, 3))
     colour = "e => getComputedStyle(e).backgroundColor"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import BrowserContext, Locator, expect
 
-from support.folder_server import served
+from support.built_sites import Site
 from support.reader_page import (
     FALL_PAGE,
     PUSH_PAGE,
@@ -20,6 +20,7 @@ from support.reader_page import (
     quiet,
 )
 from support.scratch_course import Folder
+from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 
@@ -88,8 +89,8 @@ def test_question_that_cannot_be_fetched_is_linked(calm: BrowserContext, site: s
     expect(page.locator(".due")).to_have_text("One question is due.")
 
 
-def test_review_opened_from_disk_links_to_questions(calm: BrowserContext, reader: Folder) -> None:
-    page = opened(calm, (reader.root / "public/review/index.html").as_uri())
+def test_review_opened_from_disk_links_to_questions(calm: BrowserContext, reader: Site) -> None:
+    page = opened(calm, (reader.public / "review/index.html").as_uri())
     put(page, {"quiz": "fall", "key": "way", "lesson": "1.2"})
     page.reload()
     link = page.get_by_role("link", name="question 1 in its lesson")
@@ -99,11 +100,12 @@ def test_review_opened_from_disk_links_to_questions(calm: BrowserContext, reader
 
 
 def test_reworded_question_keeps_its_answer_and_its_turn(
-    calm: BrowserContext, reader: Folder, tmp_path: Path
+    calm: BrowserContext, reader: Site, tmp_path: Path
 ) -> None:
     folder = Folder(tmp_path / "course")
     shutil.copytree(reader.root, folder.root, symlinks=True)
-    with served(folder.root / "public") as site:
+    with Host(folder.root / "public") as host:
+        site = host.url
         page = opened(calm, site + PUSH_PAGE)
         first = page.locator(".question").first
         choose(page, first, "Up")

@@ -5,11 +5,8 @@ The platform's half is the npm package scorm-again, which refuses what the data 
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
-import subprocess
-import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,33 +14,13 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page, expect
 
-from support.folder_server import served
-from support.scratch_course import GOOD, ROOT, Folder
+from support.axe import violations
+from support.scratch_course import ROOT
+from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 
-MODULES = ROOT / "site/node_modules"
 RUNTIME = ROOT / "site/node_modules/scorm-again/dist/scorm12.min.js"
-QUIZ = """
-## Questions
-
-```quiz
-{"id": "check", "title": "Check", "questions": [
-  {"kind": "mcq", "id": "which", "q": "Which?", "options": ["red", "green", "blue"], "answer": 1},
-  {"kind": "numeric", "id": "much", "q": "How much?", "answer": 0.08, "unit": "kg"},
-  {"kind": "open", "id": "why", "q": "Why?", "reference": "It turns."}]}
-```
-
-[The other lesson](lesson:1.2)
-"""
-OTHER = """
-## Other
-
-```quiz
-{"id": "other", "questions": [
-  {"kind": "mcq", "id": "other", "q": "Or?", "options": ["this", "that"], "answer": 0}]}
-```
-"""
 PLATFORM = """<!DOCTYPE html><html lang="en"><title>Platform</title>
 <script src="/runtime.js"></script><script>
 var refused = [];
@@ -65,29 +42,17 @@ function leave() { document.querySelector('iframe').remove(); }
 </iframe></body></html>"""
 
 
-@pytest.fixture(scope="module")
-def package(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
-    """A package, unpacked as a platform does."""
+@pytest.fixture(scope="session")
+def base(scorm: Path) -> Iterator[str]:
+    """A platform that has the package."""
     if not RUNTIME.is_file():
         pytest.fail("scorm-again is not installed: run python site/bundle.py packages")
-    folder = Folder(tmp_path_factory.mktemp("scorm") / "course")
-    folder.fill([GOOD + QUIZ, OTHER], stores)
-    done = folder.main("export", "scorm")
-    assert done.status == 0, done.out + done.err
-    place = tmp_path_factory.mktemp("platform")
-    with zipfile.ZipFile(folder.root / "course-scorm.zip") as archive:
-        archive.extractall(place / "package")
-    (place / "runtime.js").write_bytes(RUNTIME.read_bytes())
+    shutil.copy(RUNTIME, scorm / "runtime.js")
     for name in ("1.1-one", "1.2-two"):
-        page = PLATFORM.replace("PLACE", f"package/sco/{name}.html")
-        (place / f"{name}.html").write_text(page, encoding="utf-8")
-    return place
-
-
-@pytest.fixture(scope="module")
-def base(package: Path) -> Iterator[str]:
-    with served(package) as address:
-        yield address
+        page = PLATFORM.replace("PLACE", f"sco/{name}.html")
+        (scorm / f"{name}.html").write_text(page, encoding="utf-8")
+    with Host(scorm) as host:
+        yield host.url
 
 
 Open = Callable[..., Page]
@@ -222,7 +187,7 @@ def test_visit_goes_on_over_other_pages_of_the_course(visit: Open) -> None:
 
 def test_lesson_is_there_without_a_platform_and_says_so(context: BrowserContext, base: str) -> None:
     page = context.new_page()
-    page.goto(f"{base}package/sco/1.1-one.html")
+    page.goto(f"{base}sco/1.1-one.html")
     expect(page.get_by_role("status")).to_have_text(re.compile("^No learning platform"))
     page.frame_locator("iframe").locator("[data-question]").first.wait_for()
     until(page, "document.documentElement.scrollWidth <= innerWidth")
@@ -233,7 +198,7 @@ def test_lesson_without_javascript_is_a_link_away(
 ) -> None:
     with browsers["plain"].new_context(java_script_enabled=False) as context:
         page = context.new_page()
-        page.goto(f"{base}package/sco/1.1-one.html")
+        page.goto(f"{base}sco/1.1-one.html")
         page.get_by_role("link", name="1.1 Lesson one").click()
         heading = page.get_by_role("heading", level=1)
         expect(heading).to_have_text(re.compile("Lesson one$"))
@@ -244,7 +209,7 @@ def test_platform_in_a_window_of_its_own(context: BrowserContext, base: str) -> 
     opener.goto(f"{base}1.1-one.html")
     opener.evaluate("document.querySelector('iframe').remove(); API.reset()")
     with context.expect_page() as opened:
-        opener.evaluate("window.open('package/sco/1.1-one.html')")
+        opener.evaluate("window.open('sco/1.1-one.html')")
     window = opened.value
     window.frame_locator("iframe").locator("[data-question]").first.wait_for()
     until(opener, "API.cmi.core.lesson_status === 'incomplete'")
@@ -252,27 +217,11 @@ def test_platform_in_a_window_of_its_own(context: BrowserContext, base: str) -> 
     until(opener, "API.isTerminated()")
 
 
-def test_launch_page_meets_the_standards(context: BrowserContext, base: str) -> None:
-    address = f"{base}package/sco/1.1-one.html"
-    java = shutil.which("java")
-    assert java is not None, "no java: install Debian's package `default-jre-headless`"
-    jar = MODULES / "vnu-jar/build/dist/vnu.jar"
-    allow = "-Dnu.validator.servlet.allow-forbidden-hosts=true"
-    command = [java, allow, "-jar", str(jar), "--format", "json", "--stdout", address]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert json.loads(done.stdout)["messages"] == []
+def test_axe_finds_nothing_in_the_launch_page(context: BrowserContext, base: str) -> None:
     page = context.new_page()
-    page.goto(address)
+    page.goto(f"{base}sco/1.1-one.html")
     page.get_by_role("status").wait_for()
-    for scheme in ("light", "dark"):
-        page.emulate_media(color_scheme=scheme)
-        found = page.evaluate(
-            f"{(MODULES / 'axe-core/axe.min.js').read_text('utf-8')};"
-            # The heading is that of the lesson, in the frame.
-            "axe.run(document, {iframes: false, rules: {'page-has-heading-one': {enabled: false}}})"
-            ".then(({violations}) => violations)"
-        )
-        assert [(one["id"], len(one["nodes"])) for one in found] == []
+    assert violations(page, "body > :not(iframe)") == []
 
 
 def test_keyboard_reaches_into_the_lesson(visit: Open) -> None:

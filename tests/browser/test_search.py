@@ -10,55 +10,19 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, expect
 
 from support.axe import violations
-from support.built_sites import BuiltCourses, lesson_files
-from support.folder_server import served
+from support.built_sites import Site
 from support.lab_page import becomes, settled, until, watched
-from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.browser
 
 HOSTILE = '<img src=x onerror="alert(1)"> & <b>bold'
-LESSONS = [
-    """## The inertia tensor {#tensor}
-
-For a rigid body it is $I_{xx}$ and its kin; the angular velocity is $\\omega$.
-
-$$\\boldsymbol{\\tau} = \\dot{\\mathbf{L}}$$
-
-## Drift of Euler's step
-
-Energy grows by a little each step.
-""",
-    "## Stepping\n\n"
-    + block(
-        "step.py", "import math\n\n\ndef mj_forward(model, data):\n    return data\n", info="norun"
-    )
-    + "The `qpos` of `mjData` is read by `data.qpos[0]`.\n",
-    '## Titles of `<img src=x onerror="alert(1)">`\n\n'
-    "Hostile `</script><script>alert(2)</script>`.\n",
-]
 SINGLE = "localStorage.getItem('coursebuild.shortcuts')"
 
 
 @pytest.fixture(scope="session")
-def folder(built_courses: BuiltCourses) -> Folder:
-    """A course of three lessons and many short ones, built."""
-    files = lesson_files(*LESSONS)
-    toml = str(files["content/course.toml"])
-    toml = toml.replace('title = "Lesson three"', f"title = {json.dumps(HOSTILE)}")
-    for n in range(4, 24):
-        toml += (
-            f'\n[[level.lesson]]\nid = "1.{n}"\nslug = "more{n}"\ntitle = "Pendulum {n}"\n'
-            'status = "complete"\n'
-        )
-        files[f"content/lessons/1.{n}-more{n}.md"] = f"## Swing\n\nA pendulum, number {n}.\n"
-    return built_courses.of_files("search", {**files, "content/course.toml": toml})
-
-
-@pytest.fixture(scope="session")
-def site(folder: Folder) -> Iterator[str]:
-    with served(folder.root / "public") as address:
-        yield address
+def site(sites: Mapping[str, Site]) -> str:
+    """The address of a course of three lessons and many short ones."""
+    return sites["search"].url()
 
 
 Opened = Callable[..., Page]
@@ -349,13 +313,14 @@ def test_hostile_titles_and_texts_are_text(opened: Opened) -> None:
     assert HOSTILE in ask(page, "bold")[0]
 
 
-def test_from_a_disk(folder: Folder, opened: Opened) -> None:
-    page = opened(base=(folder.root / "public").as_uri() + "/")
+def test_from_a_disk(sites: Mapping[str, Site], opened: Opened) -> None:
+    public = sites["search"].public
+    page = opened(base=f"{public.as_uri()}/")
     open_by_key(page)
     assert ask(page, "mj_forwrad")[0].startswith("1.2 Lesson two")
     page.keyboard.press("Enter")
     page.wait_for_url("file://**/lessons/1.2-two.html")
-    page.goto((folder.root / "public" / "search" / "index.html").as_uri() + "?q=euler+drfit")
+    page.goto(f"{public.as_uri()}/search/index.html?q=euler+drfit")
     expect(page.locator(".found-pages a").first).to_have_text("1.1 Lesson one")
 
 
@@ -421,10 +386,10 @@ def test_an_index_that_does_not_come_is_told(opened: Opened, calm: BrowserContex
 
 
 def test_a_list_of_pages_from_before_is_loaded_anew(
-    opened: Opened, calm: BrowserContext, folder: Folder
+    opened: Opened, calm: BrowserContext, sites: Mapping[str, Site]
 ) -> None:
     """The site was built anew since the browser kept the list, and the files in it have gone."""
-    text = folder.text("public/search/index.js")
+    text = (sites["search"].public / "search/index.js").read_text()
     names = json.loads(text.partition(',"",')[2].rstrip()[:-1])["files"]
     old = text.replace(names, "0" * len(names))
     calm.route(

@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 from urllib.parse import urljoin, urlsplit
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
+from support import quiz_page
 from support.axe import violations
 from support.built_sites import Site
-from support.lab_page import settled, until, watched
+from support.lab_page import becomes, settled, until, watched
 from support.scratch_course import ROOT
+from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 
@@ -29,7 +32,7 @@ NARROW = (320, 360)
 
 
 def test_every_kind_of_page_is_found(sites: Mapping[str, Site]) -> None:
-    for site in sites.values():
+    for site in (sites[name] for name in NAMES):
         assert site.kinds().keys() >= KNOWN
         assert len(site.pages()) > len(site.kinds())
 
@@ -37,14 +40,47 @@ def test_every_kind_of_page_is_found(sites: Mapping[str, Site]) -> None:
 # ------------------------------------------------------------------------------------ HTML
 
 
-def test_nu_checker_finds_nothing(sites: Mapping[str, Site]) -> None:
+REFERENCES = """() => {
+  const ids = [...document.querySelectorAll('[id]')].map((element) => element.id)
+  const twice = ids.filter((id, i) => ids.indexOf(id) !== i)
+  const named = ['for', 'aria-describedby', 'aria-labelledby'].flatMap((name) =>
+    [...document.querySelectorAll(`[${name}]`)].flatMap((element) =>
+      element.getAttribute(name).split(' ')))
+  return [twice, named.filter((id) => !ids.includes(id))]
+}"""
+"""Ids that are there twice, and references to none."""
+
+
+@pytest.fixture
+def live_quizzes(context: BrowserContext, quizzes: str, tmp_path: Path) -> str:
+    """A page as scripts leave it when every kind of question was answered."""
+    page = context.new_page()
+    quiz_page.visit(page, quizzes + quiz_page.PATH)
+    quiz_page.answer_all(page)
+    becomes(page, lambda: page.evaluate(REFERENCES), [[], []])
+    parts = page.locator(".quiz").evaluate_all("all => all.map(one => one.outerHTML).join('')")
+    head = '<!DOCTYPE html><html lang="en"><head><title>Live</title></head><body>'
+    file = tmp_path / "live.html"
+    file.write_text(f"{head}<h1>Live</h1>{parts}</body></html>", encoding="utf-8")
+    return str(file)
+
+
+@pytest.fixture
+def launch_page(scorm: Path) -> Iterator[str]:
+    with Host(scorm) as host:
+        yield f"{host.url}sco/1.1-one.html"
+
+
+def test_nu_checker_finds_nothing(
+    sites: Mapping[str, Site], live_quizzes: str, launch_page: str
+) -> None:
     """Over HTTP, so that `'self'` in the pages' policy means something; one start for all."""
     java = shutil.which("java")
     assert java is not None, "no java: install Debian's package `default-jre-headless`"
     allow = "-Dnu.validator.servlet.allow-forbidden-hosts=true"
-    urls = [site.host.url + path for site in sites.values() for path in site.unlike_pages()]
+    urls = [sites[name].url() + path for name in NAMES for path in sites[name].unlike_pages()]
     options = ("--format", "json", "--stdout", "--exit-zero-always")
-    command = [java, allow, "-jar", str(VNU), *options, *urls]
+    command = [java, allow, "-jar", str(VNU), *options, *urls, live_quizzes, launch_page]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     messages = json.loads(done.stdout)["messages"]
     assert [(m["url"], m.get("lastLine"), m["message"]) for m in messages] == []

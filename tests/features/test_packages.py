@@ -12,8 +12,8 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from support.axe import violations
-from support.folder_server import served
 from support.scratch_course import ROOT, Done, Folder
+from support.static_host import Host
 
 pytestmark = pytest.mark.site
 
@@ -140,11 +140,11 @@ def test_mistakes_have_rules_and_places(
 @pytest.fixture
 def page(browsers: Mapping[str, Browser], course: Folder) -> Iterator[Page]:
     with (
-        served(course.root / "public") as address,
+        Host(course.root / "public") as host,
         browsers["plain"].new_context(service_workers="block") as context,
     ):
         page = context.new_page()
-        page.goto(f"{address}lessons/1.1-one.html")
+        page.goto(f"{host.url}lessons/1.1-one.html")
         yield page
 
 

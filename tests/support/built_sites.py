@@ -10,22 +10,24 @@ import contextlib
 import fcntl
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from support.course_folders import course_files
-from support.scratch_course import ROOT, Folder, course_map
+from support.scratch_course import ROOT, Folder
 from support.static_host import Host
 
 _KIND = re.compile(rb'<body class="on-([a-z-]+)"')
+
+
+_BASES = {"real": "/mujoco-course/", "full": "/constructs/", "nasty": "/c/", "arabic": "/c/"}
+"""The paths of the base addresses that courses say they have."""
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
     """A built course and its host."""
 
-    name: str
     root: Path
     host: Host
 
@@ -56,7 +58,7 @@ class Site:
         assert match is not None, path
         return match[1].decode()
 
-    def url(self, path: str) -> str:
+    def url(self, path: str = "") -> str:
         return self.host.url + path.removesuffix("index.html")
 
 
@@ -67,22 +69,16 @@ class BuiltCourses:
     shared: Path
     stores: Path
 
-    def of_files(self, name: str, files: Mapping[str, str | bytes]) -> Folder:
-        """A course of these files."""
-        folder = Folder(self.shared / name / "a course")
-        with _locked(self.shared / name):
-            if not self._done(name).exists():
-                shutil.rmtree(folder.root, ignore_errors=True)
-                for path, data in files.items():
-                    folder.write(path, data)
-                folder.borrow(self.stores)
-                _build(folder)
-                self._done(name).touch()
-        return folder
-
     def of_case(self, name: str) -> Folder:
         """The course of a folder in tests/courses."""
-        return self.of_files(name, course_files(name))
+        folder = Folder(self.shared / name / "a course")
+        done = self.shared / name / "done"
+        with _locked(self.shared / name):
+            if not done.exists():
+                shutil.rmtree(folder.root, ignore_errors=True)
+                _build(course_copy(name, folder.root, self.stores))
+                done.touch()
+        return folder
 
     def real(self) -> Folder:
         """The course of this repository: where `make site` has been run, nothing is to do."""
@@ -91,15 +87,25 @@ class BuiltCourses:
             _build(folder)
         return folder
 
-    def _done(self, name: str) -> Path:
-        return self.shared / name / "done"
+
+class Sites(dict[str, Site]):
+    """The courses in `tests/courses`, and the `real` one, built and served when asked for."""
+
+    def __init__(self, courses: BuiltCourses) -> None:
+        super().__init__()
+        self._courses = courses
+
+    def __missing__(self, name: str) -> Site:
+        folder = self._courses.real() if name == "real" else self._courses.of_case(name)
+        self[name] = Site(folder.root, Host(folder.root / "public", _BASES.get(name, "/")))
+        return self[name]
 
 
-def lesson_files(*texts: str) -> dict[str, str | bytes]:
-    """The files of a course of these lessons."""
-    named = Folder(ROOT)
-    lessons = {named.lesson(number): text for number, text in enumerate(texts, 1)}
-    return {"content/course.toml": course_map(len(texts)), **lessons}
+def course_copy(name: str, root: Path, stores: Path) -> Folder:
+    """A copy of a course in `tests/courses`, for a test that changes it."""
+    folder = Folder(Path(shutil.copytree(ROOT / "tests/courses" / name / "course", root)))
+    folder.borrow(stores)
+    return folder
 
 
 def _build(folder: Folder) -> None:

@@ -1,47 +1,27 @@
-"""A static host: compresses, sends validators and lifetimes as hosts do, and can be away."""
+"""A static host: sends compressed copies, validators and lifetimes as hosts do, and can be away."""
 
 from __future__ import annotations
 
 import contextlib
-import gzip
 import hashlib
 import http.server
+import mimetypes
 import re
 import socket
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 from urllib.parse import unquote, urlsplit
 
-import brotli
-
-TYPES = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".webmanifest": "application/manifest+json",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-    ".jpg": "image/jpeg",
-    ".woff2": "font/woff2",
-    ".wasm": "application/wasm",
-    ".xml": "application/xml",
-    ".py": "text/x-python; charset=utf-8",
-    ".md": "text/markdown; charset=utf-8",
-    ".txt": "text/plain; charset=utf-8",
-}
-_PACKED = (".html", ".css", ".js", ".json", ".webmanifest", ".svg", ".wasm", ".xml", ".txt")
 _LASTING = re.compile(r".*/assets/.*\.[0-9a-f]{8}\.[a-z0-9]+")
 
 
-class Host:
-    """Serves a folder at `url`, which stays its address while it is away."""
+class Host(contextlib.AbstractContextManager["Host"]):
+    """Serves a folder at `url`, which stays its address while it is away; `base` is its path."""
 
     def __init__(self, folder: Path, base: str = "/") -> None:
-        """`base` is the path under which the folder is served."""
         self.folder = folder
         self.base = base
         self.asked: list[str] = []
@@ -51,10 +31,15 @@ class Host:
         self.answering.set()
         self.fonts_delay = 0.0
         """Seconds before a font, which on this machine alone comes before anything is drawn."""
-        self._packed: dict[tuple[str, bytes], bytes] = {}
         self._server: http.server.ThreadingHTTPServer | None = None
         self._port = 0
         self.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
 
     @property
     def url(self) -> str:
@@ -92,24 +77,10 @@ class Host:
 
     def file(self, address: str) -> tuple[int, Path]:
         path = unquote(urlsplit(address).path)
-        if not path.startswith(self.base):
-            return 404, self.folder / "404.html"
         inner = path.removeprefix(self.base)
-        if not inner or inner.endswith("/"):
-            inner += "index.html"
-        found = self.folder / inner
-        return (200, found) if found.is_file() else (404, self.folder / "404.html")
-
-    def packed(self, data: bytes, accepted: str) -> tuple[str, bytes]:
-        coding = "br" if "br" in accepted else "gzip" if "gzip" in accepted else ""
-        if not coding or len(data) < 256:
-            return "", data
-        key = coding, hashlib.sha256(data).digest()
-        if key not in self._packed:
-            self._packed[key] = (
-                brotli.compress(data, quality=5) if coding == "br" else gzip.compress(data, 6)
-            )
-        return coding, self._packed[key]
+        found = self.folder / (inner + "index.html" if not inner or inner[-1] == "/" else inner)
+        known = path.startswith(self.base) and found.is_file()
+        return (200, found) if known else (404, self.folder / "404.html")
 
 
 class _Server(http.server.ThreadingHTTPServer):
@@ -157,19 +128,19 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         time.sleep(host.fonts_delay if path.suffix == ".woff2" else 0.0)
         data = path.read_bytes() if path.is_file() else b""
         tag = f'"{hashlib.sha256(data).hexdigest()[:16]}"'
-        lasting = _LASTING.fullmatch(urlsplit(self.path).path)
-        fresh = self.headers.get("If-None-Match", "").removeprefix("W/") == tag
-        if status == 200 and fresh:
+        if status == 200 and self.headers.get("If-None-Match", "").removeprefix("W/") == tag:
             status, data = 304, b""
         self.send_response(status)
-        coding = ""
-        if path.suffix in _PACKED and status != 304:
-            coding, data = host.packed(data, self.headers.get("Accept-Encoding", ""))
-        self.send_header("Content-Type", TYPES.get(path.suffix, "application/octet-stream"))
-        if coding:
-            self.send_header("Content-Encoding", coding)
+        copy = path.with_name(f"{path.name}.br")
+        if data and "br" in self.headers.get("Accept-Encoding", "") and copy.is_file():
+            data = copy.read_bytes()
+            self.send_header("Content-Encoding", "br")
+        kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+        text = "; charset=utf-8" if kind.startswith("text/") else ""
+        self.send_header("Content-Type", kind + text)
         self.send_header("Vary", "Accept-Encoding")
         self.send_header("ETag", tag)
+        lasting = _LASTING.fullmatch(urlsplit(self.path).path)
         kept = "max-age=31536000, immutable" if lasting else "max-age=0, must-revalidate"
         self.send_header("Cache-Control", kept)
         self.send_header("Content-Length", str(len(data)))

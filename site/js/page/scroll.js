@@ -18,7 +18,8 @@ export function markScrolling(part) {
     const sides = hiddenSides(box.scrollLeft, box.clientWidth, box.scrollWidth)
     if (sides) box.dataset.more = sides
     else delete box.dataset.more
-    if (sides || box.scrollHeight > box.clientHeight + 1) box.tabIndex = 0
+    const below = box.scrollHeight > box.clientHeight + 1 && getComputedStyle(box).overflowY !== 'hidden'
+    if (sides || below) box.tabIndex = 0
     else box.removeAttribute('tabindex')
   }
   const observer = new ResizeObserver((entries) => entries.forEach(({ target }) => mark(target)))
