@@ -1,6 +1,6 @@
 """Speed against error of a model in its scenarios.
 
-Entry point: `measure_scene(model, declared, quick=…, clock=…, tell=…)`.
+Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 
 1. A first run in small steps says what acts in a scenario and how far it can be told (`pilot`).
 2. The reference is made, and made again in another way (`references`).
@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import Declarations
 from coursebuild.numerics.engine import refsafe_from
 from coursebuild.numerics.front import front, verdict, words
 from coursebuild.numerics.measure import Errors, Sizes, fitted_orders
@@ -32,39 +31,13 @@ from coursebuild.numerics.reports.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.numerics.rows import Basis, MeasuredRow, measured
-from coursebuild.numerics.scene import Scene, scenes
+from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import own_setting, settings, stable
 from coursebuild.numerics.timing import Clock, costs, subnormal
 from mjcourse.spatial import angular_distance
 
 _STRAIGHT = 0.75
 """The difference of slopes on the way from which on errors follow no one power of the timestep."""
-
-
-def measure_scene(
-    model: Any,
-    declared: Declarations | None,
-    *,
-    quick: bool = False,
-    clock: Clock | None,
-    tell: Callable[[str], None] = lambda _: None,
-) -> tuple[ScenarioReport, ...]:
-    """Measure a model (`mjModel`) in its scenarios.
-
-    Args:
-        model: compiled; it is not changed.
-        declared: what its author wrote of it, if anything.
-        quick: fewer timesteps, fewer repeats.
-        clock: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
-        tell: is told what is being done.
-
-    Raises:
-        SceneError: a scenario does not fit the model, or diverges at every timestep.
-    """
-    return tuple(
-        measure_scenario(model, one, quick=quick, clock=clock, tell=tell)
-        for one in scenes(model, declared, quick=quick)
-    )
 
 
 def measure_scenario(
@@ -75,7 +48,18 @@ def measure_scenario(
     clock: Clock | None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> ScenarioReport:
-    """Measure a model in one of its scenarios; see `measure_scene`."""
+    """Measure a model (`mjModel`) in one of its scenarios.
+
+    Args:
+        model: compiled; it is not changed.
+        scene: the scenario.
+        quick: fewer timesteps, fewer repeats.
+        clock: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
+        tell: is told what is being done.
+
+    Raises:
+        SceneError: the scenario does not fit the model, or diverges at every timestep.
+    """
     tell(f"{scene.name}: a first run")
     first = pilot(model, scene)
     tell(f"{scene.name}: the reference")

@@ -34,6 +34,8 @@ _CODE = {
     Integrator.RK4: mujoco.mjtIntegrator.mjINT_RK4,
     Integrator.DISCRETE: mujoco.mjtIntegrator.mjINT_DISCRETE,
 }
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""All that the next step depends on."""
 _WATCHED = 8
 """Steps from one look at the state to the next."""
 
@@ -127,6 +129,13 @@ def initial_data(scenario: Scenario, model: Any) -> Any:
     if scenario.controls:
         data.ctrl[:] = scenario.controls[0]
     return data
+
+
+def full_state(model: Any, data: Any) -> Array:
+    """What `STATE` says, as it is now."""
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return state
 
 
 # ------------------------------------------------------------------------------------------ states

@@ -29,11 +29,6 @@ class Integrator(enum.Enum):
     RK4 = "RK4"
     DISCRETE = "discrete"
 
-    @property
-    def mjcf_name(self) -> str:
-        """What `<option integrator="…">` says."""
-        return "Euler" if self is Integrator.EULER_EXPLICIT else self.value
-
 
 INTEGRATORS: tuple[Integrator, ...] = tuple(Integrator)
 STANDARD: tuple[Integrator, ...] = tuple(

@@ -33,7 +33,15 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
 
-from coursebuild.numerics.engine import advance, initial_data, integrator_of, silent, varied
+from coursebuild.numerics.engine import (
+    STATE,
+    advance,
+    full_state,
+    initial_data,
+    integrator_of,
+    silent,
+    varied,
+)
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports.bench import MeasuredSetting
@@ -59,8 +67,6 @@ _JOB = 1_000_000
 """ns that a job takes at least."""
 _EMPTY = 20
 """Times that beginning is repeated, to see what it takes."""
-STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""All that the next step depends on."""
 
 
 class Timing(Struct, frozen=True):
@@ -259,10 +265,3 @@ def moments(model: Any, data: Any, scenario: Scenario) -> tuple[Array, ...]:
             found.append(full_state(model, data))
         advance(model, data, every)
     return tuple(found)
-
-
-def full_state(model: Any, data: Any) -> Array:
-    """What `STATE` says, as it is now."""
-    state = np.empty(mujoco.mj_stateSize(model, STATE))
-    mujoco.mj_getState(model, data, state, STATE)
-    return state

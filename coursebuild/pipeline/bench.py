@@ -163,25 +163,17 @@ class SceneRun(MeasuringRun):
             scene.name, "bench", whole, SceneReport, lambda: self._report(scene, parts)
         )
 
-    def _report(self, scene: CourseScene, parts: tuple[str, ...]) -> SceneReport | None:
-        scenarios = self._scenarios(scene, parts)
-        if scenarios is None:
-            return None
+    def _report(self, scene: CourseScene, parts: tuple[str, ...]) -> SceneReport:
+        scenarios = tuple(self._scenarios(scene, parts))
         report = SceneReport(scene.name, scene.digest, self.quick, self.here, scenarios)
         if self.cards and scenarios:
             self.progress.doing(scene.name, "what it is made of")
             report = self.measuring.with_card(self.options.root, scene, report)
         return report
 
-    def _scenarios(
-        self, scene: CourseScene, parts: tuple[str, ...]
-    ) -> tuple[ScenarioReport, ...] | None:
-        """Each scenario, from what is kept or measured now; nothing where one cannot be."""
+    def _scenarios(self, scene: CourseScene, parts: tuple[str, ...]) -> Iterator[ScenarioReport]:
+        """Each scenario, from what is kept or measured now."""
         loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
-        if isinstance(loaded, Diagnostic):
-            self.diagnostics.append(loaded)
-            return None
-        reports = []
         for number in range(len(loaded.scenarios)):
             own = (*parts, f"{number}")
             found = self.kept("bench-scenarios", own, ScenarioReport)
@@ -193,12 +185,8 @@ class SceneRun(MeasuringRun):
                     timed=not self.again,
                     tell=lambda text: self.progress.doing(scene.name, text),
                 )
-                if isinstance(found, Diagnostic):
-                    self.diagnostics.append(found)
-                    return None
                 self.keep("bench-scenarios", own, found)
-            reports.append(found)
-        return tuple(reports)
+            yield found
 
     @property
     def measuring(self) -> Any:

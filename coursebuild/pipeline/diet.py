@@ -14,7 +14,7 @@ Entry point: `diet(options, names, …)`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from msgspec.structs import replace
 
@@ -23,9 +23,12 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_course
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.numerics.engine import silent
+from coursebuild.numerics.pruning.ablation import Survey
+from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.reports.diet import DietReport
 from coursebuild.numerics.reports.records import DIET, ReportFailure
-from coursebuild.pipeline.diet_model import CannotError, DietModel
+from coursebuild.pipeline.diet_model import DietModel
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reports import (
     MeasuringRun,
@@ -35,10 +38,6 @@ from coursebuild.pipeline.reports import (
 )
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.report.measuring import Measurement
-
-if TYPE_CHECKING:
-    from coursebuild.numerics.pruning.ablation import Survey
-    from coursebuild.numerics.pruning.model_text import ModelText
 
 _T = TypeVar("_T")
 _CODE = ("coursebuild/numerics", "coursebuild/pipeline/diet_model.py", "mjcourse/spatial")
@@ -97,14 +96,8 @@ class _DietRun(MeasuringRun):
         )
 
     def _looked(self, look: DietModel) -> DietReport | None:
-        from coursebuild.numerics.engine import silent
-
-        try:
-            with silent():  # what MuJoCo warns of, it would write into the working directory
-                report = self._fixed(look) if self.fix else self._surveyed(look)[0]
-        except CannotError as error:
-            self.diagnostics.append(error.diagnostic)
-            return None
+        with silent():  # what MuJoCo warns of, it would write into the working directory
+            report = self._fixed(look) if self.fix else self._surveyed(look)[0]
         return None if report is None else replace(report, digest=look.digest())
 
     def _surveyed(self, look: DietModel) -> tuple[DietReport, Survey, ModelText]:

@@ -14,35 +14,31 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import mujoco
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Declarations, MjcfModel
 from coursebuild.core.run.mjcf import model_files
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source, Span
+from coursebuild.numerics.pruning.ablation import Order, Survey, survey
+from coursebuild.numerics.pruning.compare import pruning_scenes
+from coursebuild.numerics.pruning.markup import MarkupError
+from coursebuild.numerics.pruning.model_text import ModelText, ModelTextError, open_model, saved
+from coursebuild.numerics.pruning.readers import Reader, Readers, readers_of
 from coursebuild.numerics.reports.bench import Machine
 from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
+from coursebuild.numerics.scene import SceneError
+from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
-
-if TYPE_CHECKING:
-    from coursebuild.numerics.pruning.ablation import Survey
-    from coursebuild.numerics.pruning.model_text import ModelText
-    from coursebuild.numerics.pruning.readers import Readers
 
 _TEXT = ".coursebuild-text.xml"
 """No file has this name: MuJoCo takes the text in its place."""
 _CODE_FILES = (".js", ".mjs", ".py", ".ts", ".json")
-
-
-class CannotError(Exception):
-    """Why a model cannot be looked at."""
-
-    def __init__(self, diagnostic: Diagnostic) -> None:
-        super().__init__(diagnostic.message)
-        self.diagnostic = diagnostic
 
 
 class DietModel:
@@ -74,8 +70,6 @@ class DietModel:
 
     def compile(self, text: bytes) -> Any:
         """A text as if it stood in the model's place."""
-        import mujoco
-
         place = str((self.root / self.path).parent / _TEXT)
         try:
             return mujoco.MjModel.from_xml_path(place, assets={place: text})
@@ -89,14 +83,6 @@ class DietModel:
         Raises:
             CannotError: it cannot be looked at.
         """
-        import mujoco
-
-        from coursebuild.numerics.pruning.ablation import Order, survey
-        from coursebuild.numerics.pruning.compare import pruning_scenes
-        from coursebuild.numerics.pruning.markup import MarkupError
-        from coursebuild.numerics.pruning.model_text import ModelTextError, open_model
-        from coursebuild.numerics.scene import SceneError
-
         source = self.scene.model.source
         try:
             text = open_model(self.path, self.read, self.compile, check=not self.changed)
@@ -159,19 +145,18 @@ class DietModel:
 
     def change(self, survey: Survey, text: ModelText) -> None:
         """Take over what is to be changed, if it still compiles to the model that was run."""
-        from coursebuild.numerics.pruning.markup import MarkupError
-        from coursebuild.numerics.pruning.model_text import ModelTextError, open_model, saved
-
         before = dict(self.changed)
         self.changed |= text.files(survey.edits)
-        try:
-            again = open_model(self.path, self.read, self.compile, check=False).model
-            same = saved(again) == saved(text.compiled(survey.edits))
-        except (MarkupError, ModelTextError, ValueError):
-            same = False
-        if not same:
+        if self._compiled() != saved(text.compiled(survey.edits)):
             self.changed = before
             raise self._another()
+
+    def _compiled(self) -> bytes | None:
+        """The model of the files as changed so far; `None` where they make none."""
+        try:
+            return saved(open_model(self.path, self.read, self.compile, check=False).model)
+        except (MarkupError, ModelTextError, ValueError):
+            return None
 
     def digest(self) -> str:
         """Of the model as it lies on the disk now."""
@@ -190,33 +175,26 @@ class DietModel:
         """
         if not self.changed:
             return
-        from coursebuild.numerics.pruning.model_text import open_model, saved
-
-        wanted = saved(open_model(self.path, self.read, self.compile, check=False).model)
+        wanted = self._compiled()
         written: list[str] = []
         try:
             for path, data in sorted(self.changed.items()):
                 write_atomic(self.root, path, data, expected=self.original[path])
                 written.append(path)
-            self._verify(wanted)
+            if not self._compiles_to(wanted):
+                raise self._another()
         except (EffectError, CannotError):
             for path in written:
                 write_atomic(self.root, path, self.original[path], expected=self.changed[path])
             self.changed.clear()
             raise
 
-    def _verify(self, wanted: bytes) -> None:
-        from coursebuild.numerics.pruning.model_text import saved
-
+    def _compiles_to(self, wanted: bytes | None) -> bool:
+        """Whether the files on the disk make a model, with what MuJoCo itself includes."""
         try:
-            if (
-                saved(self.compile(self.changed.get(self.path) or self.original[self.path]))
-                == wanted
-            ):
-                return
+            return saved(self.compile(self.read(self.path) or b"")) == wanted
         except ValueError:
-            pass
-        raise self._another()
+            return False
 
     def _another(self) -> CannotError:
         message = f"the changed model `{self.scene.name}` is not the one that was run"
@@ -265,8 +243,6 @@ def _is_model(path: str) -> bool:
 
 def _readers(root: Path, files: CourseFiles, scene: CourseScene) -> Readers:
     """The files of the course that use a model, and what is to be measured on it."""
-    from coursebuild.numerics.pruning.readers import Reader, Readers, readers_of
-
     texts = [Reader(s.path, s.text) for s in (*files.lessons, *files.pages)]
     found = list(readers_of(scene.name, texts).files)
     if found:  # what lessons and labs are made with may read anything for them

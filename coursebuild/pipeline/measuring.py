@@ -11,7 +11,8 @@ what a model is made of and how fast the browser's engine runs it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ import mujoco
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.problem import Scenario
@@ -28,6 +29,7 @@ from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.scene import SceneError, scenes
+from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene
 
 _SECONDS = 20.0
@@ -43,56 +45,51 @@ class CompiledScene(Struct, frozen=True):
     scenarios: tuple[PhysicsScene, ...]
 
 
-def scenarios_of(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene | Diagnostic:
-    """Compile a scene, and work out its scenarios; or why they cannot be."""
-    source = scene.model.source
-    path = str(root / source.path)
-    try:
-        with silent():
-            model = mujoco.MjModel.from_xml_path(path, assets={path: source.text.encode()})
-            found = scenes(model, scene.declared, quick=quick)
-    except SceneError as error:
-        return _told(scene, error)
-    except mujoco.FatalError as error:
-        return _refused(scene, error)
-    return CompiledScene(scene, model, found)
+def scenarios_of(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
+    """Compile a scene, and work out its scenarios.
+
+    Raises:
+        CannotError: they cannot be.
+    """
+    with _told(scene):
+        model = _compiled(root, scene)
+        return CompiledScene(scene, model, scenes(model, scene.declared, quick=quick))
 
 
 def measured(
     loaded: CompiledScene, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
-) -> ScenarioReport | Diagnostic:
-    """Measure a scenario, by its number; or why it cannot be."""
+) -> ScenarioReport:
+    """Measure a scenario, by its number.
+
+    Raises:
+        CannotError: it cannot be.
+    """
+    clock = time.thread_time_ns if timed else None
+    with _told(loaded.scene):
+        chosen = loaded.scenarios[number]
+        return measure_scenario(loaded.model, chosen, quick=quick, clock=clock, tell=tell)
+
+
+@contextmanager
+def _told(scene: CourseScene) -> Iterator[None]:
+    """What goes wrong meanwhile is told at its place, and what MuJoCo warns of not at all."""
+    source = scene.model.source
     try:
         with silent():
-            return measure_scenario(
-                loaded.model,
-                loaded.scenarios[number],
-                quick=quick,
-                clock=time.thread_time_ns if timed else None,
-                tell=tell,
-            )
+            yield
     except SceneError as error:
-        return _told(loaded.scene, error)
-    except mujoco.FatalError as error:
-        return _refused(loaded.scene, error)
+        beside = source if scene.declared is None else scene.declared.source
+        place = error.span or beside.span(0, 0)
+        wrong = diagnose("scenario-model", place, error.message, help=error.help)
+        raise CannotError(wrong) from None
+    except mujoco.FatalError as error:  # such as a model that asks for less memory than it needs
+        said = f"the model `{scene.name}` cannot be measured: {' '.join(str(error).split())}"
+        raise CannotError(diagnose("model-error", source.span(0, 0), said)) from None
 
 
-def _told(scene: CourseScene, error: SceneError) -> Diagnostic:
-    place = error.span
-    if place is None:
-        place = scene.model.source.span(0, 0) if scene.declared is None else _beside(scene)
-    return diagnose("scenario-model", place, error.message, help=error.help)
-
-
-def _refused(scene: CourseScene, error: Exception) -> Diagnostic:
-    """Such as a model that asks for less memory than it needs."""
-    said = f"the model `{scene.name}` cannot be measured: {' '.join(str(error).split())}"
-    return diagnose("model-error", scene.model.source.span(0, 0), said)
-
-
-def _beside(scene: CourseScene) -> Any:
-    assert scene.declared is not None
-    return scene.declared.source.span(0, 0)
+def _compiled(root: Path, scene: CourseScene) -> Any:
+    path = str(root / scene.model.source.path)
+    return mujoco.MjModel.from_xml_path(path, assets={path: scene.model.source.text.encode()})
 
 
 # ------------------------------------------------------------------------------------------- cards
@@ -110,9 +107,7 @@ def with_card(
 
     source = scene.model.source
     with silent():  # what it warns of, it would write into the working directory
-        model = mujoco.MjModel.from_xml_path(
-            str(root / source.path), assets={str(root / source.path): source.text.encode()}
-        )
+        model = _compiled(root, scene)
         found = scenes(model, scene.declared)
         touched = {pair for one in found for pair in watch(model, one).touching}
     files = (root / path for path in parts(root, source.path, source.text))

@@ -1,6 +1,7 @@
 """What `bench`, `stability` and `diet` find, and reports of it in the course's folder.
 
-Entry points: `MeasuringRun`, which gives a `Measurement`; `read_record`, `with_records`.
+Entry points: `MeasuringRun`, which gives a `Measurement`; `CannotError`; `read_record`,
+`with_records`.
 """
 
 from __future__ import annotations
@@ -26,6 +27,14 @@ from coursebuild.report.measuring import Measurement
 
 _T = TypeVar("_T")
 _A = TypeVar("_A")
+
+
+class CannotError(Exception):
+    """Why a model cannot be measured, or looked at."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
 
 
 class MeasuringRun:
@@ -79,7 +88,10 @@ class MeasuringRun:
                 if found is None:
                     self.progress.started(name)
                     began = time.monotonic()
-                    found = measure()
+                    try:
+                        found = measure()
+                    except CannotError as error:
+                        self.diagnostics.append(error.diagnostic)
                     verdict = f"not {self.done}" if found is None else self.done
                     self.progress.finished(name, verdict, time.monotonic() - began)
                     if found is not None:

@@ -7,8 +7,8 @@ from typing import Any
 import mujoco
 import pytest
 
-from coursebuild.numerics.bench import measure_scene
-from coursebuild.numerics.scene import SceneError
+from coursebuild.numerics.bench import measure_scenario
+from coursebuild.numerics.scene import SceneError, scenes
 from support.bench_runs import measured
 
 pytestmark = pytest.mark.site
@@ -90,7 +90,9 @@ def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
 def test_times_are_of_the_clock() -> None:
     """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
     ticks = iter(range(0, 10**15, 2_000_000))
-    (report,) = measure_scene(stiff(0.01, 0.1, 10), None, quick=True, clock=lambda: next(ticks))
+    model = stiff(0.01, 0.1, 10)
+    (one,) = scenes(model, None, quick=True)
+    report = measure_scenario(model, one, quick=True, clock=lambda: next(ticks))
     for one in report.rows:
         assert one.cost is not None and one.cost > 0
         assert one.realtime is not None and one.realtime > 0

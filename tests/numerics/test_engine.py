@@ -18,7 +18,7 @@ def test_integrators_are_set_and_reset_is_off() -> None:
         model = compiled(text, integrator, 0.125)
         assert model.opt.timestep == 0.125
         named = mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_")
-        assert named == integrator.mjcf_name.upper()
+        assert named == integrator.value.partition(",")[0].upper()
         assert model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         explicit = bool(model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP))
         assert explicit == (integrator is Integrator.EULER_EXPLICIT)

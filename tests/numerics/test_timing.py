@@ -8,10 +8,11 @@ from collections.abc import Callable
 import mujoco
 import pytest
 
+from coursebuild.numerics.engine import full_state
 from coursebuild.numerics.pilot import pilot
 from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.timing import FEWEST, Batch, Job, costs, full_state, step_times, timed
+from coursebuild.numerics.timing import FEWEST, Batch, Job, costs, step_times, timed
 
 
 class Machine:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.bench import bench
 from coursebuild.pipeline.options import UsageError
@@ -156,7 +156,7 @@ def test_two_runs_at_once_measure_one_after_the_other(course: Path) -> None:
     most = 0
 
     class Slow(Fake):
-        def measured(self, *args: Any, **how: Any) -> ScenarioReport | Diagnostic:
+        def measured(self, *args: Any, **how: Any) -> ScenarioReport:
             nonlocal most
             running.append(1)
             most = max(most, len(running))

@@ -9,9 +9,10 @@ import mujoco
 
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.bench import measure_scene
+from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
+from coursebuild.numerics.scene import scenes
 
 MODELS = Path(__file__).parents[2] / "models"
 FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
@@ -20,7 +21,10 @@ FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
 def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
     parsed = parse_declarations(Source("models/m.toml", text))
     assert parsed.value is not None, parsed.diagnostics
-    return measure_scene(model, parsed.value, quick=quick, clock=None)
+    return tuple(
+        measure_scenario(model, one, quick=quick, clock=None)
+        for one in scenes(model, parsed.value, quick=quick)
+    )
 
 
 def of_problem(name: str, text: str) -> ScenarioReport:

@@ -11,6 +11,7 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.pipeline.measuring import CompiledScene
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene
 from support.bench_reports import swing
 
@@ -36,9 +37,7 @@ class Fake:
         self.found = list(found) or [swing()]
         self.asked: list[tuple[str, int, bool, bool]] = []
 
-    def scenarios_of(
-        self, root: Path, scene: CourseScene, *, quick: bool
-    ) -> CompiledScene | Diagnostic:
+    def scenarios_of(self, root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
         assert root.is_absolute()
         scenes: Any = tuple(self.found)
         return CompiledScene(scene, None, scenes)
@@ -55,10 +54,12 @@ class Fake:
         quick: bool,
         timed: bool,
         tell: Callable[[str], None],
-    ) -> ScenarioReport | Diagnostic:
+    ) -> ScenarioReport:
         tell("swing: Euler")
         self.asked.append((loaded.scene.name, number, quick, timed))
         found = self.found[number]
+        if isinstance(found, Diagnostic):
+            raise CannotError(found)
         if isinstance(found, BaseException):
             raise found
         return found

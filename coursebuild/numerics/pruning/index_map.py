@@ -12,9 +12,10 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from coursebuild.numerics.engine import STATE, full_state
+
 Places: TypeAlias = NDArray[np.int64]
 
-_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SIZES = ("nq", "nv", "na", "nu", "nbody", "nmocap", "ngeom", "nsensordata", "nuserdata", "neq")
 
 
@@ -119,11 +120,9 @@ def transfer(model: Any, data: Any, index: IndexMap, other: Any, into: Any) -> N
         ValueError: a part of it (of a plugin, of a delay) cannot be told apart.
     """
     same = all(getattr(model, size) == getattr(other, size) for size in _SIZES)
-    size = mujoco.mj_stateSize(model, _STATE)
-    if index.equal and same and mujoco.mj_stateSize(other, _STATE) == size:
-        state = np.empty(size)
-        mujoco.mj_getState(model, data, state, _STATE)
-        mujoco.mj_setState(other, into, state, _STATE)
+    sizes = {mujoco.mj_stateSize(one, STATE) for one in (model, other)}
+    if index.equal and same and len(sizes) == 1:
+        mujoco.mj_setState(other, into, full_state(model, data), STATE)
         return
     delays = mujoco.mj_stateSize(other, int(mujoco.mjtState.mjSTATE_HISTORY))
     if other.npluginstate or delays:

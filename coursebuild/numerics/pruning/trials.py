@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 from msgspec import Struct
 
-from coursebuild.numerics.engine import initial_data
+from coursebuild.numerics.engine import STATE, full_state, initial_data
 from coursebuild.numerics.pruning.compare import MotionComparison, Seen, compare
 from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove, set_options
 from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
@@ -26,11 +26,9 @@ from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.reports.diet import Saving
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import (
-    STATE,
     Batch,
     Clock,
     Timing,
-    full_state,
     moments,
     step_count,
     step_times,
