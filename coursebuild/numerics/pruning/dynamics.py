@@ -21,10 +21,15 @@ import mujoco
 import numpy as np
 
 from coursebuild.numerics.pruning.edits import set_attributes
-from coursebuild.numerics.pruning.markup import place_of
-from coursebuild.numerics.pruning.model_text import thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
-from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
+from coursebuild.numerics.pruning.trials import (
+    Candidate,
+    Item,
+    PruningContext,
+    called,
+    named_item,
+    worded,
+)
 
 _NO_BIAS = int(mujoco.mjtBias.mjBIAS_NONE)
 _NO_DYNAMICS = int(mujoco.mjtDyn.mjDYN_NONE)
@@ -43,18 +48,11 @@ def _tendons(look: PruningContext) -> Iterator[Candidate]:
     """Tendons along which nothing acts, and whose length nobody asks for."""
     if look.readers.whole("tendon"):
         return
-    used = {
-        attribute.value
-        for one in look.elements
-        for attribute in one.attributes
-        if attribute.name in _TENDON
-    }
     items: list[Item] = []
-    for element in look.elements:
-        thing, name = look.text.ids(element), element.get("name") or ""
-        if thing is None or thing.kind != "tendon" or name in used or look.readers.named(name):
-            continue
-        if all(_slack(look.model, number) for number in thing.ids):
+    for element, ids in look.things("tendon"):
+        name = element.get("name") or ""
+        needed = look.users(name, _TENDON) or look.readers.named(name)
+        if not needed and all(_slack(look.model, number) for number in ids):
             items.append(named_item(element))
     if items:
         message = worded(
@@ -83,17 +81,13 @@ def _actuators(look: PruningContext) -> Iterator[Candidate]:
     if look.readers.whole("actuator"):
         return
     driven = _driven(look)
-    elements = [one for one in look.elements if thing_kind(one) == "actuator"]
     free: list[Item] = []
     held: list[Item] = []
-    for element in elements:
-        thing = look.text.ids(element)
-        if thing is None or look.readers.named(element.get("name") or ""):
-            continue
-        if any(number in driven for number in thing.ids):
+    for element, ids in look.things("actuator"):
+        if look.readers.named(element.get("name") or "") or not driven.isdisjoint(ids):
             continue
         item = named_item(element)
-        (free if all(_forceless(look.model, i) for i in thing.ids) else held).append(item)
+        (free if all(_forceless(look.model, i) for i in ids) else held).append(item)
     blocked = ""
     if "controls" in look.numbered:
         blocked = "scenarios give commands by number: their rows would have to be shortened"
@@ -197,14 +191,10 @@ def _geoms(
     far = {geom for pair in apart for geom in pair} - near
     explicit = {int(g) for g in (*look.model.pair_geom1, *look.model.pair_geom2)}
     items = []
-    for element in look.elements:
-        thing = look.text.ids(element)
-        if element.tag != "geom" or thing is None or not far.issuperset(thing.ids):
-            continue
-        if explicit.isdisjoint(thing.ids):
+    for element, ids in look.things("geom"):
+        if far.issuperset(ids) and explicit.isdisjoint(ids):
             edits = set_attributes(element, (("contype", "0"), ("conaffinity", "0")))
-            name = element.get("name") or place_of(element)
-            items.append(Item(name, element, edits=edits))
+            items.append(Item(called(element), element, edits=edits))
     if items:
         what = worded(items, "the geom {}", "the geoms {}")
         yield Candidate(

@@ -51,12 +51,9 @@ def scenery(look: PruningContext) -> Iterator[Candidate]:
     far = _out_of_reach(trees, focus, region)
     items: list[Item] = []
     roots: set[int] = set()
-    for element in look.elements:
-        thing = look.text.ids(element)
-        if thing is None or thing.kind != "body" or any(b.tag in _VIEWS for b in element.walk()):
-            continue
-        if far.issuperset(thing.ids):
-            roots |= set(thing.ids)
+    for element, ids in look.things("body"):
+        if far.issuperset(ids) and not any(one.tag in _VIEWS for one in element.walk()):
+            roots |= set(ids)
             items.append(named_item(element, *trees.references([element])[0]))
     if items:
         nearest = min(region.distance(trees.region([root])) for root in roots)
@@ -127,11 +124,6 @@ class Trees:
     def __init__(self, look: PruningContext) -> None:
         self.look = look
         self._unread = set(unread_sensors(look))
-        self._by_name: dict[str, list[Element]] = {}
-        for element in look.elements:
-            for one in element.attributes:
-                if one.name not in _NOT_REFERENCES:
-                    self._by_name.setdefault(one.value, []).append(element)
         self.model = model = look.model
         self.of_body = [-1] * model.nbody
         """The root of the tree that a body is in; −1 for what is fixed to the world."""
@@ -148,19 +140,15 @@ class Trees:
         self.of_geom = [self.of_body[int(b)] for b in model.geom_bodyid]
         self.touching = frozenset(pair for seen in look.seen for pair in seen.touching)
         self._elements: dict[int, list[Element]] = {root: [] for root in self.roots}
-        for element in look.elements:
-            thing = look.text.ids(element)
-            if thing is None or thing.kind not in ("body", "joint", "geom", "site"):
-                continue
-            for root in {self.of_body[self._body(thing.kind, i)] for i in thing.ids} - {-1}:
-                self._elements[root].append(element)
-
-    def _body(self, kind: str, number: int) -> int:
-        model = self.model
-        if kind == "body":
-            return number
-        ids = {"joint": model.jnt_bodyid, "geom": model.geom_bodyid, "site": model.site_bodyid}
-        return int(ids[kind][number])
+        for kind, bodies in (
+            ("body", range(model.nbody)),
+            ("joint", model.jnt_bodyid),
+            ("geom", model.geom_bodyid),
+            ("site", model.site_bodyid),
+        ):
+            for element, ids in look.things(kind):
+                for root in {self.of_body[int(bodies[i])] for i in ids} - {-1}:
+                    self._elements[root].append(element)
 
     def focus(self) -> frozenset[int]:
         """The trees that the scene is about, and what touches them."""
@@ -253,14 +241,14 @@ class Trees:
         return loose, [one for one in found if one not in loose]
 
     def _naming(self, element: Element) -> list[Element]:
-        name = element.get("name")
+        name, values = element.get("name"), self.look.values
         if not name:
             return []
-        found = self._by_name.get(name, [])
+        names = [name]
         if is_repeated(element):
-            longer = (key for key in self._by_name if key.startswith(name) and key[-1].isdigit())
-            found = [*found, *(one for key in longer for one in self._by_name[key])]
-        return found
+            names += [key for key in values if key.startswith(name) and key[-1].isdigit()]
+        named = (pair for key in names for pair in values.get(key, ()))
+        return [one for attribute, one in named if attribute not in _NOT_REFERENCES]
 
 
 def _is_pair(element: Element) -> bool:

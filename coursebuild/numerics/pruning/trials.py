@@ -9,7 +9,7 @@ Entry points: `Candidate`, `Item`, `PruningContext`; `PruningTrials`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -71,7 +71,7 @@ class Candidate(Struct, frozen=True, eq=False):
     """Who may need it, so that it is no fault; empty where nobody does."""
 
 
-class PruningContext(Struct, frozen=True, eq=False):
+class PruningContext(Struct, frozen=True, eq=False, dict=True):
     """All that is known before anything is tried."""
 
     text: ModelText
@@ -92,15 +92,40 @@ class PruningContext(Struct, frozen=True, eq=False):
         """All elements of its files."""
         return self.text.elements
 
+    @cached_property
+    def values(self) -> dict[str, list[tuple[str, Element]]]:
+        """For each value of an attribute the attributes that have it, with their elements."""
+        found: dict[str, list[tuple[str, Element]]] = {}
+        for element in self.elements:
+            for one in element.attributes:
+                found.setdefault(one.value, []).append((one.name, element))
+        return found
+
+    def users(self, name: str, attributes: Collection[str]) -> list[Element]:
+        """Elements that name something in one of these attributes."""
+        return [element for key, element in self.values.get(name, ()) if name and key in attributes]
+
+    def things(self, kind: str) -> Iterator[tuple[Element, tuple[int, ...]]]:
+        """Elements of a kind, with the numbers of what they become in the compiled model."""
+        for element in self.elements:
+            thing = self.text.ids(element)
+            if thing is not None and thing.kind == kind:
+                yield element, thing.ids
+
 
 def worded(items: Sequence[Item], one: str, many: str) -> str:
     """What to say of one item, or of several."""
     return one if len(items) == 1 else many
 
 
+def called(element: Element) -> str:
+    """The name of an element, or the way to it where it has none."""
+    return element.get("name") or place_of(element)
+
+
 def named_item(element: Element, *more: Element) -> Item:
     """An element to take out, with others that go with it."""
-    return Item(element.get("name") or place_of(element), element, (element, *more))
+    return Item(called(element), element, (element, *more))
 
 
 # ----------------------------------------------------------------------------------------- trials

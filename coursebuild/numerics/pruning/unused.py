@@ -18,9 +18,16 @@ import mujoco
 import numpy as np
 
 from coursebuild.numerics.pruning.edits import ModelEdit, drop_attribute, set_attributes
-from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import thing_kind
-from coursebuild.numerics.pruning.trials import Candidate, Item, PruningContext, named_item, worded
+from coursebuild.numerics.pruning.trials import (
+    Candidate,
+    Item,
+    PruningContext,
+    called,
+    named_item,
+    worded,
+)
 
 _SITE = frozenset(
     "site site1 site2 refsite cranksite slidersite sidesite objname refname".split(" ")
@@ -77,11 +84,7 @@ def _assets(look: PruningContext, kept: Kept) -> Iterator[Candidate]:
                 continue
             if look.readers.named(name) or (kind != "model" and look.readers.whole(kind)):
                 continue
-            using = [
-                one
-                for one in look.elements
-                if one is not element and any(one.get(a) == name for a in (*attributes, "objname"))
-            ]
+            using = [o for o in look.users(name, (*attributes, "objname")) if o is not element]
             if all(one in gone for one in using):
                 items.append(Item(name, element, (element, *using)))
         found = f"unused-{kind}"
@@ -130,17 +133,12 @@ def _sites(look: PruningContext, gone: Collection[Element]) -> list[Item]:
     """Sites that only elements which are gone refer to."""
     if look.readers.whole("site"):
         return []
-    using: dict[str, list[Element]] = {}
-    for one in look.elements:
-        for attribute in one.attributes:
-            if attribute.name in _SITE:
-                using.setdefault(attribute.value, []).append(one)
     found = []
     for one in look.elements:
         name = one.get("name") or ""
         if one.tag != "site" or thing_kind(one) != "site" or look.readers.named(name):
             continue
-        users = using.get(name, []) if name else []
+        users = look.users(name, _SITE)
         if all(user in gone for user in users):
             found.append(named_item(one, *users))
     return found
@@ -214,8 +212,7 @@ def meshes(look: PruningContext) -> Iterator[Candidate]:
                 continue
             if other.ngeom == look.model.ngeom and _alike(look.model, other, geom, shape):
                 edits = _as_primitive(element, shape, other, geom)
-                name = element.get("name") or place_of(element)
-                items.append(Item(name, element, _unshared(look, element), edits))
+                items.append(Item(called(element), element, _unshared(look, element), edits))
                 break
     if items:
         yield Candidate(
@@ -233,11 +230,11 @@ def _shown_meshes(look: PruningContext) -> Iterator[tuple[Element, int]]:
     """Geoms that are meshes of their own, and touch nothing."""
     model = look.model
     paired = {int(g) for g in (*model.pair_geom1, *model.pair_geom2)}
-    for element in look.elements:
-        thing, name = look.text.ids(element), element.get("mesh")
-        if element.tag != "geom" or not name or thing is None or len(thing.ids) != 1:
+    for element, ids in look.things("geom"):
+        name = element.get("mesh")
+        if not name or len(ids) != 1:
             continue
-        (geom,) = thing.ids
+        (geom,) = ids
         touches = model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in paired
         held = element.above is not None and element.above.tag in ("body", "worldbody")
         is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
@@ -291,7 +288,7 @@ def _as_primitive(element: Element, shape: str, other: Any, geom: int) -> tuple[
 
 def _unshared(look: PruningContext, element: Element) -> tuple[Element, ...]:
     """The mesh, if nothing else shows it."""
-    name = element.get("mesh")
-    if any(one.get("mesh") == name for one in look.elements if one is not element):
+    name = element.get("mesh") or ""
+    if look.users(name, ("mesh",)) != [element]:
         return ()
     return tuple(one for one in look.elements if _is_asset(one, "mesh") and asset_name(one) == name)
