@@ -14,7 +14,6 @@ import contextlib
 import hashlib
 import os
 import stat
-import unicodedata
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
@@ -118,11 +117,7 @@ def marker(paths: Iterable[str]) -> bytes:
 
 def holds(folder: Path, paths: Collection[str]) -> bool:
     """Whether a folder has these files and the marker, and no other."""
-    found, wanted = set(_files(folder)), {MARKER, *paths}
-    if found == wanted:
-        return True
-    found, wanted = set(map(_composed, found)), set(map(_composed, wanted))
-    return found <= wanted and all(p.rpartition("/")[2] in _JUNK for p in wanted - found)
+    return set(_files(folder)) == {MARKER, *paths}
 
 
 def foreign_files(place: Path) -> list[str]:
@@ -133,14 +128,7 @@ def foreign_files(place: Path) -> list[str]:
     with contextlib.suppress(FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
         header, *listed = (place / MARKER).read_text(encoding="utf-8").split("\n")
         listed = [MARKER, *listed] if header == _HEADER else []
-    other = set(_files(place)).difference(listed)
-    ours = {_composed(path) for path in listed} if other else set[str]()
-    return sorted(path for path in other if _composed(path) not in ours)
-
-
-def _composed(path: str) -> str:
-    """The path with its letters composed: some file systems of macOS take them apart."""
-    return path if path.isascii() else unicodedata.normalize("NFC", path)
+    return sorted(set(_files(place)).difference(listed))
 
 
 def _files(folder: Path) -> list[str]:

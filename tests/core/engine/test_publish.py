@@ -15,9 +15,8 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.engine import publish as publishing
-from coursebuild.core.engine.exchange import exchange
 from coursebuild.core.engine.manifest import MARKER
-from coursebuild.core.engine.publish import check_out, publish
+from coursebuild.core.engine.publish import check_out, exchange, publish
 from coursebuild.core.files.errors import EffectError, PublishRefusedError
 from coursebuild.core.model.results import OutputFile
 
@@ -137,7 +136,7 @@ class TestPublish:
             publish(root, root / "public", [])
             assert tree(root / "public") == {}
 
-    @pytest.mark.parametrize("call", ["write", "mkdir", "fchmod"])
+    @pytest.mark.parametrize("call", ["fchmod", "mkdir", "fchmod"])
     def test_full_disk(self, root: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
         publish(root, root / "public", site("one"))
         really = getattr(os, call)
