@@ -91,9 +91,8 @@ def made(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 def host(made: Folder, tmp_path: Path) -> Iterator[Host]:
     """Serves a copy of the site, in a folder of its host."""
     shutil.copytree(made.root / "first", tmp_path / "site")
-    host = Host(tmp_path / "site", "/course/")
-    yield host
-    host.stop()
+    with Host(tmp_path / "site", "/course/") as host:
+        yield host
 
 
 def settle(page: Page, keep: str = "auto", look: bool = False) -> None:
@@ -138,11 +137,20 @@ def edited(made: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
             made.replace(path, new, old)
 
 
-def test_every_page_is_there_without_a_network_after_one_visit(
-    context: BrowserContext, host: Host
-) -> None:
-    page, said = opened(context, host)
-    assert said == []
+@pytest.fixture(scope="module")
+def kept(browsers: Mapping[str, Browser], made: Folder) -> Iterator[tuple[Page, Host]]:
+    """A page of a site that was visited once, and that the tests leave as it is."""
+    with (
+        Host(made.root / "first", "/course/") as host,
+        browsers["plain"].new_context() as context,
+    ):
+        page, said = opened(context, host)
+        assert said == []
+        yield page, host
+
+
+def test_every_page_is_there_without_a_network_after_one_visit(kept: tuple[Page, Host]) -> None:
+    page, host = kept
     with host.away():
         for path, text in ((FIRST, "Text of one."), (SECOND, "Text of two."), ("", "Lesson one")):
             page.goto(host.url + path)
@@ -157,9 +165,9 @@ def test_every_page_is_there_without_a_network_after_one_visit(
 
 
 def test_page_that_is_not_there_leads_back_when_there_is_a_network(
-    context: BrowserContext, host: Host
+    kept: tuple[Page, Host],
 ) -> None:
-    page, _ = opened(context, host)
+    page, host = kept
     with host.away():
         page.goto(f"{host.url}lessons/9.9-none.html?x=<b>&y")
         expect(page).to_have_url(re.compile(rf"^{re.escape(host.url)}offline/\?from="))
@@ -174,8 +182,16 @@ def test_page_that_is_not_there_leads_back_when_there_is_a_network(
     expect(page.locator("h1")).to_have_text("Page not found")
 
 
-def test_no_way_back_leads_elsewhere(context: BrowserContext, host: Host) -> None:
-    page, _ = watched(context)
+def test_slow_network_does_not_keep_back_a_page_that_is_here(kept: tuple[Page, Host]) -> None:
+    page, host = kept
+    host.answering.clear()
+    page.goto(host.url + SECOND)
+    see(page, "Text of two.")
+    host.answering.set()
+
+
+def test_no_way_back_leads_elsewhere(kept: tuple[Page, Host]) -> None:
+    page, host = kept
     for from_ in ("https://example.com/x", "//example.com/", "/a/", "data:,"):
         page.goto(f"{host.url}offline/?from={from_}")
         page.locator(".keep input").first.wait_for()
@@ -233,23 +249,12 @@ def test_page_that_was_kept_says_when_there_is_a_newer_one(
     expect(page.locator(".notice")).to_have_count(0)
 
 
-def test_slow_network_does_not_keep_back_a_page_that_is_here(
-    context: BrowserContext, host: Host
-) -> None:
-    page, _ = opened(context, host)
-    host.answering.clear()
-    page.goto(host.url + SECOND)
-    see(page, "Text of two.")
-    host.answering.set()
-
-
 def test_several_courses_on_one_origin(
     context: BrowserContext, made: Folder, tmp_path: Path
 ) -> None:
     shutil.copytree(made.root / "first", tmp_path / "both")
     shutil.copytree(made.root / "first", tmp_path / "both" / "inner")
-    host = Host(tmp_path / "both", "/")
-    try:
+    with Host(tmp_path / "both") as host:
         opened(context, host)
         page, _ = opened(context, host, "inner/")
         names = page.evaluate("caches.keys()")
@@ -260,8 +265,6 @@ def test_several_courses_on_one_origin(
         assert page.evaluate("caches.keys()") == [f"coursebuild 1 {host.url}"]
         scopes = "navigator.serviceWorker.getRegistrations().then(all => all.map(r => r.scope))"
         assert page.evaluate(scopes) == [host.url]
-    finally:
-        host.stop()
 
 
 def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> None:
@@ -315,9 +318,10 @@ def test_page_on_keeping_says_what_is_so_without_scripts_and_without_workers(
         assert [text for text in said if "blocked by Playwright" not in text] == []
 
 
-def test_site_can_be_installed(context: BrowserContext, host: Host) -> None:
-    page, _ = opened(context, host)
-    client = context.new_cdp_session(page)
+def test_site_can_be_installed(kept: tuple[Page, Host]) -> None:
+    page, host = kept
+    page.goto(host.url)
+    client = page.context.new_cdp_session(page)
     errors = client.send("Page.getInstallabilityErrors")["installabilityErrors"]
     # A context of Playwright's is a private window, in which nothing can be installed.
     assert [error["errorId"] for error in errors if error["errorId"] != "in-incognito"] == []
@@ -342,8 +346,7 @@ def test_labs_run_without_a_network_once_they_were_used(
     context: BrowserContext, tmp_path: Path, course: Site
 ) -> None:
     shutil.copytree(course.public, tmp_path / "site")
-    host = Host(tmp_path / "site")
-    try:
+    with Host(tmp_path / "site") as host:
         page, _ = opened(context, host, PAGE)
         assert not page.evaluate(HAS_ENGINE)
         lab(page)
@@ -352,16 +355,13 @@ def test_labs_run_without_a_network_once_they_were_used(
         with host.away():
             page.goto(host.url + PAGE)
             lab(page)
-    finally:
-        host.stop()
 
 
 def test_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
     context: BrowserContext, tmp_path: Path, course: Site
 ) -> None:
     shutil.copytree(course.public, tmp_path / "site")
-    host = Host(tmp_path / "site")
-    try:
+    with Host(tmp_path / "site") as host:
         page, _ = watched(context)
         # The host has none yet: a request that is caught in the browser can hold back the next one.
         worker = (tmp_path / "site/service-worker.js").rename(tmp_path / "worker.js")
@@ -373,8 +373,6 @@ def test_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
         lab(page)
         until(page, "navigator.serviceWorker.controller !== null")
         until(page, HAS_ENGINE)
-    finally:
-        host.stop()
 
 
 class Previewed(Session):
