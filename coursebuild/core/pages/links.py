@@ -143,21 +143,14 @@ def without_lines(ids: Iterable[str]) -> frozenset[str]:
     kept: set[str] = set()
     longest: dict[str, int] = {}
     for name in ids:
-        stem, _, line = name.rpartition(".L")
-        if stem.isprintable() and stem and _is_number(line):  # as most are
-            last = int(line)
-        elif ".L" in name and (lines := linked_lines(name)) is not None:
-            stem, _, last = lines
-        else:
+        lines = linked_lines(name) if ".L" in name else None
+        if lines is None:
             kept.add(name)
             continue
+        stem, _, last = lines
         if last > longest.get(stem, 0):
             longest[stem] = last
     return frozenset(kept | {f"{stem}.L{last}" for stem, last in longest.items()})
-
-
-def _is_number(text: str) -> bool:
-    return text.isdecimal() and text.isascii() and text[0] != "0" and len(text) < 10
 
 
 def _target(path: str, url: str, base: _Base) -> Reference | str | None:

@@ -80,11 +80,7 @@ class Look(Struct, frozen=True):
     """Details of the HTML."""
 
     words: Words = field(default_factory=Words)
-    anchors: bool = True
-    """Whether headings have their ids, and links to themselves."""
-    frames: bool = True
-    """Whether tables stand in a box of their own, that can be scrolled."""
-    void_end: str = ">"
-    """How a tag without content ends."""
+    plain: bool = False
+    """Whether it is CommonMark's own: headings without ids, tables without a box that scrolls."""
     quantities: Literal["", "ltr", "rtl"] = ""
     """Whether numbers are kept with their units, and in which direction the text runs."""

@@ -126,6 +126,8 @@ class _Writer:
 
     def __init__(self, context: Context, look: Look) -> None:
         self.context, self.look = context, look
+        self.end = " />" if look.plain else ">"
+        """Of a tag without content."""
 
     def blocks(self, blocks: Iterable[Block]) -> str:
         return "".join(map(self.block, blocks))
@@ -186,7 +188,7 @@ class _Writer:
             case HtmlFlow():
                 return f"{self.inlines(block.children)}\n"
             case ThematicBreak():
-                return f"<hr{self.look.void_end}\n"
+                return f"<hr{self.end}\n"
             case MathBlock():
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case Table():
@@ -200,7 +202,7 @@ class _Writer:
 
     def _heading(self, heading: Heading) -> str:
         inner, name = self.inlines(heading.children), f"h{heading.level}"
-        if not self.look.anchors:
+        if self.look.plain:
             return f"<{name}>{inner}</{name}>\n"
         anchor = _escaped(heading.anchor)
         kinds = f' class="{_escaped(" ".join(heading.classes))}"' if heading.classes else ""
@@ -232,7 +234,7 @@ class _Writer:
         words = self.look.words
         label = _escaped(words.done if checked else words.not_done)
         state = " checked" if checked else ""
-        return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.look.void_end} '
+        return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.end} '
 
     def table(self, table: Table) -> str:
         """A table; its columns are aligned by class."""
@@ -240,7 +242,7 @@ class _Writer:
         rows = "".join(self._row(row, table, "td") for row in table.rows)
         body = f"<tbody>\n{rows}</tbody>\n" if rows else ""
         html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
-        if not self.look.frames:
+        if self.look.plain:
             return html
         label = _escaped(self.look.words.table)
         return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
@@ -269,7 +271,7 @@ class _Writer:
                     return self.context.display(inline.tex.text, inline.span.start)
                 return self.context.math(inline.tex.text)
             case Term():
-                name = f' id="{_escaped(inline.anchor)}"' if self.look.anchors else ""
+                name = "" if self.look.plain else f' id="{_escaped(inline.anchor)}"'
                 return f"<dfn{name}>{self.inlines(inline.children)}</dfn>"
             case Emphasis():
                 return f"<em>{self.inlines(inline.children)}</em>"
@@ -284,7 +286,7 @@ class _Writer:
             case RawInline():
                 return raw_html(inline, self.context.url)
             case HardBreak():
-                return f"<br{self.look.void_end}\n"
+                return f"<br{self.end}\n"
             case NumberBinding():
                 return self.context.binding(inline)
             case FootnoteRef():
@@ -296,14 +298,14 @@ class _Writer:
         title = f' title="{_escaped(link.title)}"' if link.title else ""
         href = _escaped(self.context.href(link.target))
         inner = self.inlines(link.children) or _escaped(self.context.reference(link.target))
-        bare = self.look.frames and inner == href  # an address that stands for itself
+        bare = inner == href and not self.look.plain  # an address that stands for itself
         own = ' class="url"' if bare else ""
         return f'<a href="{href}"{title}{own}>{inner}</a>'
 
     def _image(self, image: Image) -> str:
         title = f' title="{_escaped(image.title)}"' if image.title else ""
         url = _escaped(self.context.url(image.url))
-        return f'<img src="{url}" alt="{_escaped(image.alt)}"{title}{self.look.void_end}'
+        return f'<img src="{url}" alt="{_escaped(image.alt)}"{title}{self.end}'
 
     # -- footnotes
 

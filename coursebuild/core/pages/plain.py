@@ -39,7 +39,7 @@ from coursebuild.core.pages.markup import (
     render_table,
 )
 
-PLAIN = Look(anchors=False, frames=False, void_end=" />")
+PLAIN = Look(plain=True)
 
 
 def plain_html(document: Document) -> Markup:

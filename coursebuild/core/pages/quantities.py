@@ -28,8 +28,7 @@ _UNIT = (
     rf"(?:{_PREFIXED}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
     r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
 )
-_SPACE = " \u00a0\u202f"
-_SPACES = f"[{_SPACE}]"
+_SPACES = "[ \u00a0\u202f]"
 _END = r"(?![^\W_])"
 _UNITS = rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}(?:{_SPACES}{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}){{0,3}}"
 _NUMBER = (
@@ -37,8 +36,8 @@ _NUMBER = (
     r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
 )
 
-_ONE_UNIT = re.compile(rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}")
-_AFTER_DIGIT = re.compile("[0-9] ")
+_WITH_UNITS = re.compile(rf"(?<=[0-9]) {_UNITS}")
+_UNITS_FIRST = re.compile(rf"{_SPACES}?{_UNITS}")
 _QUANTITY = re.compile(
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
 )
@@ -61,33 +60,13 @@ def in_order(html: Markup) -> Markup:
 
 def joined(text: str) -> str:
     """The text with no line end between a number and its unit, nor inside the unit."""
-    parts: list[str] = []
-    at = 0
-    for space in _AFTER_DIGIT.finditer(text):
-        start = space.start() + 1
-        end = _units_end(text, start + 1) if start >= at else 0
-        if end:
-            parts += (text[at:start], text[start:end].replace(" ", "\u00a0"))
-            at = end
-    return "".join((*parts, text[at:])) if parts else text
-
-
-def _units_end(text: str, at: int) -> int:
-    """Where the units end that begin at a place (`_UNITS`); 0 where none does."""
-    found = _ONE_UNIT.match(text, at)
-    if found is None:
-        return 0
-    for _ in range(3):
-        more = _ONE_UNIT.match(text, found.end() + 1)
-        if more is None or text[found.end()] not in _SPACE:
-            break
-        found = more
-    return found.end()
+    return _WITH_UNITS.sub(lambda found: found[0].replace(" ", "\u00a0"), text)
 
 
 def unit_length(text: str) -> int:
     """How many characters at the start of a text are the unit of a number that stands before it."""
-    return _units_end(text, int(text[:1] in _SPACE)) if text else 0
+    found = _UNITS_FIRST.match(text)
+    return 0 if found is None else found.end()
 
 
 def quantities(text: str) -> Iterator[tuple[str, bool]]:

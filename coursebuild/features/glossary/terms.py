@@ -26,14 +26,11 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.pages import formulas
-from coursebuild.core.pages.look import Look
 from coursebuild.core.pages.markup import render_inlines
-from coursebuild.core.pages.plain import PlainContext
+from coursebuild.core.pages.plain import PLAIN, PlainContext
 from coursebuild.core.pages.plainly import without_links
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.features.glossary.sentences import runs_on, sentence_of
-
-_LOOK = Look(anchors=False)
 
 
 class DefinitionPart(Struct, frozen=True):
@@ -86,7 +83,7 @@ def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     context = _Excerpted(mathml)
 
     def html(inlines: tuple[Inline, ...]) -> str:
-        return str(render_inlines(without_links(inlines), context, _LOOK))
+        return str(render_inlines(without_links(inlines), context, PLAIN))
 
     for siblings in _sibling_groups(document):
         for number, block in enumerate(siblings):

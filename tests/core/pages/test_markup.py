@@ -109,7 +109,7 @@ def test_a_table_is_framed_and_aligned() -> None:
 
 
 def test_a_table_without_rows_and_frame() -> None:
-    text = html("| a |\n| - |\n", Look(frames=False))
+    text = html("| a |\n| - |\n", Look(plain=True))
     assert text == '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n</tr>\n</thead>\n</table>\n'
 
 
