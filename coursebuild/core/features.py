@@ -294,8 +294,8 @@ class Feature(Struct, frozen=True, kw_only=True):
     """What is wrong in some documents of the course, beside what parsing found."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
     """What is wrong once the scripts have run."""
-    unproven: Callable[[Course], Iterable[Diagnostic]] | None = None
-    """What nothing in the course proves: `coursebuild check --truth` lists it."""
+    unproven: Callable[[Course], Iterable[Diagnostic | str]] | None = None
+    """What nothing in the course proves, and lines that sum it up, for `check --truth`."""
     check_models: (
         Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
     ) = None

@@ -169,8 +169,8 @@ def page_copies() -> tuple[PageCopy, ...]:
     return tuple(sorted(copies, key=lambda copy: not copy.download))
 
 
-def unproven(course: Course) -> tuple[Diagnostic, ...]:
-    """What nothing in the course proves."""
+def unproven(course: Course) -> tuple[Diagnostic | str, ...]:
+    """What nothing in the course proves, and lines that sum it up."""
     lists = (feature.unproven for feature in features() if feature.unproven is not None)
     return tuple(found for one in lists for found in one(course))
 

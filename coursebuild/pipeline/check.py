@@ -78,11 +78,14 @@ def _check(
     if sensitivity:
         sensitive, warnings = _sensitivity(course, options, progress, verified, chosen)
         found += warnings
-    if truth:
-        found += unproven(course)
+    told = unproven(course) if truth else ()
+    found += [one for one in told if isinstance(one, Diagnostic)]
     found += shown_reports(options.root, course).diagnostics
     if shard is None or not any(True for _ in extract(course).value):
         found += _no_scripts(course, chosen, verified.scripts, found)
+    remarks = [one for one in told if isinstance(one, str)]
+    if shard is not None:
+        remarks.append(_part(shard, verified))
     report = judge(
         course,
         found,
@@ -91,7 +94,7 @@ def _check(
         lessons=len(chosen.lessons),
         documents=chosen.documents,
         labs=verified.labs,
-        remarks=() if shard is None else (_part(shard, verified),),
+        remarks=tuple(remarks),
     )
     return replace(report, depends=depends_on(course, verified.results), sensitivity=sensitive)
 

@@ -135,6 +135,9 @@ class Course(Struct, frozen=True):
     """Variables of the environment of scripts, sorted."""
     id: str = ""
     """Names the course where its title may change; see `key`."""
+    truth: float | None = None
+    """Which share of the numbers in the text must be proven."""
+    truth_span: Span | None = None
 
     @property
     def key(self) -> str:

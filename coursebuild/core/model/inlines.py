@@ -48,7 +48,7 @@ class CodeSpan(Struct, frozen=True):
 
 
 class NumberBinding(Struct, frozen=True):
-    """`` `+6.6 %`{out} ``: a number that must be one the script printed."""
+    """`` `+6.6 %`{out} ``: a number that must be one the script printed, or one that is given."""
 
     span: Span
     text: str
@@ -56,6 +56,8 @@ class NumberBinding(Struct, frozen=True):
     """What stands between the backticks."""
     script: str | None
     """The path given by `{out=…}`; `None`: the script of the nearest recorded output above."""
+    source: str | None = None
+    """Where it is from, by `{given="…"}`, perhaps empty; `None` where a script has printed it."""
 
 
 class Label(Struct, frozen=True):
@@ -63,6 +65,10 @@ class Label(Struct, frozen=True):
 
     span: Span
     id: str
+    source: str | None = None
+    """Where its numbers are from, by `given="…"`, perhaps empty; `None` where nobody says it."""
+    check: Span | None = None
+    """Where `check` asks that it be proven."""
 
 
 class Meaning(Struct, frozen=True):
@@ -84,6 +90,8 @@ class Math(Struct, frozen=True):
     """Only where it is on a line of its own."""
     meaning: Meaning | None = None
     """Only where it is not."""
+    source: str | None = None
+    """The same: where its numbers are from, as in `NumberBinding`."""
 
 
 class Term(Struct, frozen=True):

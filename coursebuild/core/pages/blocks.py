@@ -116,7 +116,7 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
 def binding(page: PageContext, node: NumberBinding) -> Markup:
     """A number that a script printed; the mark names the script."""
     text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
-    return page.template("blocks/binding.html", text=text, path=node.script)
+    return page.template("blocks/binding.html", text=text, path=node.script, source=node.source)
 
 
 # --- outputs

@@ -127,8 +127,9 @@ def _key(verdict: Verdict) -> tuple[str, int]:
 
 
 def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
-    """The bindings of a document, in order: footnotes, tables, callouts and quizzes as well."""
-    return tuple(i for i in document_inlines(document) if isinstance(i, NumberBinding))
+    """The bound numbers of a document, in order: also in footnotes, tables and quizzes."""
+    inlines = document_inlines(document)
+    return tuple(i for i in inlines if isinstance(i, NumberBinding) and i.source is None)
 
 
 def check_bindings(

@@ -22,15 +22,16 @@ from coursebuild.core.text.source import Excerpt
 Report = Callable[[Diagnostic], None]
 
 _TERM = re.compile(r"\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}(\}?)", re.I)
-_SYMBOL = re.compile(r"\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units)\b[^{}]{0,400}(\}?)", re.I)
+_SYMBOL = re.compile(r"\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units|given)\b[^{}]{0,400}(\}?)", re.I)
 _LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 _PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_ID = re.compile(r"\{#(eq:[\w-]+)\}")
+_ID = re.compile(r"\{#(eq:[\w-]+)(?=[\s}])")
 _SPACES = re.compile(r"\s+")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` where the glossary is to say it otherwise'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
 _LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
+_MARK_HELP = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
 
 
 class Braces(Struct, frozen=True):
@@ -107,21 +108,26 @@ def read_term(content: Excerpt, braces: Braces, report: Report) -> str | None:
     return _text(given)
 
 
-def read_meaning(content: Excerpt, braces: Braces, report: Report) -> Meaning | None:
-    """What a symbol stands for; `None` for a mistake."""
-    found = _read(content, braces, ("symbol", "unit"), "symbol-attribute", _SYMBOL_HELP)
+def read_meaning(
+    content: Excerpt, braces: Braces, report: Report
+) -> tuple[Meaning | None, str | None]:
+    """What a symbol stands for, and where numbers are from; `None` for what is not said."""
+    found = _read(content, braces, ("symbol", "unit", "given"), "symbol-attribute", _SYMBOL_HELP)
     place = content.span(braces.start, braces.end)
     if isinstance(found, Diagnostic):
         report(found)
-        return None
+        return None, None
+    source = _text(found["given"]) if "given" in found else None
+    if source is not None and len(found) == 1:
+        return None, source
     meaning, unit = _text(found.get("symbol")), _text(found.get("unit"))
     if not meaning or ("unit" in found and not unit):
         missing = "unit is empty" if meaning else "meaning of the symbol is missing"
         report(diagnose("symbol-attribute", place, f"the {missing}", help=_SYMBOL_HELP))
-        return None
+        return None, source
     for wrong in check_unit(found["unit"]) if unit and found["unit"] is not None else ():
         report(wrong)
-    return Meaning(place, meaning, unit)
+    return Meaning(place, meaning, unit), source
 
 
 def _text(value: Excerpt | None) -> str:
@@ -131,11 +137,24 @@ def _text(value: Excerpt | None) -> str:
 def read_label(content: Excerpt, braces: Braces, report: Report) -> Label | None:
     """The label of a formula; `None` for a mistake."""
     text, place = content.text[braces.start : braces.end], content.span(braces.start, braces.end)
-    found = _ID.fullmatch(text)
+    found = _ID.match(text) if braces.closed else None
     if found is None:
         message = "the label of this formula is never closed"
         if braces.closed:
             message = f"`{text}` is no label of a formula"
         report(diagnose("equation-label", place, message, help=_LABEL_HELP))
         return None
-    return Label(content.span(braces.start + 2, braces.end - 1), found[1])
+    end = braces.start + found.end()
+    marks = _read(
+        content,
+        Braces(end - 1, braces.end, closed=True),
+        ("check", "given"),
+        "equation-label",
+        _MARK_HELP,
+    )
+    if isinstance(marks, Diagnostic):
+        report(marks)
+        marks = {}
+    source = _text(marks["given"]) if "given" in marks else None
+    check = content.span(end, braces.end - 1) if "check" in marks else None
+    return Label(content.span(braces.start + 2, end), found[1], source, check)

@@ -115,6 +115,10 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     )
     filter: tuple[FilterTable, ...] = ()
     env: Annotated[dict[str, str], Meta(description="variables of the environment of scripts")] = {}
+    truth: Annotated[
+        Annotated[float, Meta(ge=0, le=1)] | None,
+        Meta(description="which share of the numbers in lessons must be proven"),
+    ] = None
 
 
 class CalloutTable(Struct, frozen=True, forbid_unknown_fields=True):

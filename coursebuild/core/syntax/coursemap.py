@@ -90,6 +90,7 @@ def _course(
 ) -> Course:
     about, verify = fields.course, fields.verify or VerifyTable()
     table = root.get("course")
+    gate = root.get("verify")
     engine = table.get("engine") if isinstance(table, ObjectNode) else None
     return Course(
         map=source,
@@ -103,6 +104,8 @@ def _course(
         engine=about.engine,
         engine_span=engine.span if engine is not None else None,
         comparison=comparison(root, verify),
+        truth=verify.truth,
+        truth_span=gate.place("truth") if isinstance(gate, ObjectNode) else None,
         filters=tuple(Filter(f.pattern, f.replacement) for f in verify.filter),
         callouts=callout_kinds(fields.callouts),
         silences=tuple(Silence(s.rule, s.reason, s.path) for s in fields.silence),

@@ -69,17 +69,23 @@ def _emphasis(state: StateInline, silent: bool) -> bool:
 
 
 _BRACE = re.compile(r"\{\s*([A-Za-z]{2,20})")
-_BINDING = re.compile(r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}""")
+_BINDING = re.compile(
+    r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}|\{(given)(?:="([^{}"]+)")?\}"""
+)
 
 
 def _like_out(key: str) -> bool:
-    """Whether the key of an attribute is `out`, or looks like it."""
+    """Whether the key of an attribute is `out` or `given`, or looks like it."""
     key = key.lower()
-    return key.startswith("out") or key in ("ou", "ot", "ut", "otu", "uot", "oput", "oout", "oit")
+    near = ("ou", "ot", "ut", "otu", "uot", "oput", "oout", "oit", "gien", "gven", "gvien")
+    return key.startswith(("out", "giv")) or key in near
 
 
 def _code_span(state: StateInline, silent: bool) -> bool:
-    """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`."""
+    """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`.
+
+    With `{given}` it is a `number_given`, and its `info` the source.
+    """
     start = state.pos
     if not backtick(state, silent):
         return False
@@ -92,8 +98,10 @@ def _code_span(state: StateInline, silent: bool) -> bool:
         state.pos = found.end()
     if not silent:
         token = state.tokens[-1]
-        token.type = "number_binding" if found else "number_unbound"
-        token.info = (found[1] or found[2] or "") if found else ""
+        token.type = "number_unbound"
+        if found:
+            token.type = "number_given" if found[3] else "number_binding"
+            token.info = found[1] or found[2] or found[4] or ""
         token.map = [start + len(token.markup), end - len(token.markup)]
     return True
 

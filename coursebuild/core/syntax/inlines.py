@@ -60,7 +60,7 @@ from coursebuild.core.text.source import Excerpt, Span
 MAX_DEPTH = 60
 """Emphasis inside emphasis; what is deeper loses its marks."""
 
-_BRACES = re.compile(r"\{[^}\s]{0,60}\}?")
+_BRACES = re.compile(r"\{[^}\n]{0,60}\}?")
 _DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
@@ -260,7 +260,7 @@ class _Pass:
                 node = self._math(token, span)
             case "code_inline":
                 node = CodeSpan(span, token.content)
-            case "number_binding" | "number_unbound":
+            case "number_binding" | "number_given" | "number_unbound":
                 node = self._number(token, span)
             case "html_inline":
                 node = self._html(token, span)
@@ -284,7 +284,7 @@ class _Pass:
         if braces is None:
             return Math(span, tex, display)
         if not display:
-            return Math(span, tex, display, None, read_meaning(self.content, braces, report))
+            return Math(span, tex, display, None, *read_meaning(self.content, braces, report))
         label = read_label(self.content, braces, report)
         if label is not None:
             self.reader.session.anchors.take(label.id, label.span)
@@ -296,14 +296,17 @@ class _Pass:
             braces = _BRACES.match(self.content.text, token.end)
             assert braces is not None
             place = self.content.span(braces.start(), braces.end())
-            message = f"`{braces[0]}` does not say what the number is bound to"
-            help = "write `{out}`, or `{out=examples/x.py}` with the path of a script"
+            message = f"`{braces[0]}` does not say where the number is from"
+            help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
             self.reader.report(diagnose("binding-attribute", place, message, help=help))
             return CodeSpan(span, token.content)
         start, end = token.map
         if end - start == len(token.content) + 2:
             start, end = start + 1, end - 1
-        return NumberBinding(span, token.content, self.content.span(start, end), token.info or None)
+        place = self.content.span(start, end)
+        if token.type == "number_given":
+            return NumberBinding(span, token.content, place, None, folded(token.info))
+        return NumberBinding(span, token.content, place, token.info or None)
 
     def _html(self, token: PositionedToken, span: Span) -> RawInline:
         def place(start: int, end: int) -> Span:

@@ -22,7 +22,7 @@ _MATH_HELP = (
 )
 
 _FOREIGN = re.compile(
-    r"(?P<binding>(?P<number>(?<![\w.])[-+\u2212]?\d[\w.,]*)?\{out\b[^{}\n\0]*\})"
+    r"(?P<binding>(?P<number>(?<![\w.])[-+\u2212]?\d[\w.,]*)?\{(?:out|given)\b[^{}\n\0]*\})"
     r"|(?P<wiki>\[\[[^\[\]\n\0]+\]\])"
     r"|(?P<template>\{\{[^{}\n\0]*\}\}|\{%[^%\n\0]*%\})"
     r"|^ {0,3}(?P<admonition>(?:!!!|\?\?\?\+?)[ \t]+[\w-]+|:{3,}[ \t]*\{?[\w-]+\}?)",
@@ -80,7 +80,7 @@ def _foreign(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Dia
         match kind:
             case "binding":
                 number = found["number"] or ""
-                what = f"`{written}` is no bound number: nothing compares it with an output"
+                what = f"`{written}` marks no number, and is shown as it is written"
                 bound = f"`` `{number or '4.47'}`{written.removeprefix(number)} ``"
                 help = f"put the number into backticks: {bound}"
                 yield diagnose("binding-attribute", span, what, help=help)

@@ -1,11 +1,14 @@
 """Units as authors write them: `kg m²`, `N*m/rad`, `mm`.
 
-Entry point: `find_unit(text)`. Pint knows them, and is imported when the first one is asked for.
+Entry point: `find_unit(text)`. Those of mechanics are known here. Of others Pint is asked, whose
+import takes longer than a page does to be built.
 """
 
 from __future__ import annotations
 
 import functools
+import re
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, TypeAlias
 
@@ -14,21 +17,72 @@ from msgspec import Struct
 Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
 """Powers of base quantities, as of length and time, in the order of their names."""
 
+_PREFIXES = {"": 0, "k": 3, "M": 6, "G": 9, "c": -2, "m": -3, "µ": -6, "μ": -6, "n": -9}
+_BASES = {"m": ("length", 0), "g": ("mass", -3), "s": ("time", 0)}
+"""What they measure, and the power of ten by which they are base units."""
+_DERIVED = {"N": "kg*m/s^2", "J": "N*m", "W": "J/s", "Pa": "N/m^2", "Hz": "1/s", "rad": "1"}
+_FACTOR = re.compile(r"(^|[*/])(1|[^\W\d_]+)(?:\^\(?(-?\d)\)?)?")
+_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
+
 
 class Unit(Struct, frozen=True):
     """How large a unit is in base units of the SI, and what it measures."""
 
-    size: float
-    dimension: Dimension
+    size: Fraction
+    dimension: Dimension = ()
+
+    def times(self, other: Unit, power: int) -> Unit:
+        """The product with a power of another unit."""
+        size = self.size * other.size**power
+        return Unit(size, multiply(self.dimension, other.dimension, power))
+
+
+def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Dimension:
+    """The dimension of a product, whose second factor is raised to a power."""
+    powers = dict(left)
+    for name, exponent in right:
+        powers[name] = powers.get(name, Fraction(0)) + exponent * power
+    return tuple(sorted((name, found) for name, found in powers.items() if found))
 
 
 @functools.lru_cache(maxsize=256)
 def find_unit(text: str) -> Unit | None:
     """The unit of a name; `None` where nobody knows it."""
+    raised = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda found: "^" + found[0].translate(_RAISED), text.strip())
+    return _read(re.sub(r"\s*[ ·⋅*]\s*", "*", raised), _common) or _ask_pint(text)
+
+
+def _read(text: str, find: Callable[[str], Unit | None]) -> Unit | None:
+    """A product of units; `None` where one of them is not found."""
+    unit, at = Unit(Fraction(1)), 0
+    for factor in _FACTOR.finditer(text):
+        one = find(factor[2])
+        if one is None or factor.start() != at:
+            return None
+        at = factor.end()
+        unit = unit.times(one, int(factor[3] or 1) * (-1 if factor[1] == "/" else 1))
+    return unit if at == len(text) and at else None
+
+
+@functools.cache
+def _common(name: str) -> Unit | None:
+    if name == "1":
+        return Unit(Fraction(1))
+    for prefix, power in _PREFIXES.items():
+        rest = name.removeprefix(prefix)
+        if rest in _BASES:
+            measures, shift = _BASES[rest]
+            return Unit(Fraction(10) ** (power + shift), ((measures, Fraction(1)),))
+        if rest in _DERIVED and (unit := _read(_DERIVED[rest], _common)):
+            return Unit(unit.size * Fraction(10) ** power, unit.dimension)
+    return None
+
+
+def _ask_pint(text: str) -> Unit | None:
     try:
         base = _registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
-        powers = sorted((str(n), Fraction(p)) for n, p in base.dimensionality.items())
-        return Unit(float(base.magnitude), tuple(powers))
+        powers = sorted((str(n)[1:-1], Fraction(p)) for n, p in base.dimensionality.items())
+        return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
     except Exception:  # what Pint's reader of expressions raises is not said anywhere
         return None
 

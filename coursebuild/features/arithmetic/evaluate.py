@@ -16,7 +16,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from coursebuild.core.text.units import Dimension, find_unit
+from coursebuild.core.text.units import Dimension, find_unit, multiply
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 
 _MOST_BITS = 4_000
@@ -146,7 +146,7 @@ class _Evaluator:
         unit = find_unit(one.text)
         if unit is None:
             raise one.not_understood(f"`{one.text}` is no unit that is known")
-        return Quantity(self.arithmetic.number(repr(unit.size)), unit.dimension)
+        return Quantity(self.arithmetic.number(str(unit.size)), unit.dimension)
 
     def _sum(self, one: Expression) -> Quantity:
         first, *rest = map(self.of, one.parts)
@@ -189,17 +189,9 @@ class _Evaluator:
         return Quantity(value, multiply(dimension[0], at.dimension, sign))
 
 
-def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Dimension:
-    """The dimension of a product, whose second factor is raised to a power."""
-    powers = dict(left)
-    for name, exponent in right:
-        powers[name] = powers.get(name, Fraction(0)) + exponent * power
-    return tuple(sorted((name, found) for name, found in powers.items() if found))
-
-
 def say(dimension: Dimension) -> str:
     """A dimension in words: `length/time^2`."""
     if not dimension:
         return "a number"
-    parts = (name.strip("[]") + ("" if power == 1 else f"^{power}") for name, power in dimension)
+    parts = (name + ("" if power == 1 else f"^{power}") for name, power in dimension)
     return "`" + " ".join(parts) + "`"

@@ -1,0 +1,71 @@
+"""How much of a course is proven: which numbers are neither bound, nor computed, nor given.
+
+The claims of a document are counted when it is read (`claims`), and kept with it. The fence `truth`
+shows them lesson by lesson, and `[verify] truth` in the course map makes a gate of the share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from coursebuild.core.features import Feature
+from coursebuild.core.model import Course, Document, Lesson
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.rules import Rule
+from coursebuild.features.truth.claims import claims_of, document_claims, documents_of, total
+from coursebuild.features.truth.table import KIND
+
+_TEXTS = """\
+[truth]
+part = "Lesson or page"
+numbers = "Numbers"
+bound = "Printed by a script"
+computed = "Computed"
+given = "Given"
+open = "Unproven"
+share = "Proven"
+all = "All"
+"""
+
+
+def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+    """That less is proven than the course map asks for."""
+    if course.truth is None or course.truth_span is None:
+        return
+    found = total(claims_of(document) for _, document in documents_of(course))
+    if found.proven < course.truth * found.all:
+        wanted = f"{100 * course.truth:g} %"
+        message = f"{found.share} % of the numbers are proven, and {wanted} are asked for"
+        help = f"`coursebuild check --truth` lists the other {len(found.open)}"
+        yield diagnose("truth-share", course.truth_span, message, help=help)
+
+
+def unproven(course: Course) -> Iterator[Diagnostic | str]:
+    """Each number that nothing proves, and the share of the others by lesson."""
+    known = [(owner, claims_of(document)) for owner, document in documents_of(course)]
+    rows = [(owner.id if isinstance(owner, Lesson) else owner.title, one) for owner, one in known]
+    for name, claims in (*rows, ("all", total(one for _, one in known))):
+        if claims.all:
+            yield (
+                f"{name}: {claims.share} % of {claims.all} numbers proven: {claims.bound} bound,"
+                f" {claims.computed} computed, {claims.given} given"
+            )
+    for _, claims in known:
+        for place in claims.open:
+            yield diagnose("number-unproven", place, f"nothing proves `{place.text}`")
+
+
+FEATURE = Feature(
+    name="truth",
+    needs=("arithmetic",),
+    fences=(KIND,),
+    summary=lambda document, mathml: Parsed(document_claims(document)),
+    check=check,
+    unproven=unproven,
+    texts={"en": _TEXTS},
+    rules=(
+        Rule("number-unproven", "warning", "A number that nothing in the course proves."),
+        Rule("truth-share", "error", "Fewer numbers are proven than the course map asks for."),
+        Rule("truth-text", "error", "A fence `truth` has a text, which nothing reads."),
+    ),
+)

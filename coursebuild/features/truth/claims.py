@@ -1,0 +1,228 @@
+"""The numbers that a document claims, and what proves each.
+
+Entry points: `claims_of(document)`, `documents_of(course)`, `total(claims)`.
+
+1. A number in digits is a claim, but not: a whole number up to twelve without a unit, which counts
+   or names as a word does; a year; what only looks like a number (versions, dates, `x1`).
+2. Headings, footnotes (which name sources), code, addresses, links to lessons, pages and models,
+   and recorded outputs are not looked at.
+3. In formulas a side that is a number is one claim, and so is a side with symbols in which a number
+   has a point. Where arithmetic was computed the whole chain is one claim.
+4. A number in an alternative text, where nothing can be marked, is proven where the document has
+   it bound or given.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+from msgspec import Struct
+
+from coursebuild.core.model import (
+    Course,
+    Document,
+    Emphasis,
+    Heading,
+    Image,
+    Inline,
+    Lesson,
+    Link,
+    Math,
+    MathBlock,
+    NumberBinding,
+    Page,
+    Recording,
+    Strikethrough,
+    Strong,
+    Term,
+    TermTarget,
+    Text,
+    UrlTarget,
+    block_inlines,
+    walk_blocks,
+)
+from coursebuild.core.scripts.numbers import Number, scan_prose
+from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.features.arithmetic.chains import check_arithmetic
+from coursebuild.features.arithmetic.expressions import Expression
+from coursebuild.features.arithmetic.statements import Side, read_statements
+
+KINDS = ("bound", "computed", "given")
+"""The fields of `Claims` that count what is proven."""
+
+_COUNTS = 12
+_YEARS = range(1600, 2100)
+_UNIT = re.compile(
+    r"[\s\u00a0\u202f]*(?:[%‰°]|(?:per cent|[mkµn]?(?:rad|Hz|Pa|[gmsNJWVA])|c?m|min|h|[kMG]i?B)"
+    r"(?![\w’']))"
+)
+_DECIMAL = re.compile(r"\d\.\d")
+_MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
+"""What a formula without claims does not have."""
+
+
+class Claims(Struct, frozen=True):
+    """How many numbers of a document are proven, and where the others stand."""
+
+    bound: int
+    """Printed by a script."""
+    computed: int
+    """Computed in a formula."""
+    given: int
+    """Said to be given by the author."""
+    open: tuple[Span, ...]
+
+    @property
+    def proven(self) -> int:
+        """How many are."""
+        return self.bound + self.computed + self.given
+
+    @property
+    def all(self) -> int:
+        """How many there are."""
+        return self.proven + len(self.open)
+
+    @property
+    def share(self) -> str:
+        """The share of those that are proven, in per cent, rounded down; empty of none."""
+        return f"{1000 * self.proven // self.all / 10:.1f}" if self.all else ""
+
+
+def claims_of(document: Document) -> Claims:
+    """The claims of a document whose text may be left out."""
+    known = (document.summaries or {}).get("truth")
+    return known if isinstance(known, Claims) else document_claims(document)
+
+
+def documents_of(course: Course) -> Iterator[tuple[Lesson | Page, Document]]:
+    """The lessons, and the pages that every page's menu has, as far as they are written."""
+    pages = (page for page in course.pages if page.menu)
+    owners: tuple[Lesson | Page, ...] = (*course.lessons, *pages)
+    for owner in owners:
+        if owner.document is not None:
+            yield owner, owner.document
+
+
+def total(claims: Iterable[Claims]) -> Claims:
+    """The claims of several documents."""
+    known = tuple(claims)
+    places = tuple(place for one in known for place in one.open)
+    bound, computed, given = (sum(getattr(one, kind) for one in known) for kind in KINDS)
+    return Claims(bound, computed, given, places)
+
+
+def document_claims(document: Document) -> Claims:
+    """The claims of a document, from its text."""
+    counter = _Counter()
+    recorded: set[int] = set()
+    for block in walk_blocks(document.blocks):
+        if isinstance(block, Recording):
+            recorded.add(id(block.body))
+        if isinstance(block, MathBlock):
+            counter.formula(block.tex, block.label.source if block.label else None)
+        elif not isinstance(block, Heading) and id(block) not in recorded:
+            counter.inlines(block_inlines(block))
+    for span, numbers in counter.alternatives:
+        counter.add("bound" if numbers <= counter.marked else "", span)
+    bound, computed, given = map(counter.kinds.count, KINDS)
+    return Claims(bound, computed, given, tuple(counter.open))
+
+
+class _Counter:
+    def __init__(self) -> None:
+        self.kinds: list[str] = []
+        self.open: list[Span] = []
+        self.marked: set[str] = set()
+        self.alternatives: list[tuple[Span, set[str]]] = []
+
+    def add(self, kind: str, span: Span) -> None:
+        """A claim and what proves it: nothing, where that is empty."""
+        if kind:
+            self.kinds.append(kind)
+        else:
+            self.open.append(span)
+
+    def inlines(self, inlines: Iterable[Inline]) -> None:
+        """The claims of a line."""
+        for inline in inlines:
+            match inline:
+                case Text():
+                    self.text(inline)
+                case NumberBinding():
+                    for number in scan_prose(inline.text):
+                        self.marked.add(number.text)
+                        self.add("bound" if inline.source is None else "given", inline.span)
+                case Math():
+                    source = inline.source
+                    if source is None and inline.label is not None:
+                        source = inline.label.source
+                    self.formula(inline.tex, source)
+                case Image():
+                    numbers = {number.text for number in claimed(inline.alt)}
+                    self.alternatives += [(inline.span, {number}) for number in sorted(numbers)]
+                case Link(target=UrlTarget() | TermTarget()) if not _is_address(inline):
+                    self.inlines(inline.children)
+                case Emphasis() | Strong() | Strikethrough() | Term():
+                    self.inlines(inline.children)
+                case _:
+                    pass
+
+    def text(self, text: Text) -> None:
+        """The claims of plain text."""
+        exact = text.span.end - text.span.start == len(text.text)
+        for number in claimed(text.text):
+            span = text.span
+            if exact:
+                span = Span(span.source, span.start + number.start, span.start + number.end)
+            self.add("", span)
+
+    def formula(self, tex: Excerpt, source: str | None) -> None:
+        """The claims of a formula."""
+        if _MAY_CLAIM.search(tex.text) is None:
+            return
+        holds = [one for one in check_arithmetic(tex.text) if one.kind == "holds"]
+        for statement in read_statements(tex.text):
+            first, last = statement.sides[0], statement.sides[-1]
+            if any(first.start <= one.start < last.end for one in holds):
+                self.add("computed", tex.span(first.start, last.end))
+                continue
+            for side in statement.sides:
+                if _is_claim(side, tex.text):
+                    place = tex.span(*_trimmed(tex.text, side.start, side.end))
+                    self.add("" if source is None else "given", place)
+
+
+def claimed(text: str) -> Iterator[Number]:
+    """The numbers of a text that are claims."""
+    for number in scan_prose(text):
+        if not number.finite:
+            continue
+        whole = number.integer or number.text.endswith(".")
+        small = whole and (number.value in _YEARS or abs(number.value) <= _COUNTS)
+        if not small or _UNIT.match(text, number.end):
+            yield number
+
+
+def _is_address(link: Link) -> bool:
+    """Whether a link shows its address."""
+    shown = "".join(child.text for child in link.children if isinstance(child, Text))
+    return isinstance(link.target, UrlTarget) and shown in link.target.url
+
+
+def _is_claim(side: Side, tex: str) -> bool:
+    if not isinstance(side.expression, Expression):
+        return side.numeric or _DECIMAL.search(tex, side.start, side.end) is not None
+    parts = tuple(side.expression.walk())
+    numbers = [part.text for part in parts if part.kind == "number"]
+    if any("." in number for number in numbers):
+        return True
+    units = any(part.kind == "unit" for part in parts)
+    powers = any(part.kind == "^" and part.parts[0].text == "10" for part in parts)
+    large = any(int(number) > _COUNTS for number in numbers)
+    return bool(side.numeric and numbers and (units or powers or large))
+
+
+def _trimmed(text: str, start: int, end: int) -> tuple[int, int]:
+    part = text[start:end]
+    return start + len(part) - len(part.lstrip()), start + len(part.rstrip())

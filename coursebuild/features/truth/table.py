@@ -1,0 +1,99 @@
+"""The fence `truth`: how much of each lesson is proven, as a table.
+
+Entry point: `KIND`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.features import FenceKind, MarkdownWriter
+from coursebuild.core.model import Cell, FeatureBlock, Lesson, Table, Text
+from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.source import Excerpt
+from coursebuild.features.truth.claims import KINDS, Claims, claims_of, documents_of, total
+
+if TYPE_CHECKING:
+    from coursebuild.core.pages.context import PageContext
+    from coursebuild.core.pages.library import Library
+    from coursebuild.core.pages.urls import Place
+
+_COLUMNS = ("part", "numbers", *KINDS, "open", "share")
+_RIGHT: Literal["right"] = "right"
+
+
+class TruthTable(FeatureBlock, frozen=True):
+    """Where the table stands."""
+
+    def summary(self) -> TruthTable:
+        """The same: it shows nothing but the course."""
+        return self
+
+
+class TruthRows(Struct, frozen=True):
+    """What the table shows: for each lesson and page its title and its numbers, the sum last."""
+
+    rows: tuple[tuple[str, ...], ...]
+
+
+def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
+    """The fence, which has neither keys nor a text."""
+    wrong = list(fence.keys().diagnostics)
+    if fence.body.text.strip():
+        help = "leave it empty: the table is made from the course"
+        wrong.append(diagnose("truth-text", fence.body.span(), "nothing reads this", help=help))
+    return Parsed(TruthTable(fence.span), tuple(wrong))
+
+
+def values(library: Library, place: Place, block: TruthTable) -> TruthRows:
+    """The rows."""
+    words, known = library.words, []
+    rows: list[tuple[str, ...]] = []
+    for owner, document in documents_of(library.course):
+        known.append(claims_of(document))
+        name = f"{owner.id} {owner.title}" if isinstance(owner, Lesson) else owner.title
+        rows.append((name, *_figures(known[-1])))
+    return TruthRows((*rows, (words("truth.all"), *_figures(total(known)))))
+
+
+def _figures(claims: Claims) -> tuple[str, ...]:
+    counts = (claims.all, claims.bound, claims.computed, claims.given, len(claims.open))
+    share = f"{claims.share} %" if claims.all else "–"
+    return (*map(str, counts), share)
+
+
+def _table(page: PageContext, block: TruthTable) -> Table:
+    shown = page.shown.blocks[block.span.start]
+    assert isinstance(shown, TruthRows)
+
+    def cell(text: str) -> Cell:
+        return Cell(block.span, Excerpt.of_span(block.span), (Text(block.span, text),))
+
+    header = tuple(cell(page.tools.words(f"truth.{name}")) for name in _COLUMNS)
+    rows = tuple(tuple(map(cell, row)) for row in shown.rows)
+    return Table(block.span, ("left", *(_RIGHT for _ in _COLUMNS[1:])), header, rows)
+
+
+def draw(page: PageContext, block: TruthTable) -> Markup:
+    """The table in a page."""
+    return page.blocks((_table(page, block),))
+
+
+def markdown(writer: MarkdownWriter, block: TruthTable) -> str:
+    """The table in Markdown."""
+    return writer.blocks((_table(writer.page, block),))
+
+
+KIND = FenceKind(
+    name="truth",
+    block=TruthTable,
+    parse=parse_truth,
+    draw=draw,
+    markdown=markdown,
+    values=values,
+)
