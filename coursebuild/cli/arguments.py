@@ -81,6 +81,7 @@ def _check(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="run the scripts on a Dask cluster: dask://HOST:PORT",
     )
+    _long(parser)
     parser.add_argument(
         "--sensitivity",
         action="store_true",
@@ -102,8 +103,15 @@ def _check(parser: argparse.ArgumentParser) -> None:
 def _update(parser: argparse.ArgumentParser) -> None:
     _running(parser)
     _lessons(parser)
+    _long(parser)
     parser.add_argument(
         "--dry-run", action="store_true", help="show what would change; write nothing"
+    )
+
+
+def _long(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--long", action="store_true", help="run scripts too that are recorded once"
     )
 
 

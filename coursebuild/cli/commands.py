@@ -31,7 +31,8 @@ def options_of(arguments: argparse.Namespace) -> Options:
         store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
     where = getattr(arguments, "executor", None)
     executor = None if where is None else open_executor(where)
-    return Options(root, jobs, arguments.quiet, store, executor)
+    long = getattr(arguments, "long", False)
+    return Options(root, jobs, arguments.quiet, store, executor, long)
 
 
 def available_cores() -> int:
@@ -63,7 +64,11 @@ def check_command(arguments: argparse.Namespace) -> int:
 
     # Machines are told how long it took.
     parts = arguments.shard or arguments.timings or arguments.write_timings
-    if arguments.format != "text" or parts or arguments.sensitivity or arguments.truth:
+    if (
+        arguments.format != "text"
+        or parts
+        or any((arguments.sensitivity, arguments.truth, arguments.long))
+    ):
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
     return _once_while_unchanged(arguments, "check", ("examples",), work)

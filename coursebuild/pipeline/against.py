@@ -60,7 +60,9 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
         documents = select(course, names, options.root).documents
         extracted = extract_scripts(course, options)
         chosen = tuple(
-            e for e in extracted.runnable if documents is None or e.document in documents
+            e
+            for e in extracted.runnable
+            if (documents is None or e.document in documents) and not e.script.once
         )
         work = _Work(course, options, progress, chosen, other)
         blocked = tuple(

@@ -36,6 +36,8 @@ class Options(Struct, frozen=True):
     """What was made before; what is kept in the course's folder where nothing is said."""
     executor: str | None = None
     """Where scripts run, `dask://HOST:PORT`; here, where nothing is said."""
+    long: bool = False
+    """Whether scripts run of which the course keeps a run."""
     run_all: RunAll | None = None
     """What runs scripts, such as a server that stays for the next command; one of this command's
     own, where nothing is said."""

@@ -24,6 +24,7 @@ from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.recorded_runs import recorded_runs
 from coursebuild.pipeline.remember import Memory, longest_first
 from coursebuild.report import ScriptLine
 
@@ -121,7 +122,7 @@ def run(
     chosen = tuple(chosen)
     memory = Memory(options.root, options.store) if memory is None else memory
     todo = jobs(chosen, perturbation)
-    done = dict(known or {})
+    done = {**(known or {}), **recorded_runs(chosen, options)}
     inputs = {
         job.path: memory.inputs(job, extraction.data)
         for job, extraction in zip(todo, chosen, strict=True)

@@ -38,6 +38,7 @@ from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.recorded_runs import check_recorded_runs, keep_runs
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
@@ -79,8 +80,11 @@ def _update(
     for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
         edits = {source: changes for source, changes in edits.items() if source.path != path}
     remarks, unwritten = _write(options, edits, dry_run=dry_run)
+    if options.long and not dry_run:
+        keep_runs(scripts, first, options)
     now = loaded if dry_run or not edits else load(options.root)
     found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
+    found += check_recorded_runs(scripts, options)
     found += _afterwards(course, now.course or course, scripts, first, again)
     if edits and not dry_run and now.course is not None:
         changed = {
@@ -121,7 +125,7 @@ def _again(
     left = [
         extraction
         for extraction, one in zip(scripts, first, strict=True)
-        if not one.cached or one.path in wrong
+        if (not one.cached or one.path in wrong) and not extraction.script.once
     ]
     memory = Memory(options.root, options.store, fresh=True)
     second = run(left, options, progress, "running scripts again", memory, run_all)

@@ -32,6 +32,7 @@ from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.recorded_runs import check_recorded_runs
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
 from coursebuild.pipeline.trials import run_with_trials
@@ -87,6 +88,7 @@ def verify(
         found += wrong
     else:
         runs = scripts()
+    found += check_recorded_runs(chosen, options)
     verdicts = compare_all(course, runs)
     found += script_findings(course, chosen, runs, verdicts, held, extracted.all)
     if memory.differing:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import platform
+import re
 from collections.abc import Callable
 
 import pytest
@@ -289,3 +291,48 @@ def test_update_writes_the_parts_of_files_that_a_lesson_shows(make: Make) -> Non
     folder.replace("src/ball.py", "return 1", "return 2")
     done = folder.main("build")
     assert "it has `return 2` here" in done.out
+
+
+TRAIN = """
+import os
+from pathlib import Path
+
+print(Path("models/data.txt").read_text(), len(os.listdir("models")))
+Path("runs").mkdir(exist_ok=True)
+Path("runs/count").open("a").write("+")
+"""
+
+
+def test_long_work_is_run_only_when_that_is_asked_for(make: Make) -> None:
+    info = "record=once writes=runs/"
+    folder = make("## One\n\n" + block("train.py", TRAIN, "OLD 12", info=info) + "It has `12`{out}.\n")
+    folder.write("models/data.txt", "12")
+
+    def rules(*command: str) -> list[str]:
+        return re.findall(r"error\[([\w-]+)\]", folder.main(*command).out)
+
+    assert rules("check") == ["recorded-run"]
+    assert rules("update") == ["recorded-run"]
+    assert not (folder.root / "runs").exists()
+    assert rules("update", "--long") == []
+    assert "12 1\n" in folder.text(folder.lesson())
+    assert folder.text("runs/count") == "+", "it runs once"
+    assert folder.main("build", "--no-cache").status == 0
+    assert folder.text("runs/count") == "+"
+    page = folder.text("public/lessons/1.1-one.html")
+    assert "Recorded once (" in page and platform.machine() in page
+    lesson = folder.text(folder.lesson())
+    for path, old, new, rule in (
+        (folder.lesson(), "len(os", "1 * len(os", "recorded-run"),
+        ("models/data.txt", "12", "13", "recorded-run"),
+        (folder.lesson(), "12 1", "12 2", "output-drift"),
+        (folder.lesson(), "`12`", "`15`", "binding-mismatch"),
+    ):
+        folder.replace(path, old, new)
+        assert rules("check") == [rule], new
+        folder.replace(path, new, old)
+    assert rules("update") == [] and folder.text(folder.lesson()) == lesson
+    folder.write("models/data.txt", "13")
+    assert rules("check", "--long") == ["recorded-run", "output-drift"]
+    assert rules("update", "--long") == ["binding-mismatch"]
+    assert folder.text("runs/count") == "++"

@@ -157,6 +157,8 @@ class Script(Struct, frozen=True):
     """Whether bodies in it are to lie deep in each other."""
     writes: tuple[str, ...] = ()
     """Folders of the project that it may write into."""
+    once: bool = False
+    """Whether the course keeps what it printed, and it runs only when that is asked for."""
 
 
 class Mode(enum.Enum):

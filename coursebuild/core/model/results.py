@@ -133,6 +133,8 @@ class ScriptRun(Struct, frozen=True):
     cached: bool = False
     trace: Trace | None = None
     """What it looked at; `None` where nobody watched."""
+    recorded: str = ""
+    """When and where it was made, of a run that the course keeps."""
 
 
 class DriftKind(enum.Enum):

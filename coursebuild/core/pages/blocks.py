@@ -163,6 +163,8 @@ def _output_receipt(
     match verdict.status:
         case "verified":
             how = compared(words, verdict.comparison)
+            if run is not None and run.recorded:
+                return Receipt("verified", f"{words('receipt.once', when=run.recorded)} {how}.")
             return Receipt("verified", f"{words('receipt.verified', **versions)} {how}.")
         case "volatile":
             return Receipt("volatile", words("receipt.volatile", **versions))
@@ -206,6 +208,8 @@ def short(value: Decimal) -> str:
 def script_receipt(page: PageContext, run: ShownRun | None) -> Receipt:
     """What can be said for a script without a recorded output."""
     words, shown = page.tools.words, page.shown
+    if run is not None and run.recorded:
+        return Receipt("verified", words("receipt.once_ran", when=run.recorded))
     if run is not None and run.outcome is Outcome.OK:
         text = words("receipt.ran", engine=shown.engine, python=shown.python)
         return Receipt("verified", text)

@@ -146,13 +146,13 @@ class _Page:
 
 def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
     if run.outcome is not Outcome.OK or not numbers:
-        return ShownRun(run.outcome, run.missing)
+        return ShownRun(run.outcome, run.missing, recorded=run.recorded)
     lines = run.stdout.split("\n")
     asked = (
         (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
         for n in sorted(numbers)
     )
-    return ShownRun(run.outcome, run.missing, tuple(asked))
+    return ShownRun(run.outcome, run.missing, tuple(asked), run.recorded)
 
 
 def address(library: Library, place: urls.Place, path: str, target: Target) -> str:

@@ -29,6 +29,8 @@ class ShownRun(Struct, frozen=True):
     lines: tuple[tuple[int, str | None], ...] = ()
     """Lines that it printed, by number from 1, as far as questions of the page ask for them;
     `None` where there is no such line."""
+    recorded: str = ""
+    """When and where it was made, of a run that the course keeps."""
 
 
 class ShownVerdict(Struct, frozen=True):

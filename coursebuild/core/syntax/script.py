@@ -24,7 +24,7 @@ DEFAULT_TIMEOUT = 60.0
 LONGEST_TIMEOUT = 86400.0
 """Seconds."""
 
-_VALUES = ("timeout", "requires", "args", "writes")
+_VALUES = ("timeout", "requires", "args", "writes", "record")
 _FLAGS = ("norun", "diverges", "deep")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
@@ -92,6 +92,11 @@ def _script(
     requires = _modules(keys.get("requires"), diagnostics)
     args = _arguments(keys.get("args"), diagnostics)
     writes = _folders(keys.get("writes"), diagnostics)
+    record = keys.get("record")
+    if record is not None and record.value != "once":
+        message = f"`{record.value}` is not a way to record"
+        help = "write `record=once`"
+        diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
     if wrong:
         return None
     return Script(
@@ -108,6 +113,7 @@ def _script(
         keys.get("diverges") is not None,
         keys.get("deep") is not None,
         writes,
+        once=record is not None,
     )
 
 

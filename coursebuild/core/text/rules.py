@@ -204,6 +204,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "Bodies of a script's simulation lie deep in each other, of which MuJoCo does not warn.",
     ),
     ("script-shallow", "error", "A script says `deep`, and no bodies lay deep in each other."),
+    (
+        "recorded-run",
+        "error",
+        "The course keeps no run of a script that is recorded once, or one of another state.",
+    ),
     ("output-drift", "error", "A recorded output differs from what the script prints."),
     (
         "output-noise",
