@@ -305,7 +305,9 @@ Path("runs/count").open("a").write("+")
 
 def test_long_work_is_run_only_when_that_is_asked_for(make: Make) -> None:
     info = "record=once writes=runs/"
-    folder = make("## One\n\n" + block("train.py", TRAIN, "OLD 12", info=info) + "It has `12`{out}.\n")
+    folder = make(
+        "## One\n\n" + block("train.py", TRAIN, "OLD 12", info=info) + "It has `12`{out}.\n"
+    )
     folder.write("models/data.txt", "12")
 
     def rules(*command: str) -> list[str]:
