@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from tree_sitter import Node
 
-from coursebuild.features.lab.export.engine_names import ARRAYS
+from coursebuild.features.lab.export.engine_names import ArrayField, engine_field
 from coursebuild.features.lab.export.values import NUMBERS, Type
 from coursebuild.features.lab.javascript import (
     UntranslatableError,
@@ -82,7 +82,7 @@ def _guess(value: Node, given: Type | None, types: Mapping[str, Type]) -> Type:
             return given
         case "member_expression" if path[:1] == ("ctx",) and path[-1] in types:
             return types[path[-1]]
-        case "member_expression" if path in ARRAYS:
+        case "member_expression" if isinstance(engine_field(path), ArrayField):
             return "vector"
         case _:
             return "num"

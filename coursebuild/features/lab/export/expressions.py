@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping
 from msgspec import Struct
 from tree_sitter import Node
 
-from coursebuild.features.lab.export import engine_names as engine
+from coursebuild.features.lab.export.engine_names import ArrayField, Scalar, engine_field
 from coursebuild.features.lab.export.values import (
     AND,
     ARRAYS,
@@ -60,7 +60,7 @@ _CONSTANTS = {
 }
 _UNBOUNDED = {"NaN": "math.nan", "Infinity": "math.inf"}
 _ROOTS = frozenset("model data mj sim ctx lib Math value".split())
-_SCALAR_TYPES: dict[str, Type] = {"float": "num", "int": "int", "size": "nat"}
+_SCALAR_TYPES: dict[Scalar, Type] = {"float": "num", "int": "int", "size": "nat"}
 _COMPARISONS = {
     **{"===": "==", "!==": "!=", "==": "==", "!=": "!="},
     **{"<": "<", ">": ">", "<=": "<=", ">=": ">="},
@@ -200,8 +200,6 @@ class Expressions(ABC):
         match path:
             case ("sim", "time"):
                 return Code("data.time", "num")
-            case ("model", size) if size in engine.SIZES:
-                return Code(text, "nat")
             case ("ctx", own) if own in self.context:
                 return Code(text, self.context[own])
             case ("Math", constant) if constant in _CONSTANTS:
@@ -210,11 +208,13 @@ class Expressions(ABC):
                 return Code(f"mujoco.{enumeration}.{member}.value", "int")
             case _:
                 pass
-        if path in engine.SCALARS:
-            return Code(text, _SCALAR_TYPES[engine.SCALARS[path]])
-        if path in engine.ARRAYS:
-            array = engine.ARRAYS[path]
-            return Code(text, "rows" if array.rows else "vector", element=array.element)
+        match engine_field(path):
+            case ArrayField() as array:
+                return Code(text, "rows" if array.rows else "vector", element=array.element)
+            case None:
+                pass
+            case scalar:
+                return Code(text, _SCALAR_TYPES[scalar])
         if name == "length":
             return Code(f"{self.array(field(node, 'object')).text}.size", "nat")
         if path:

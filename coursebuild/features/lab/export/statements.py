@@ -15,8 +15,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from msgspec import Struct
 from tree_sitter import Node
 
-from coursebuild.features.lab.export import engine_names as engine
 from coursebuild.features.lab.export.calls import Calls, check_single, refused_call
+from coursebuild.features.lab.export.engine_names import CALLS, ArrayField, engine_field
 from coursebuild.features.lab.export.expressions import Variable
 from coursebuild.features.lab.export.library import LIBRARY
 from coursebuild.features.lab.export.values import NUMBERS, Code, Type, as_float
@@ -272,11 +272,13 @@ class _Statements(Calls):
                 path = self.path(target)
                 if path[:1] == ("ctx",):
                     return _place(self.value(target))
-                if path[:1] in (("data",), ("model",)) and path in engine.SCALARS:
-                    if engine.SCALARS[path] == "float":
+                match engine_field(path):
+                    case "float":
                         return _Place(".".join(path), "number", True)
-                    if engine.SCALARS[path] == "int":
+                    case "int":
                         return _Place(".".join(path), "whole")
+                    case _:
+                        pass
                 name = ".".join(path) or text_of(field(target, "property"))
                 raise UntranslatableError(f"an assignment to `{name}`")
             case _:
@@ -294,7 +296,7 @@ class _Statements(Calls):
             case ("sim", "reset") if self.button and not given:
                 yield f"reset(model, data{', ctx' if self.context else ''})"
                 return
-            case ("mj", name) if name in engine.CALLS:
+            case ("mj", name) if name in CALLS:
                 yield self.value(node).text
                 return
         method = text_of(field(function, "property")) if "member" in function.type else ""
@@ -373,8 +375,8 @@ class _Statements(Calls):
             case "member_expression":
                 path = self.path(limit)
                 if path[-1:] == ("length",):
-                    return path[:-1] in engine.ARRAYS
-                return path[:1] == ("ctx",) or (path[:1] == ("model",) and path[-1] in engine.SIZES)
+                    return isinstance(engine_field(path[:-1]), ArrayField)
+                return path[:1] == ("ctx",) or (path[0] == "model" and engine_field(path) == "size")
             case "binary_expression":
                 return self.is_steady(field(limit, "left")) and self.is_steady(
                     field(limit, "right")

@@ -12,15 +12,16 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.model import Course
 from coursebuild.core.run.versions import engine_version
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
-from coursebuild.features.lab.export import difference as export_check
+from coursebuild.features.lab.export.difference import difference
 from coursebuild.features.lab.export.script import (
-    Export,
     export_script,
     file_name,
     filled,
@@ -52,26 +53,62 @@ def exported(
     main: dict[str, Any],
     parity: Parity | None,
 ) -> LabExport:
-    """The script of a lab.
+    """The script of a lab, from the store where the same was tried before.
 
     `main` is the main run of its trial, `parity` how that compares with native MuJoCo.
     """
-    course = context.course
     metadata = ExportMetadata(
         file_name(trial.name),
-        _origin(course, trial.owner),
-        course.title,
+        _origin(context.course, trial.owner),
+        context.course.title,
         engine_version(),
         _seconds(lab, main),
     )
+    same = parity is not None and parity.first is None
+    # The model is in it by what the trial recorded.
+    readouts = [picture["readouts"] for picture in main["pictures"]]
+    made_of = (_digest(), lab.config, asdict(metadata), main.get("recorded"), readouts, same)
+    key = hashlib.sha256(json.dumps(made_of).encode()).hexdigest()
+    store = context.memory.store
+    found = store.get("exports", key)
+    if found is not None:
+        return msgspec.json.decode(found, type=LabExport)
+    try:
+        offer = _offered(context.root, native, lab, metadata, main, same)
+    except NativeError as error:
+        return LabExport(None, f"the script {error}")
+    store.put("exports", key, msgspec.json.encode(offer))
+    return offer
+
+
+def _offered(
+    root: Path,
+    native: NativeEngine,
+    lab: Lab,
+    metadata: ExportMetadata,
+    main: dict[str, Any],
+    same: bool,
+) -> LabExport:
     export = export_script(lab, metadata)
     if isinstance(export, str):
         return LabExport(None, export)
     if main["diverged"]:
         return LabExport(None, "its simulation diverges")
-    if main.get("recorded") is None:
+    kept = main.get("recorded")
+    if kept is None:
         return LabExport(None, "the lab makes no step")
-    reason = _checked(context, native, lab, export, main, parity)
+    request = {
+        "path": str(root / "examples" / export.name),
+        "text": filled(export, initial_values(lab)),
+        "others": [filled(export, values) for values in _others(lab)],
+        "buttons": list(export.buttons),
+        "near": kept["near"],
+    }
+    run = native.script(request)
+    if run["failure"]:
+        return LabExport(None, f"the script fails: {run['failure']}")
+    rtol = PARITY_RTOL if lab.verify.rtol is None else lab.verify.rtol
+    reason = difference(main, run, exact=export.exact and same, rtol=rtol)
     return LabExport(None, reason) if reason else LabExport((export.name, export.text))
 
 
@@ -94,45 +131,6 @@ def _seconds(lab: Lab, main: dict[str, Any]) -> float:
     return seconds
 
 
-def _checked(
-    context: TrialContext,
-    native: NativeEngine,
-    lab: Lab,
-    export: Export,
-    main: dict[str, Any],
-    parity: Parity | None,
-) -> str:
-    """Why the script cannot be offered; empty if it can."""
-    exact = export.exact and parity is not None and parity.first is None
-    rtol = PARITY_RTOL if lab.verify.rtol is None else lab.verify.rtol
-    kept = main["recorded"]
-    request = {
-        "path": str(context.root / "examples" / export.name),
-        "text": filled(export, initial_values(lab)),
-        "others": [filled(export, values) for values in _others(lab)],
-        "buttons": list(export.buttons),
-        "near": kept["near"],
-    }
-    asked = {"kept": kept, "pictures": [p["readouts"] for p in main["pictures"]], "exact": exact}
-    digest = hashlib.sha256(_digest().encode())
-    # The model is in it by what the trial recorded.
-    for part in ({**request, "path": export.name}, {**asked, "rtol": rtol}):
-        digest.update(json.dumps(part).encode() + b"\0")
-    key = digest.hexdigest()
-    store = context.memory.store
-    found = store.get("exports", key)
-    if found is not None:
-        return found.decode()
-    try:
-        run = native.script(request)
-    except NativeError as error:
-        return f"the script {error}"
-    reason = run["failure"] and f"the script fails: {run['failure']}"
-    reason = reason or export_check.difference(main, run, exact=exact, rtol=rtol) or ""
-    store.put("exports", key, reason.encode())
-    return reason
-
-
 def _others(lab: Lab) -> list[dict[int, float | str]]:
     """Values of the controls that a reader can choose, each control for itself."""
     start = initial_values(lab)
@@ -147,10 +145,8 @@ def _others(lab: Lab) -> list[dict[int, float | str]]:
     return found
 
 
-@functools.lru_cache(maxsize=1)
+@functools.cache
 def _digest() -> str:
-    """A hash of how a script is run and held against the lab."""
-    from coursebuild.features.lab.engines import native_worker
-
-    files = (native_worker.__file__, export_check.__file__)
-    return hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()
+    """A hash of how scripts are made, run and held against labs."""
+    files = sorted(Path(__file__).parents[1].rglob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
