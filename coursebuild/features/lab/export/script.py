@@ -17,21 +17,20 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
-from tree_sitter import Node
 
 from coursebuild.features.lab.export import text
 from coursebuild.features.lab.export.calls import INEXACT
-from coursebuild.features.lab.export.context import field_types
 from coursebuild.features.lab.export.library import LIBRARY, helpers, imports, names_in
 from coursebuild.features.lab.export.statements import (
     RESERVED,
     Translation,
+    field_types,
     translate_expression,
     translate_statements,
 )
 from coursebuild.features.lab.export.text import ExportMetadata
 from coursebuild.features.lab.export.values import Code, Type
-from coursebuild.features.lab.javascript import UntranslatableError, parse_statements
+from coursebuild.features.lab.javascript import UntranslatableError
 from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.schema import Button, Control, Select, Slider
 
@@ -313,14 +312,13 @@ def _setter(control: Slider | Select) -> str | None:
     return f"({control.set}\n) = value" if control.set is not None else control.apply
 
 
-def _pieces(lab: Lab, values: list[Code | None]) -> Iterator[tuple[list[Node], Type | None]]:
-    """All statements of a lab, each piece with the type of `value` in it."""
-    for code in (lab.fields.setup, lab.fields.controller):
-        yield parse_statements(code), None
+def _pieces(lab: Lab, values: list[Code | None]) -> Iterator[tuple[str, Code | None]]:
+    """All statements of a lab, each piece with what `value` stands for in it."""
+    yield from ((lab.fields.setup, None), (lab.fields.controller, None))
     for control, value in zip(lab.fields.controls, values, strict=True):
         piece = control.run if isinstance(control, Button) else _setter(control)
         if piece is not None:
-            yield parse_statements(piece), value.type if value is not None else None
+            yield piece, value
 
 
 def _is_exact(code: str) -> bool:

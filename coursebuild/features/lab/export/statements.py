@@ -1,6 +1,6 @@
 """Pieces of lab code as Python.
 
-Entry points: `translate_statements`, `translate_expression`.
+Entry points: `translate_statements`, `translate_expression`; `field_types`, what `ctx` holds.
 
 A piece becomes the lines of a function's body. Whether it may stand among other lines is said with
 it: one that has variables of its own needs a function of its own.
@@ -83,6 +83,28 @@ def translate_expression(code: str, context: Mapping[str, Type]) -> Code:
     return found
 
 
+def field_types(
+    parameters: Mapping[str, Type], pieces: Iterable[tuple[str, Code | None]]
+) -> dict[str, Type]:
+    """The fields of `ctx`: those of parameters, and those that statements assign to.
+
+    `pieces` are all statements of a lab, each with what `value` stands for. They are translated
+    until nothing more is learned from it: what a field holds may depend on another.
+    """
+    types, before, pieces = dict(parameters), None, tuple(pieces)
+    while types != before:
+        before = dict(types)
+        for code, value in pieces:
+            learner = _Statements(types, value, button=True, learned=types)
+            tuple(learner.block(parse_statements(code)))
+    for name, type in types.items():
+        if keyword.iskeyword(name) or name.startswith("__") or not name.isidentifier():
+            raise UntranslatableError(f"the name `ctx.{name}`")
+        if type == "str" and name not in parameters:
+            raise UntranslatableError(f"the text `ctx.{name}`, which is not there at the start")
+    return types
+
+
 class _Place(Struct, frozen=True):
     """What can be assigned to."""
 
@@ -94,11 +116,18 @@ class _Place(Struct, frozen=True):
 
 
 class _Statements(Calls):
-    """Translates statements."""
+    """Translates statements; into `learned` it notes types of fields, and passes over mistakes."""
 
-    def __init__(self, context: Mapping[str, Type], value: Code | None, button: bool) -> None:
+    def __init__(
+        self,
+        context: Mapping[str, Type],
+        value: Code | None,
+        button: bool,
+        learned: dict[str, Type] | None = None,
+    ) -> None:
         super().__init__(context, value)
         self.button = button
+        self.learned = learned
         self.taken: set[str] = set()
         self.returns = False
 
@@ -115,8 +144,21 @@ class _Statements(Calls):
         """Statements in a scope of their own."""
         self.scopes.append({})
         for statement in body:
-            yield from self.statement(statement)
+            try:
+                yield from self.statement(statement)
+            except UntranslatableError:
+                if self.learned is None:
+                    raise
         self.scopes.pop()
+
+    def learn(self, target: Node, value: Node | None) -> None:
+        """Note what is assigned to a field of `ctx`; without a value it is a number."""
+        path = self.path(target)
+        if self.learned is None or len(path) != 2 or path[0] != "ctx":
+            return
+        found = "num" if value is None else self.value(value, single=True).type
+        old = self.learned.get(path[1], found)
+        self.learned[path[1]] = "num" if {old, found} <= {*NUMBERS} else old
 
     def indented(self, body: Node) -> list[str]:
         """The body of an `if` or a loop."""
@@ -215,10 +257,13 @@ class _Statements(Calls):
 
     def assignment(self, node: Node) -> str:
         """`a = b = value`."""
-        places = []
+        targets = []
         while node.type == "assignment_expression":
-            places.append(self.place(field(node, "left")))
+            targets.append(field(node, "left"))
             node = field(node, "right")
+        for target in targets:
+            self.learn(target, node)
+        places = [self.place(target) for target in targets]
         takes = {place.takes for place in places}
         if takes == {"number", "float"}:
             takes = {"float"}
@@ -229,6 +274,7 @@ class _Statements(Calls):
 
     def compound(self, target: Node, operator: str, value: Node | None) -> str:
         """`target += value` and its like; without a value it is 1."""
+        self.learn(target, None)
         place = self.place(target)
         if operator in _COMPOUND and place.direct:
             return f"{place.text} {operator}= {self.number(value).text if value else '1'}"
