@@ -8,8 +8,8 @@ a `Report`.
 2. `load`: disk → course. Its parser is `documents` (with `reading`, `tasks`, `fingerprints`), which
    parses only what nobody has parsed
 3. `verify`: course → results. `scripts` runs scripts, by `remember`, which gives what is known;
-   `remember_models` compiles models; `labs` (with `lab_inputs`, `lab_models`, `lab_export`,
-   `custom_labs`) tries labs; `shards` leaves out the parts of other machines
+   `remember_models` compiles models; `trials` tries what features have, as labs; `shards` leaves
+   out the parts of other machines
 4. `judge`: findings → report, and the files for which it holds
 5. `site` (with `pages`, `page_index`): course and results → the files of a site
 6. `preview`: the same in memory, for `serve`

@@ -1,9 +1,9 @@
 """JavaScript expressions of lab code as Python.
 
-Entry point: `Expressions.value(node)`. Calls are translated by a subclass, see `python_calls`.
+Entry point: `Expressions.value(node)`. Calls are translated by a subclass, see `calls`.
 
 A Python expression made here has the same value as the one in JavaScript, as long as no error is
-raised. Where the two languages differ for numbers a helper takes over (see `python_library`), and
+raised. Where the two languages differ for numbers a helper takes over (see `helpers`), and
 where they differ otherwise the expression is refused.
 """
 

@@ -2,7 +2,7 @@
 
 Entry points: `export_script(lab, metadata)`; `filled`, the script with values for its controls.
 
-1. Every piece of the lab's code is translated (`python_statements`). Where one cannot be, there is
+1. Every piece of the lab's code is translated (`statements`). Where one cannot be, there is
    no script, and the reason is said.
 2. The pieces are put together in the order in which the lab's core runs them (see docs/labs.md),
    with the helpers that they use.
