@@ -1,11 +1,13 @@
 """What of `helpers` an exported script brings along, and what it imports.
 
-Entry points: `LIBRARY`, the definitions by name; `helpers`, those that code needs; `imports`.
+Entry points: `LIBRARY`, the definitions by name; `helpers`, those that code needs; `imports`;
+`RESERVED`, names that are taken.
 """
 
 from __future__ import annotations
 
 import ast
+import keyword
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,6 +27,15 @@ def _definitions() -> Iterator[tuple[str, str]]:
 
 LIBRARY = dict(_definitions())
 """What a script can bring along, by name, in the order in which it stands there."""
+
+RESERVED = frozenset(
+    """
+        model data ctx lib math np mujoco sim abs float int str any range max min len print format
+        Ctx load start reset step simulate readouts report main control random struct
+        model_path Iterable NamedTuple dataclass field Context Decimal ROUND_HALF_UP
+    """.split()
+).union(LIBRARY, keyword.kwlist, keyword.softkwlist)
+"""Names that nothing else in a script may have."""
 
 _IMPORTS = {
     "collections.abc": ("Iterable",),

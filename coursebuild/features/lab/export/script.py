@@ -20,9 +20,14 @@ from msgspec import Struct
 
 from coursebuild.features.lab.export import text
 from coursebuild.features.lab.export.calls import INEXACT
-from coursebuild.features.lab.export.library import LIBRARY, helpers, imports, names_in
-from coursebuild.features.lab.export.statements import (
+from coursebuild.features.lab.export.library import (
+    LIBRARY,
     RESERVED,
+    helpers,
+    imports,
+    names_in,
+)
+from coursebuild.features.lab.export.statements import (
     Translation,
     field_types,
     translate_expression,

@@ -18,7 +18,7 @@ from tree_sitter import Node
 from coursebuild.features.lab.export.calls import Calls, check_single, refused_call
 from coursebuild.features.lab.export.engine_names import CALLS, ArrayField, engine_field
 from coursebuild.features.lab.export.expressions import Variable
-from coursebuild.features.lab.export.library import LIBRARY
+from coursebuild.features.lab.export.library import RESERVED
 from coursebuild.features.lab.export.values import NUMBERS, Code, Type, as_float
 from coursebuild.features.lab.javascript import (
     UntranslatableError,
@@ -36,14 +36,6 @@ _INDENT = "    "
 _NAME = re.compile(r"[A-Za-z_$][A-Za-z0-9_$]*")
 _JAVASCRIPT_NAMES = frozenset("model data mj sim ctx lib Math value arguments eval".split())
 _COMPOUND = ("+", "-", "*", "/")
-RESERVED = frozenset(
-    """
-        model data ctx lib math np mujoco sim abs float int str any range max min len print format
-        Ctx load start reset step simulate readouts report main control random struct
-        model_path Iterable NamedTuple dataclass field Context Decimal ROUND_HALF_UP
-    """.split()
-).union(LIBRARY, keyword.kwlist, keyword.softkwlist)
-"""Names that nothing else in a script may have."""
 
 
 class Translation(Struct, frozen=True):
