@@ -20,6 +20,7 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
+from markupsafe import Markup
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import course_formulas
@@ -28,10 +29,10 @@ from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Results
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.draw import draw
 from coursebuild.core.pages.folding import fold, imported
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import record
 from coursebuild.core.run.v8 import MathEngine
@@ -149,9 +150,9 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
     scripts = [script.code.text for script, _ in library.scripts.values()]
     tools = library.tools
 
-    def draws() -> list[Draft]:
+    def draws() -> list[tuple[PageHead, Markup]]:
         fold.cache_clear()
-        return [draw(inputs, document, tools)[0] for inputs, document in drawn]
+        return [draw(inputs, document, tools)[:2] for inputs, document in drawn]
 
     def modules() -> list[frozenset[str]]:
         imported.cache_clear()
@@ -168,7 +169,7 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
         "its summary": lambda: [encode(without_prose(d)) for d in documents],
         "modules that scripts import": modules,
         "draw": draws,
-        "settle, facts and links": lambda: [record(d, course.base_url) for d in drafts],
+        "settle, facts and links": lambda: [record(*d, course.base_url) for d in drafts],
     }
     counted = timed(steps, max(2, repeat), time.process_time)
     print(f"\nof each of {len(drawn)} lessons and pages, one core")

@@ -203,12 +203,12 @@ class Pages:
                 self._links.add((path, "" if anchor == "top" else anchor))
             elif anchor not in ("", "top") and not has(own, anchor):
                 self._sound = False
-        draft = record.draft
+        head = record.head
         notes = tuple(
-            (name, NotedPage(draft.path, draft.kind, entry.id, draft.title, digest))
+            (name, NotedPage(head.path, head.kind, entry.id, head.title, digest))
             for name, digest in record.notes
         )
-        return SitePage(entry, key, draft.indexed, notes, record.ids)
+        return SitePage(entry, key, head.indexed, notes, record.ids)
 
     def _drawn(self, path: str) -> DrawnPage:
         """What was drawn of a page."""
@@ -228,7 +228,7 @@ def _decoded(data: bytes) -> PageRecord:
 def framed(page: DrawnPage, frame: Frame) -> bytes:
     """A page as it is published."""
     record = page.record
-    return frame.around(record.draft, record.parts, page.body.decode()).encode()
+    return frame.around(record.head, record.parts, page.body.decode()).encode()
 
 
 def text_of(entry: PageEntry, library: Library) -> Text | None:

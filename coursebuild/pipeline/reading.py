@@ -246,8 +246,9 @@ class PageReader:
         with self._lock:
             whole = None if request.text is None else self._whole(request.text)
             document = None if whole is None else whole.document
-            draft, context = draw(inputs, document, self._tools_for(request.language, whole))
-            found, body = record(draft, request.base_url)
+            tools = self._tools_for(request.language, whole)
+            head, html, context = draw(inputs, document, tools)
+            found, body = record(head, html, request.base_url)
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             found = replace(found, notes=tuple(digests))
@@ -262,7 +263,7 @@ class PageReader:
         assert inputs.shown is not None, "a page with a document shows it"
         whole = self._whole(text)
         tools = self._tools_for(language, whole)
-        return PageContext.made(tools, inputs.shown, Place(inputs.path), whole.document)
+        return PageContext.made(tools, inputs.shown, Place(inputs.head.path), whole.document)
 
     def _tools_for(self, language: str, whole: _Whole | None) -> Tools:
         """Words, templates and marked code, with the formulas of a document."""

@@ -27,7 +27,7 @@ class NotedPage(Struct, frozen=True):
     path: str
     """Its site path."""
     kind: str
-    """See `Draft`."""
+    """See `PageHead`."""
     id: str
     """Of its lesson, level, model or page."""
     title: str

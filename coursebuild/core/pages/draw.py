@@ -6,49 +6,45 @@ Entry point: `draw(inputs, document, tools)`.
 from __future__ import annotations
 
 from markupsafe import Markup
+from msgspec.structs import replace
 
 from coursebuild.core.model import Document, Paragraph, plain_text
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.article import article, contents
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.listings import numbered
-from coursebuild.core.pages.page_inputs import AddedParts, Graphed, Highlighted, PageInputs
+from coursebuild.core.pages.page_inputs import (
+    AddedParts,
+    Graphed,
+    Highlighted,
+    PageHead,
+    PageInputs,
+)
 from coursebuild.core.pages.tools import Tools
 from coursebuild.core.registry import model_parts, page_kind
 
 
 def draw(
     inputs: PageInputs, document: Document | None, tools: Tools
-) -> tuple[Draft, PageContext | None]:
-    """The page without its frame, and the context of its document.
+) -> tuple[PageHead, Markup, PageContext | None]:
+    """The head of the page, its body, and the context of its document.
 
     The same values give the same page.
     """
     page: PageContext | None = None
     values = {name: _drawn(value, tools) for name, value in inputs.values.items()}
-    description = inputs.description
+    head = inputs.head
     if document is not None and inputs.shown is not None:
-        page = PageContext.made(tools, inputs.shown, urls.Place(inputs.path), document)
+        page = PageContext.made(tools, inputs.shown, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
-        if inputs.kind == "page":
-            description = _first_sentences(document)
-    kind = page_kind(inputs.kind)
+        if head.kind == "page":
+            head = replace(head, description=_first_sentences(document))
+    kind = page_kind(head.kind)
     if kind is not None and kind.draw is not None:
-        values |= {"title": inputs.title, "content": kind.draw(tools, values)}
-    draft = Draft(
-        inputs.path,
-        inputs.kind,
-        inputs.title,
-        description,
-        tools.render(inputs.template, **values),
-        json_ld=inputs.json_ld,
-        og_type=inputs.og_type,
-        indexed=inputs.indexed,
-    )
-    return draft, page
+        values |= {"title": head.title, "content": kind.draw(tools, values)}
+    return head, tools.render(inputs.template, **values), page
 
 
 def _drawn(value: object, tools: Tools) -> object:

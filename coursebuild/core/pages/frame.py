@@ -18,8 +18,8 @@ from coursebuild.core.features import PagePart
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
-from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_title
 from coursebuild.core.registry import features, page_copies, page_kind
 
@@ -115,32 +115,32 @@ class Frame(Struct, frozen=True):
     library: Library
     names: Names
 
-    def around(self, draft: Draft, parts: tuple[str, ...], body: str) -> str:
+    def around(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
         """The text of a page that has this body, and these parts; see `parts_of`."""
-        values = _values(self.library, self.names, draft, parts)
+        values = _values(self.library, self.names, head, parts)
         html = self.library.render("base.html", body=Markup(body), **values)
         return f"{visible(html)}\n"
 
 
 def _values(
-    library: Library, names: Names, draft: Draft, parts: tuple[str, ...]
+    library: Library, names: Names, head: PageHead, parts: tuple[str, ...]
 ) -> dict[str, object]:
-    course, known = library.course, page_kind(draft.kind)
-    place = place_of(library, draft.path)
+    course, known = library.course, page_kind(head.kind)
+    place = place_of(library, head.path)
     return {
-        "policy": policy(draft.json_ld, form=known is not None and known.form),
-        "head_title": meta.head_title(course, draft.title, draft.kind),
-        "description": draft.description,
-        "social": meta.social(library, draft.path, draft.title, draft.description, draft.og_type),
-        "canonical": urls.absolute(course, draft.path) if draft.path != urls.NOT_FOUND else "",
-        "json_ld": draft.json_ld,
-        "copies": _copies(draft.path),
-        "kind": draft.kind,
+        "policy": policy(head.json_ld, form=known is not None and known.form),
+        "head_title": meta.head_title(course, head.title, head.kind),
+        "description": head.description,
+        "social": meta.social(library, head.path, head.title, head.description, head.og_type),
+        "canonical": urls.absolute(course, head.path) if head.path != urls.NOT_FOUND else "",
+        "json_ld": head.json_ld,
+        "copies": _copies(head.path),
+        "kind": head.kind,
         "language": course.language or "en",
         "direction": direction(course.language or "en"),
         "course_key": course.key,
         "root": place.href(urls.HOME).removesuffix(urls.HOME),
-        "robots": "" if draft.indexed else "noindex",
+        "robots": "" if head.indexed else "noindex",
         "icon": place.href(names.icon),
         "style": place.href(names.style),
         "theme_script": place.href(names.theme_script),

@@ -13,7 +13,7 @@ from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.owners import owner_links
-from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.registry import page_copies
 
 
@@ -83,15 +83,11 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         ),
         "edit": edit_address(library, lesson.path),
     }
+    data = meta.lesson_data(library, lesson)
     return PageInputs(
-        place.path,
-        "lesson",
-        lesson.title,
-        lesson.summary,
+        PageHead(place.path, "lesson", lesson.title, lesson.summary, data, "article"),
         "lesson.html",
         values,
-        json_ld=meta.lesson_data(library, lesson),
-        og_type="article",
         document=document.source.path,
         shown=document_inputs(library, place, document),
     )
@@ -103,9 +99,8 @@ def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
     written = [need for need in _ancestors(library, lesson) if need.document is not None]
     readable = tuple(lesson_link(library, place, need) for need in written)
     values = {**_common(library, place, lesson), "readable": readable}
-    return PageInputs(
-        place.path, "stub", lesson.title, lesson.summary, "stub.html", values, indexed=False
-    )
+    head = PageHead(place.path, "stub", lesson.title, lesson.summary, indexed=False)
+    return PageInputs(head, "stub.html", values)
 
 
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:

@@ -1,6 +1,6 @@
 """A page that is to be drawn, as a value: everything that it shows but the text of its document.
 
-Entry point: `PageInputs`.
+Entry point: `PageInputs`, with its `PageHead`.
 
 A page is drawn from its inputs, its document, and the tool's templates and words, and from nothing
 else: so it need be drawn again only when one of these is another. What inputs are made of are plain
@@ -111,21 +111,28 @@ class Graphed(Struct, frozen=True):
     """Ids: what is needed, and what needs it."""
 
 
-class PageInputs(Struct, frozen=True):
-    """A page that is to be drawn."""
+class PageHead(Struct, frozen=True):
+    """What the frame of a page shows of it."""
 
     path: str
     """Its site path."""
     kind: str
-    """See `Draft`."""
+    """One of `registry.CORE_PAGES`, or the name of a `PageKind`; a class of the style sheet too."""
     title: str
     description: str
-    template: str
-    values: Mapping[str, object]
-    """For the template; `Highlighted`, `AddedParts` and `Graphed` among them are drawn first."""
     json_ld: Markup = Markup()
     og_type: str = "website"
     indexed: bool = True
+    """Whether search engines should list it."""
+
+
+class PageInputs(Struct, frozen=True):
+    """A page that is to be drawn."""
+
+    head: PageHead
+    template: str
+    values: Mapping[str, object]
+    """For the template; `Highlighted`, `AddedParts` and `Graphed` among them are drawn first."""
     document: str | None = None
     """The path of its document, whose text and contents the template gets as well."""
     shown: ShownDocument | None = None

@@ -16,7 +16,7 @@ from coursebuild.core.features import PageKind
 from coursebuild.core.model import Document
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.registry import page_kind
 
 
@@ -77,9 +77,8 @@ def _added_inputs(kind: PageKind, library: Library) -> PageInputs:
     title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
     values = {"home": home, **kind.values(library)}
     template = "added.html" if kind.draw is not None else f"{kind.name}.html"
-    return PageInputs(
-        kind.path, kind.name, title, description, template, values, indexed=kind.indexed
-    )
+    head = PageHead(kind.path, kind.name, title, description, indexed=kind.indexed)
+    return PageInputs(head, template, values)
 
 
 def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:

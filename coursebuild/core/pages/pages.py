@@ -17,7 +17,7 @@ from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
 from coursebuild.core.pages.lesson import LessonHead, LessonLink, edit_address, lesson_link
 from coursebuild.core.pages.library import Library, ModelUse
-from coursebuild.core.pages.page_inputs import AddedParts, Highlighted, PageInputs
+from coursebuild.core.pages.page_inputs import AddedParts, Highlighted, PageHead, PageInputs
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.registry import model_parts
 
@@ -66,10 +66,8 @@ def home_inputs(library: Library) -> PageInputs:
         "scripts": len(library.scripts),
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
     }
-    data = meta.course_data(library)
-    return PageInputs(
-        urls.HOME, "home", course.title, course.summary, "home.html", values, json_ld=data
-    )
+    head = PageHead(urls.HOME, "home", course.title, course.summary, meta.course_data(library))
+    return PageInputs(head, "home.html", values)
 
 
 def level_inputs(library: Library, level: Level) -> PageInputs:
@@ -88,7 +86,8 @@ def level_inputs(library: Library, level: Level) -> PageInputs:
         "following": _level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
     }
     title = f"{library.words('level.label', id=level.id)}: {level.title}"
-    return PageInputs(place.path, "level", title, level.summary, "level.html", values)
+    head = PageHead(place.path, "level", title, level.summary)
+    return PageInputs(head, "level.html", values)
 
 
 def _level_link(library: Library, place: urls.Place, level: Level) -> Named:
@@ -136,7 +135,7 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         ),
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
-    return PageInputs(place.path, "model", title, "", "model.html", values)
+    return PageInputs(PageHead(place.path, "model", title, ""), "model.html", values)
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
@@ -178,10 +177,7 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
     """What a page that is no lesson shows; its document's summary is enough."""
     place = urls.Place(urls.page_path(page))
     return PageInputs(
-        place.path,
-        "page",
-        page.title,
-        "",
+        PageHead(place.path, "page", page.title, ""),
         "page.html",
         {"title": page.title, "edit": edit_address(library, page.path)},
         document=document.source.path,
@@ -194,4 +190,5 @@ def not_found_inputs(library: Library) -> PageInputs:
     place = place_of(library, urls.NOT_FOUND)
     values = {"home": place.href(urls.HOME)}
     title = library.words("notfound.title")
-    return PageInputs(urls.NOT_FOUND, "notfound", title, "", "notfound.html", values, indexed=False)
+    head = PageHead(urls.NOT_FOUND, "notfound", title, "", indexed=False)
+    return PageInputs(head, "notfound.html", values)

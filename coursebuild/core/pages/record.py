@@ -1,6 +1,6 @@
 """A drawn page, ready for its frame, and what the rest of the site must know of it.
 
-Entry point: `record(draft, base_url)`.
+Entry point: `record(head, body, base_url)`.
 
 1. Formulas are set to what stands beside them (`formulas.glue`), styles in single elements become
    classes (`styles.hoist`), and forbidden characters are made visible (`characters.visible`).
@@ -9,23 +9,20 @@ Entry point: `record(draft, base_url)`.
 
 from __future__ import annotations
 
-from markupsafe import Markup
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.links import Reference, ids_and_addresses, references, without_lines
+from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.shared import page_characters
 
 
 class PageRecord(Struct, frozen=True):
     """What the site must know of a page to put it together, but for the page's body."""
 
-    draft: Draft
-    """Without its body."""
+    head: PageHead
     parts: tuple[str, ...]
     """See `frame.parts_of`."""
     text: str
@@ -41,20 +38,20 @@ class PageRecord(Struct, frozen=True):
     """What features noted of the page: the feature's name and a digest; see `added_files`."""
 
 
-def record(draft: Draft, base_url: str) -> tuple[PageRecord, str]:
+def record(head: PageHead, body: str, base_url: str) -> tuple[PageRecord, str]:
     """The record of a page that was just drawn, and its body as it will be published."""
     # Text: what is put into `Markup` would be escaped.
-    html, declarations = styles.hoist(formulas.glue(str(draft.body)))
+    html, declarations = styles.hoist(formulas.glue(str(body)))
     text, mathematics = page_characters(html)
     html = visible(html)
     ids, addresses = ids_and_addresses(html)
     found = PageRecord(
-        draft=replace(draft, body=Markup()),
-        parts=parts_of(html, draft.kind),
-        text="".join(sorted(text.union(draft.title) - fonts.BASE)),
+        head=head,
+        parts=parts_of(html, head.kind),
+        text="".join(sorted(text.union(head.title) - fonts.BASE)),
         mathematics="".join(sorted(mathematics)),
         declarations=tuple(sorted(declarations)),
         ids=tuple(sorted(without_lines(ids))),
-        references=tuple(sorted(references(draft.path, addresses, base_url))),
+        references=tuple(sorted(references(head.path, addresses, base_url))),
     )
     return found, html

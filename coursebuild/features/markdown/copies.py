@@ -46,12 +46,12 @@ def markdown_files(site: SiteContext) -> Iterator[SiteFile]:
 
 def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
     """The text of a page; nothing where it has no copy."""
-    if not urls.has_copies(inputs.path):
+    if not urls.has_copies(inputs.head.path):
         return b""
     if page is not None:
         text = _document_copy(inputs, page)
     else:
-        place = urls.Place(inputs.path)
+        place = urls.Place(inputs.head.path)
         text = markdown_of(body, lambda href: markdown_href(place, href))
     return visible(f"{text}\n").encode()
 
@@ -88,7 +88,7 @@ def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     """Title, summary, facts and objectives; of a page that is no lesson, its title."""
     lesson = inputs.values.get("lesson")
     if not isinstance(lesson, LessonHead):
-        return [f"# {_line(inputs.title)}"]
+        return [f"# {_line(inputs.head.title)}"]
     parts = [f"# {_line(f'{lesson.id} {lesson.title}')}"]
     if lesson.summary:
         parts.append(guarded(_line(lesson.summary)))

@@ -44,12 +44,12 @@ def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
         page: the document on it, where it has one.
         body: its HTML.
     """
-    if inputs.kind in _LEFT_OUT or not (inputs.indexed or inputs.kind in _LEADS):
+    if inputs.head.kind in _LEFT_OUT or not (inputs.head.indexed or inputs.head.kind in _LEADS):
         return b""
     head = inputs.values.get("lesson")
     name = head.id if isinstance(head, LessonHead) else ""
     sections = page_sections(inputs, None if page is None else page.document, body)
-    return call("page", "", packed(sections)) + b"\0" + terms([name, inputs.title], sections)
+    return call("page", "", packed(sections)) + b"\0" + terms([name, inputs.head.title], sections)
 
 
 def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
@@ -61,7 +61,7 @@ def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
 def page_sections(inputs: PageInputs, document: Document | None, body: str) -> tuple[Section, ...]:
     """What stands on a page; see `note_page`."""
     head = inputs.values.get("lesson")
-    lead = (inputs.description, *(head.objectives if isinstance(head, LessonHead) else ()))
+    lead = (inputs.head.description, *(head.objectives if isinstance(head, LessonHead) else ()))
     if document is not None:
         known = inputs.shown or ShownDocument()
         labels = {kind: shown.label for kind, shown in known.callouts.items()}
@@ -69,7 +69,7 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
     code = [v.text for v in inputs.values.values() if isinstance(v, Highlighted)]
     pieces = [SectionPiece("text", text) for text in lead if text]
     pieces += [SectionPiece("code", text) for text in code if text]
-    drawn = () if inputs.kind in _LEADS else drawn_sections(body)
+    drawn = () if inputs.head.kind in _LEADS else drawn_sections(body)
     return (Section("", "", 0, tuple(pieces)), *drawn)
 
 

@@ -12,8 +12,8 @@ from markupsafe import Markup
 
 from coursebuild.core.pages import formulas
 from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.draft import Draft
 from coursebuild.core.pages.fonts import BASE
+from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.styles import class_name
 
@@ -42,7 +42,7 @@ html = st.lists(st.sampled_from(PIECES), max_size=20).map("".join)
 
 
 def recorded(body: str) -> tuple[PageRecord, str]:
-    return record(Draft("x.html", "page", "Títle", "", Markup(body)), "")
+    return record(PageHead("x.html", "page", "Títle", ""), Markup(body), "")
 
 
 def glued(body: str) -> str:
