@@ -135,7 +135,8 @@ class _Evaluator:
         if known is not None:
             return known
         if one.text not in self.arithmetic.constants:
-            raise one.not_understood(f"`{one.text}` has no meaning in the index of symbols")
+            reason = f"no lesson says what `{one.text}` is, or several differ in its unit"
+            raise one.not_understood(reason)
         return Quantity(self.arithmetic.constants[one.text])
 
     def _unit(self, one: Expression) -> Quantity:

@@ -21,6 +21,7 @@ SPACE = re.compile(
 _NUMBER = re.compile(
     r"(?:[0-9]{1,3}(?:(?:\{,\}|\\[,;: ]|~)[0-9]{3})+(?![0-9])|[0-9]+)(?:\.[0-9]+)?|\.[0-9]+"
 )
+_LETTER = re.compile(r"[A-Za-z]|\\[A-Za-z]+")
 _DIFFERENTIAL = re.compile(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
 _UPRIGHT = re.compile(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
 _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
@@ -268,10 +269,10 @@ class _Reader:
         name = sign.lstrip("\\")
         self.at += len(sign)
         if name in _ACCENTS and sign != name:
-            inner = self.group()
-            if inner.kind != "symbol":
-                raise inner.not_understood("an accent stands over more than a letter")
-            text = f"\\{name}{{{inner.text}}}"
+            inner = self.raw()
+            if not _LETTER.fullmatch(inner):
+                raise NotUnderstood("an accent stands over more than a letter", start, self.at)
+            text = f"\\{name}{{{inner}}}"
         elif re.fullmatch("[A-Za-z]", sign) or name in GREEK:
             text = sign
         else:

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.features.arithmetic.chains import check_arithmetic
+from coursebuild.features.arithmetic.identities import check_identity
 
 HOLDS = r"""
 I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168\ \mathrm{kg\,m^2}.
@@ -69,3 +70,18 @@ def test_what_nests_too_deep_is_not_understood() -> None:
     for tex in ("(" * 2400 + "1" + ")" * 2400, r"\sqrt" * 900 + "1", "1 + " * 1200 + "1"):
         (found,) = check_arithmetic(tex + " = 1")
         assert found.message == "it is too long"
+
+
+IDENTITIES = r"""
+\sin 2x = 2\sin x\,\cos x
+\frac{\mathrm d}{\mathrm dx}\,\frac{x}{1 + x^2} = \frac{1 - x^2}{(1 + x^2)^2}
+\frac{\mathrm d\,x^3}{\mathrm dx} = 3x^2
+\int_0^x \cos x\,\mathrm dx = \sin x = \sqrt{1 - \cos^2 x}
+\int x\,\mathrm e^{x}\,\mathrm dx = (x - 1)\,e^x
+\int_0^\infty e^{-x^2}\,\mathrm dx = \tfrac12\sqrt\pi
+"""
+
+
+def test_identities_hold() -> None:
+    told = [list(check_identity(tex, {"x": ()})) for tex in IDENTITIES.strip().splitlines()]
+    assert told == [[]] * len(told)
