@@ -32,7 +32,7 @@ from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.features.lab.compile import LabCode, LabModule, compile_lab, pieces
+from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
 from coursebuild.features.lab.custom import custom_lab
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
@@ -194,7 +194,7 @@ class _Attempt(Struct, frozen=True):
     def _mistakes(self, mjb: bytes) -> list[Diagnostic]:
         """What no engine could run, and what the code names and is not there."""
         browser, code = self.engines.browser, pieces(self.lab)
-        wrong = browser.mistakes([_to_parse(piece) for piece in code])
+        wrong = browser.mistakes(code)
         found = [
             code_diagnostic(self.lab, piece, text)
             for piece, text in zip(code, wrong, strict=True)
@@ -281,10 +281,6 @@ class _Attempt(Struct, frozen=True):
 def _is_lasting(reply: dict[str, Any]) -> bool:
     """Whether the same trial would have the same result another time."""
     return all(failure["kind"] not in _TRANSIENT for failure in reply["failures"])
-
-
-def _to_parse(piece: LabCode) -> tuple[str, str, str, bool]:
-    return piece.code, piece.form, piece.function, piece.takes_value
 
 
 def _key(inputs: Inputs, mjb: bytes) -> str:

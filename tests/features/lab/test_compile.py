@@ -28,8 +28,7 @@ def engine() -> Iterator[LabEngine]:
 
 def mistakes(engine: LabEngine, given: list[tuple[Form, str]]) -> list[str | None]:
     """Why pieces of code cannot be part of a lab."""
-    pieces = [LabCode(("x",), form, code, form == "target") for form, code in given]
-    return engine.mistakes([(p.code, p.form, p.function, p.takes_value) for p in pieces])
+    return engine.mistakes([LabCode(("x",), form, c, form == "target") for form, c in given])
 
 
 BREAKING_OUT: list[tuple[Form, str]] = [
@@ -147,8 +146,7 @@ def test_no_piece_is_run_when_it_is_looked_at(engine: LabEngine, tmp_path: Path)
 
 def test_value_is_only_what_setters_see(engine: LabEngine) -> None:
     for takes_value in (True, False):
-        piece = LabCode(("x",), "statements", "let value = 1", takes_value)
-        (why,) = engine.mistakes([(piece.code, piece.form, piece.function, takes_value)])
+        (why,) = engine.mistakes([LabCode(("x",), "statements", "let value = 1", takes_value)])
         assert (why is not None) == takes_value
 
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.run.v8 import Isolate
-from coursebuild.features.lab.export.library import LIBRARY, helpers
+from coursebuild.features.lab.export import helpers
 from coursebuild.features.lab.export.statements import translate_expression, translate_statements
 from coursebuild.features.lab.export.values import Type
 
@@ -62,13 +62,10 @@ def python_value(code: str) -> float | None:
     declared = "const x = -0, y = -7.25, z = 0.1, i = 5\n"
     lines = translate_statements(f"{declared}ctx.n = {code}", CONTEXT).lines
     scope = {
-        "np": np,
-        "math": math,
+        **vars(helpers),
         "data": SimpleNamespace(qpos=np.array([2.5, -0.0])),
         "ctx": SimpleNamespace(n=None),
     }
-    for name in helpers("\n".join(lines)):
-        exec(LIBRARY[name], scope)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -114,10 +111,7 @@ WRITTEN = st.one_of(
 @given(x=WRITTEN, form=st.sampled_from(FORMS))
 def test_numbers_are_written_as_v8_writes_them(v8: Isolate, x: float, form: str) -> None:
     made = translate_expression(f"`${{ctx.n{form}}}`", CONTEXT).text
-    scope: dict[str, object] = {"ctx": SimpleNamespace(n=np.float64(x)), "math": math}
-    exec("from decimal import ROUND_HALF_UP, Context, Decimal", scope)
-    for name in helpers(made):
-        exec(LIBRARY[name], scope)
+    scope = {**vars(helpers), "ctx": SimpleNamespace(n=np.float64(x))}
     number = "NaN" if math.isnan(x) else repr(x).replace("inf", "Infinity")
     assert eval(made, scope) == v8.call("run", f"`${{({number}){form}}}`", 10.0)
 
@@ -164,11 +158,7 @@ def test_texts_are_those_of_v8(v8: Isolate, code: str) -> None:
 
 
 def test_random_numbers_are_those_of_the_lab() -> None:
-    scope: dict[str, object] = {}
-    exec("import struct", scope)
-    for name in helpers("Random"):
-        exec(LIBRARY[name], scope)
-    random = scope["Random"](7)  # type: ignore[operator]
+    random = helpers.Random(7)
     first = [random() for _ in range(5)]
     random.restart()
     assert first == [random() for _ in range(5)] and all(0 <= x < 1 for x in first)

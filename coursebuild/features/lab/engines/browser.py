@@ -17,6 +17,7 @@ from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
+from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.files import script_path, wasm_path
 
 _MEMORY = 1 << 30
@@ -52,15 +53,15 @@ class LabEngine:
         if (isolate := self._isolate) is not None:
             isolate.stop()
 
-    def mistakes(self, pieces: Sequence[tuple[str, str, str, bool]]) -> list[str | None]:
-        """For each piece of code: why it cannot be part of a lab, or `None`.
-
-        A piece is its code, its form, the function that it becomes, and whether it reads `value`.
-        """
+    def mistakes(self, pieces: Sequence[LabCode]) -> list[str | None]:
+        """For each piece of code: why it cannot be part of a lab, or `None`."""
         isolate = self._ready()
-        names = ("code", "form", "text", "takesValue")
-        request = json.dumps([dict(zip(names, piece, strict=True)) for piece in pieces])
-        found: list[str | None] = json.loads(isolate.call("parsePieces", request, _START_SECONDS))
+        asked = [
+            {"code": p.code, "form": p.form, "text": p.function, "takesValue": p.takes_value}
+            for p in pieces
+        ]
+        reply = isolate.call("parsePieces", json.dumps(asked), _START_SECONDS)
+        found: list[str | None] = json.loads(reply)
         return found
 
     def look_up(
