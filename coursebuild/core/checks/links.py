@@ -52,7 +52,7 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.equations import equation_ids
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
 _Name: TypeAlias = (
@@ -179,7 +179,7 @@ def _check_html(
     span = html.span
     for link in _HTML_ANCHOR.finditer(span.text):
         place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
-        yield from _anchor(place, link[1][1:], document, "this page")
+        yield from _check_url(place, link[1], document, known)
     for media in html.media:
         parts = urlsplit_or_none(media.url)
         if parts is None or (parts.scheme != "data" and (parts.netloc or parts.path)):
@@ -195,7 +195,8 @@ def _check_link(
         return
     rule, name, names, missing = _named(link, target, known)
     if name not in names:
-        help = _other_kind(target, known) or did_you_mean(name, names)
+        help = _other_kind(target, known) or _lesson_help(target, known)
+        help = help or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
     elif isinstance(target, ModelTarget):
         declared = known.scenarios.get(target.name, ())
@@ -226,6 +227,26 @@ def _other_kind(target: _Name, known: LinkTargets) -> str:
     else:
         return ""
     return f"{target.id} is a {kind}: {_by_id(kind, target.id)}"
+
+
+_NUMBERED = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
+"""A file or an address that begins with the id of a lesson."""
+
+
+def _lesson_help(target: _Name, known: LinkTargets) -> str:
+    """The lesson that is meant by its file or slug, else those of the same level."""
+    if not isinstance(target, LessonTarget):
+        return ""
+    numbered = _NUMBERED.fullmatch(target.id)
+    if numbered and numbered[1] in known.lessons:
+        return f"did you mean `lesson:{numbered[1]}`?"
+    written = ((id, d.source.path) for id, d in known.lessons.items() if d is not None)
+    named = [id for id, path in written if path.endswith(f"-{target.id}.md")]
+    if len(named) == 1:
+        return f"did you mean `lesson:{named[0]}`?"
+    level = target.id.rpartition(".")[0]
+    near = [id for id in known.lessons if level and id.rpartition(".")[0] == level]
+    return f"level {level} has " + ", ".join(f"`{id}`" for id in near) if near else ""
 
 
 def _named(link: Link, target: _Name, known: LinkTargets) -> tuple[str, str, Collection[str], str]:
@@ -310,12 +331,16 @@ def _ids(kind: str, known: LinkTargets) -> Collection[str]:
 
 def _file_help(path: str, known: LinkTargets) -> str:
     name = posixpath.basename(path)
+    numbered = _NUMBERED.fullmatch(name)
+    if name.endswith((".md", ".html")) and numbered and numbered[1] in known.lessons:
+        return f"link to the lesson by its id: `lesson:{numbered[1]}`"
     if name.endswith(".md"):
         return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
     if name.endswith(".xml") and name[:-4] in known.models:
         return f"link to a model by its name: `model:{name[:-4]}`"
-    files = [file for file in known.files if not file.endswith(".md")]
-    return did_you_mean(path, files) if files else "files that pages may use lie in content/"
+    files = {posixpath.basename(file): file for file in known.files if not file.endswith(".md")}
+    near = nearest(name, files)
+    return f"did you mean `{files[near]}`?" if near else "files that pages may use lie in content/"
 
 
 def _check_media(

@@ -23,6 +23,8 @@ from coursebuild.core.text.source import Excerpt, Source, Span
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
 
+_FOREIGN = {"math": "a formula on a line of its own stands between two `$$`"}
+"""Kinds of blocks that other tools read."""
 
 INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
 """How an indented block begins that was surely meant to be a fence."""
@@ -131,6 +133,12 @@ def kind_doubts(fence: Fence) -> Iterator[Diagnostic]:
         message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
         help = "a script is a block of kind `python`"
         yield diagnose("script-kind", kind.span(), message, help=help)
+    elif name in _FOREIGN or (name.startswith("{") and near is None):
+        message = f"a block of kind `{kind.text}` is shown as code here"
+        help = _FOREIGN.get(
+            name, "a callout is a quotation: `> [!note]`, and `> ` before each line"
+        )
+        yield diagnose("markup-foreign", kind.span(), message, help=help)
     elif near is not None and name not in _LANGUAGES:
         message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
         yield diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")

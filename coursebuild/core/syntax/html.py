@@ -114,6 +114,10 @@ class Balance:
             wrong = check_raw_scheme(unescape(text[start:end]), place(start, end))
             if wrong is not None:
                 self._report(wrong)
+        if text.startswith("<!--", tag.start) and text.find("-->", tag.start) < 0:
+            message, help = "this comment is never closed", "close it with `-->`"
+            opening = place(tag.start, tag.start + 4)
+            self._report(diagnose("html-unbalanced", opening, message, help=help))
         if not name or tag.complete or name in VOID or name in _IMPLIED:
             return
         if name in _OPTIONAL:

@@ -25,10 +25,13 @@ _NEAR_CAPTION = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 _PRINTS = re.compile(
-    r"(?:.{0,80}[.;:!?]\s+)?[^.;:!?]{0,60}\b(?:print(?:s|ed)?|outputs?|writes)\b[^.;!?]{0,60}:\s*",
+    r"(?:.{0,80}[.;:!?]\s+)?[^.;:!?]{0,60}"
+    r"\b(?:print(?:s|ed)?|outputs?|writes|gives|yields|returns|results?)\b[^.;!?]{0,60}:\s*",
     re.IGNORECASE | re.DOTALL,
 )
 """A sentence that leads to what a script prints: "On this machine it prints (abridged):"."""
+_PRINTED = ("text", "", "console", "output", "plain", "plaintext", "txt")
+"""Kinds of blocks that may show what a script prints."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol", "volatile")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
@@ -40,10 +43,11 @@ def is_caption(inlines: tuple[Inline, ...]) -> bool:
     return _CAPTION.fullmatch(plain_text(inlines)) is not None
 
 
-def near_caption(inlines: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
-    """A warning where a `text` block looks recorded, and is compared with nothing."""
+def near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> list[Diagnostic]:
+    """A warning where a block of a kind looks recorded, and is compared with nothing."""
     text = plain_text(inlines)
-    if _NEAR_CAPTION.fullmatch(text) is None and _PRINTS.fullmatch(text) is None:
+    near = kind == "text" and _NEAR_CAPTION.fullmatch(text)
+    if kind not in _PRINTED or not (near or _PRINTS.fullmatch(text)):
         return []
     message = "this looks like the caption of a recorded output, and nothing is compared"
     help = "a caption begins with the word `Output` and ends with a colon: `Output:`"

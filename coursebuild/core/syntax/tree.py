@@ -136,14 +136,16 @@ class TextReader:
             recording = self._recording(children, span)
             if recording is not None:
                 return recording
-        elif not self.nested and self._before_text():
-            self.session.diagnostics += near_caption(children, span)
+        elif not self.nested and (kind := self._next_kind()) is not None:
+            self.session.diagnostics += near_caption(children, span, kind)
         return Paragraph(span, children, token.hidden)
 
-    def _before_text(self) -> bool:
-        """Whether a `text` fence follows."""
+    def _next_kind(self) -> str | None:
+        """The kind of the fence that follows, if one does."""
         token = self.tokens[self.at] if self.at < len(self.tokens) else None
-        return token is not None and token.type == "fence" and token.info.split()[:1] == ["text"]
+        if token is None or token.type != "fence":
+            return None
+        return (token.info.split() or [""])[0]
 
     def _heading(self, token: PositionedToken) -> Heading:
         self.at += 2
@@ -174,7 +176,7 @@ class TextReader:
     def _fence(self, token: PositionedToken) -> Block:
         fence = read_fence(token, self.base, nested=self.nested)
         block = fence_block(fence, self.session, self.texts)
-        if isinstance(block, Script) and not block.norun and self._before_text():
+        if isinstance(block, Script) and not block.norun and self._next_kind() == "text":
             below = self.tokens[self.at]
             if below.info.split() == ["text"]:  # its keys are told as what they are
                 self.session.report(no_caption(self._span(below)))

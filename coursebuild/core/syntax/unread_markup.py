@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
+from coursebuild.core.syntax.wording import short
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -21,12 +22,79 @@ _MATH_HELP = (
     "of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
 )
 
-_FOREIGN = re.compile(
-    r"(?P<binding>(?P<number>(?<![\w.])[-+\u2212]?\d[\w.,]*)?\{(?:out|given)\b[^{}\n\0]*\})"
-    r"|(?P<wiki>\[\[[^\[\]\n\0]+\]\])"
-    r"|(?P<template>\{\{[^{}\n\0]*\}\}|\{%[^%\n\0]*%\})"
-    r"|^ {0,3}(?P<admonition>(?:!!!|\?\?\?\+?)[ \t]+[\w-]+|:{3,}[ \t]*\{?[\w-]+\}?)",
-    re.MULTILINE,
+_ESCAPED = re.compile(r"(?:\\[()\[\]]|\s)+")
+_SIGNS = re.compile(
+    r"\{|\[\[|\]\[|\[[!@]|\^\[|^\[TOC|!!!|\?\?\?|:::|===? ?\S|\\[([]|\\\w+\{|\$`", re.I | re.M
+)
+"""What markup of other tools cannot do without."""
+_NUMBER = r"(?<![\w.])[-+\u2212]?\d[\w.,]*"
+_FOREIGN: dict[str, tuple[str, str, str]] = {
+    "binding": (
+        rf"(?:{_NUMBER})?\{{(?:out|given)\b[^{{}}\n\0]*\}}",
+        "marks no number, and is shown as it is written",
+        "put the number into backticks: `` `4.47`{out} ``",
+    ),
+    "wiki": (
+        r"(?<!\\)\[\[[^\[\]\n\0]+\]\]",
+        "is no link, and is shown as it is written",
+        "a link to a lesson is `[its title](lesson:1.2)`",
+    ),
+    "template": (
+        r"\{\{[^{}\n\0]*\}\}|\{%[^%\n\0]*%\}",
+        "is shown as it is written: lessons are not templates",
+        "put it into backticks if readers are to see it",
+    ),
+    "callout": (
+        r"^ {0,3}(?:(?:!!!|\?\?\?\+?)[ \t]+[\w-]+|:{3,}[ \t]*\{?[\w-]+\}?)|\A\[![\w-]+\]",
+        "begins no callout, and is shown as it is written",
+        "a callout is a quotation: `> [!note]`, and `> ` before each line of it",
+    ),
+    "latex": (
+        r"\\\([^\n]*?[\\^_=+][^\n]*?\\\)|^\\\[\s[\s\S]*?\\\]|\$\0+\$"
+        r"|\\(?:begin|ref|eqref|cite)\{[^{}\n\0]*\}",
+        "is no formula here, and is shown as text",
+        "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",
+    ),
+    "attributes": (
+        r"\{:?[ \t]*[.#][\w-]+[^{}\n\0]*\}|\{:[^{}\n\0]+\}|(?<=\0)\{[\w-]+=[^{}\n\0]+\}",
+        "is shown as it is written: only headings have attributes",
+        "write HTML where a text needs a class or a size",
+    ),
+    "reference": (
+        r"(?<![\w\]\0\\])\[[^\[\]\n\0]+\]\[[^\[\]\n\0]*\](?!\()",
+        "is no link: its address is written nowhere",
+        "write a line `[name]: address`, or the address itself: `[text](address)`",
+    ),
+    "footnote": (
+        r"\^\[[^\[\]\n\0]+\]",
+        "is no footnote, and is shown as it is written",
+        "a footnote is `[^name]`, with a paragraph `[^name]: …`",
+    ),
+    "citation": (
+        r"\[-?@[\w:./-]+[^\[\]\n\0]*\]",
+        "is shown as it is written: there is no list of sources",
+        "link to the source, or put it into a footnote: `[^name]`",
+    ),
+    "highlight": (
+        r"(?<![=\w])==[^\s=](?:[^=\n\0]*[^\s=])?==(?![=\w])",
+        "is shown as it is written",
+        "emphasis is `*text*` or `**text**`",
+    ),
+    "contents": (
+        r"^\[TOC\]$",
+        "is shown as it is written",
+        "take it away: each page lists its headings by itself",
+    ),
+    "tab": (
+        r"^ {0,3}===[!+]? \"[^\"\n\0]*\"",
+        "begins no tab, and is shown as it is written",
+        "tabs are a feature: `plugins/tabs` of coursebuild",
+    ),
+}
+"""Markup that nothing here reads: how it looks, what becomes of it, and what to write."""
+_ANY_FOREIGN = re.compile(
+    "|".join(f"(?P<{kind}>{pattern})" for kind, (pattern, _, _) in _FOREIGN.items()),
+    re.MULTILINE | re.IGNORECASE,
 )
 
 
@@ -65,40 +133,37 @@ def unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
 def _foreign(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Diagnostic]:
     """Markup that another tool would read."""
     whole = content.text
-    if not any(sign in whole for sign in ("{", "[[", "!!!", "???", ":::")):
+    if not _SIGNS.search(whole):
         return
     parts, end = list[str](), 0
     for at, text in texts:
         parts += [_blank(whole[end:at]), text]
         end = at + len(text)
-    for found in _FOREIGN.finditer("".join(parts)):
-        if found["binding"] and whole[: found.start()].endswith("`"):
+    parts.append(_blank(whole[end:]))
+    for found in _ANY_FOREIGN.finditer("".join(parts)):
+        start, kind = found.start(), found.lastgroup or ""
+        written = whole[start : found.end()].strip()
+        start = whole.index(written, start)
+        before = whole[:start]
+        if kind == "binding" and before.endswith("`"):
             continue  # it stands behind code: why it binds nothing is told already
-        kind = found.lastgroup
-        written = found[kind or 0].rstrip()
-        span = content.span(found.start(kind or 0), found.start(kind or 0) + len(written))
-        match kind:
-            case "binding":
-                number = found["number"] or ""
-                what = f"`{written}` marks no number, and is shown as it is written"
-                bound = f"`` `{number or '4.47'}`{written.removeprefix(number)} ``"
-                help = f"put the number into backticks: {bound}"
-                yield diagnose("binding-attribute", span, what, help=help)
-            case "wiki":
-                what = f"`{written}` is no link, and is shown as it is written"
-                help = "a link to a lesson is `[its title](lesson:1.2)`"
-                yield diagnose("markup-foreign", span, what, help=help)
-            case "template":
-                what = f"`{written}` is shown as it is written: lessons are not templates"
-                help = "put it into backticks if readers are to see it"
-                yield diagnose("markup-foreign", span, what, help=help)
-            case _:
-                what = f"`{written}` begins no callout, and is shown as it is written"
-                name = written.strip("!?+: \t{}").lower()
-                help = f"a callout is a quotation: `> [!{name}]`, and `> ` before each line of it"
-                yield diagnose("markup-foreign", span, what, help=help)
+        if written.startswith("$") and written[1] != "`":
+            continue  # what stands between the dollars is no code
+        if re.match(r"\{\w", written) and kind == "attributes" and not before.endswith(")"):
+            continue  # neither a link nor an image stands before it
+        _, what, help = _FOREIGN[kind]
+        if kind == "binding":
+            number = written.partition("{")[0]
+            help = help.replace("`4.47`{out}", f"`{number or '4.47'}`{written[len(number) :]}")
+        if kind == "callout":
+            help = help.replace("note", written.strip("![]?+: \t{}").lower())
+        rule = "binding-attribute" if kind == "binding" else "markup-foreign"
+        span = content.span(start, start + len(written))
+        yield diagnose(rule, span, f"`{short(written)}` {what}", help=help)
 
 
 def _blank(text: str) -> str:
-    """What stands for other than text: as long, with the line ends."""
+    """What stands for other than text: as long, with the line ends; an escaped bracket stays."""
+    if _ESCAPED.fullmatch(text):
+        return text
     return "\n".join("\0" * len(line) for line in text.split("\n"))

@@ -117,7 +117,7 @@ def test_each_thing_of_a_document_that_has_an_anchor_is_known_by_it() -> None:
         ("Lesson 4.3", "lesson 4.3 is mentioned, and the course map does not have it"
          " [known: `1.1`, `1.2`, `1.3`]"),
         ("[a](lesson:1.4)", "lesson 1.4 is linked to, and the course map does not have it"
-         " [known: `1.1`, `1.2`, `1.3`]"),
+         " [level 1 has `1.1`, `1.2`, `1.3`]"),
         ("[a](lesson:1.3#x)", "lesson 1.3 is planned, so it has no anchor `#x` yet"
          " [link to the lesson itself]"),
         ("[a](lesson:1.2#a_b.L3)", "lesson 1.2 has no anchor `#a_b.L3`"
