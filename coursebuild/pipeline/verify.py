@@ -22,7 +22,14 @@ from msgspec import Struct
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, Trials
 from coursebuild.core.model import Course, FeatureBlock, document_blocks
-from coursebuild.core.model.results import CompileResult, Results, ScriptRun, TrialLine, TrialResult
+from coursebuild.core.model.results import (
+    CompileResult,
+    Results,
+    ScriptRun,
+    TrialLine,
+    TrialResult,
+    Verdict,
+)
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.bindings import HeldLines, document_bindings
@@ -41,6 +48,10 @@ from coursebuild.report import ScriptLine
 if TYPE_CHECKING:
     from coursebuild.core.run.runner import RunAll
     from coursebuild.pipeline.shards import Shard
+
+
+_QUICK = 20.0
+"""Seconds that a script may take to be run again where its output has drifted."""
 
 
 class Verified(Struct, frozen=True):
@@ -90,7 +101,10 @@ def verify(
         runs = scripts()
     found += check_recorded_runs(chosen, options)
     verdicts = compare_all(course, runs)
-    found += script_findings(course, chosen, runs, verdicts, held, extracted.all)
+    again = _again(chosen, runs, verdicts, options, progress, run_all) if known is None else {}
+    broken = [f"models/{name}.xml" for name, model in models if model.error]
+    everything = extracted.all
+    found += script_findings(course, chosen, runs, verdicts, held, everything, again, broken)
     if memory.differing:
         from coursebuild.core.scripts.repeat import repeat_findings
 
@@ -100,6 +114,25 @@ def verify(
     scripts_ran = script_lines(chosen, runs, verdicts)
     labs = tuple(trial.line for trial in tried)
     return Verified(results, tuple(found), scripts_ran, labs)
+
+
+def _again(
+    chosen: Sequence[Extraction],
+    runs: Sequence[ScriptRun],
+    verdicts: Sequence[Verdict],
+    options: Options,
+    progress: Progress,
+    run_all: RunAll | None,
+) -> dict[str, ScriptRun]:
+    """Second runs, by path, of quick scripts whose output has drifted: does it vary by itself?"""
+    drifted = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
+    quick = {one.path for one in runs if one.seconds < _QUICK}
+    scripts = [e for e in chosen if e.path in drifted & quick and not e.script.once]
+    if not scripts:
+        return {}
+    memory = Memory(options.root, options.store, fresh=True)
+    again = run(scripts, options, progress, "running again what differs", memory, run_all)
+    return {one.path: one for one in again}
 
 
 def _chosen(

@@ -7,7 +7,7 @@ printed, each bound number that no output bears out; `held_lines`, by which thos
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
@@ -19,11 +19,13 @@ from coursebuild.core.scripts.bindings import (
     leaning_on,
 )
 from coursebuild.core.scripts.bound_numbers import Shown, shows
-from coursebuild.core.scripts.compare import is_silent
+from coursebuild.core.scripts.compare import compare, is_silent
 from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.extract import Extraction, extract, owners
 from coursebuild.core.scripts.failures import divergence, failure, silence
+from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.numbers import scan
+from coursebuild.core.scripts.repeat import unstable
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -38,18 +40,22 @@ def script_findings(
     verdicts: Sequence[Verdict],
     held: HeldLines | None = None,
     everything: Sequence[Extraction] | None = None,
+    again: Mapping[str, ScriptRun] | None = None,
+    broken: Collection[str] = (),
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that leans on them.
 
     `extractions` are those that were run, maybe not all of the course; `everything` is what
-    `extract` gives for it, where that is known. `held`: see `check_bindings`.
+    `extract` gives for it, where that is known. `held`: see `check_bindings`. `again`: second runs,
+    by path, of scripts whose output has drifted. `broken`: files of models that do not compile, of
+    which scripts that read them and fail say nothing new.
     """
     by_path = {run.path: run for run in runs}
     everything = extract(course).value if everything is None else everything
     found: list[Diagnostic] = []
     for extraction in extractions:
         run = by_path.get(extraction.path)
-        if run is not None:
+        if run is not None and not (run.trace and {*run.trace.files}.intersection(broken)):
             failed = failure(extraction, run, everything)
             found += [] if failed is None else [failed]
             found += divergence(extraction, run, everything)
@@ -60,12 +66,30 @@ def script_findings(
         run = by_path.get(recording.script or "")
         if run is not None and run.outcome is Outcome.OK and is_silent(run.stdout):
             found.append(silence(recording, run.path))
+        elif verdict.status == "drift" and (varies := _varies(course, verdict, run, again or {})):
+            found.append(varies)
         elif verdict.status == "drift":
             leaning = leaning_on(verdict, course.documents, printed)
             found.append(drift_diagnostic(verdict, owner_of[recording.span.path], leaning))
     for document in course.documents:
         found += check_bindings(document, printed, held)
     return tuple(found)
+
+
+def _varies(
+    course: Course, verdict: Verdict, first: ScriptRun | None, again: Mapping[str, ScriptRun]
+) -> Diagnostic | None:
+    """That an output differs from run to run, as far as that is known."""
+    recording, how = verdict.recording, verdict.comparison
+    second = again.get(recording.script or "")
+    if first is None or second is None or second.outcome is not Outcome.OK:
+        return None
+    changes = compare(recording, how, course.filters, second.stdout).changes
+    if [(c.span, c.ran) for c in changes] == [(c.span, c.ran) for c in verdict.changes]:
+        return None
+    filters = (*course.filters, *how.filters)
+    one, other = Side.of(first.stdout, filters), Side.of(second.stdout, filters)
+    return unstable(recording, one, other, how)
 
 
 def held_lines(course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]) -> HeldLines:

@@ -100,8 +100,7 @@ def unstable(recording: Recording, first: Side, second: Side, comparison: Compar
 
 _REPEATABLE = "make the script print the same each time (a fixed seed, no clock)"
 _HELP = (
-    f"{_REPEATABLE}, put `volatile` on the fence, elide what varies by `ellipsis` and `...`,"
-    " or filter it by `[[verify.filter]]` in content/course.toml"
+    f'{_REPEATABLE}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
 )
 _TABLE_HELP = f"{_REPEATABLE}, or record the output in a `text` fence with `volatile`"
 
