@@ -60,9 +60,9 @@ def bench(
     """
     if record:
         forbid_quick("--record", quick=quick)
-    run = SceneRun(options, measuring, quick=quick, cards=record)
     scenes = find_scenes(options.root, names)
-    found = run.all(scenes.scenes, scenes.diagnostics)
+    run = SceneRun(options, scenes.diagnostics, measuring, quick=quick, cards=record)
+    found = run.each(scenes.scenes, run.measure)
     if not record:
         return found
     records = ((BENCH.path(one.model), BENCH.encode(one)) for one in found.reports)
@@ -85,7 +85,7 @@ def check(
     """
     forbid_quick("--check", quick=quick)
     scenes = find_scenes(options.root, names)
-    run = SceneRun(options, measuring, again=True)
+    run = SceneRun(options, scenes.diagnostics, measuring, again=True)
     recorded: dict[str, SceneReport] = {}
     for scene in scenes.scenes:
         report = read_record(options.root, BENCH, scene.name)
@@ -95,7 +95,7 @@ def check(
             recorded[scene.name] = report
     run.remarks += () if names else _of_no_model(options, scenes)
     known = {scene.name: scene for scene in scenes.scenes if scene.name in recorded}
-    found = run.all(tuple(known.values()), scenes.diagnostics)
+    found = run.each(tuple(known.values()), run.measure)
     checked = [_checked(recorded[one.model], one, known[one.model]) for one in found.reports]
     return replace(found, checked=tuple(checked))
 
@@ -136,27 +136,23 @@ class SceneRun(MeasuringRun):
     def __init__(
         self,
         options: Options,
+        diagnostics: Sequence[Diagnostic],
         measuring: Any,
         *,
         quick: bool = False,
         again: bool = False,
         cards: bool = False,
     ) -> None:
-        super().__init__(options, again=again)  # again, times do not matter
+        super().__init__(options, diagnostics, again=again)  # again, times do not matter
         self.quick = quick
         self.cards = cards
         """Whether it is also told what the models are made of."""
         self._measuring = measuring
+        self.here = machine()
+        self.code = code_digest(*_CODE)
 
-    def all(
-        self, scenes: Sequence[CourseScene], diagnostics: Sequence[Diagnostic]
-    ) -> Measurement[SceneReport]:
-        """Every scene that can be measured; with what is wrong with the others."""
-        self.diagnostics += diagnostics
-        self.here, self.code = machine(), code_digest(*_CODE)
-        return self.each(scenes, self._one)
-
-    def _one(self, scene: CourseScene) -> SceneReport | None:
+    def measure(self, scene: CourseScene) -> SceneReport | None:
+        """What was measured on a scene; `None` where it cannot be."""
         parts = (scene.name, scene.digest, f"{self.quick}", self.code, *machine_parts(self.here))
         whole = (*parts, f"{self.cards}")
         return self.once(

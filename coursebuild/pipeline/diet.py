@@ -80,8 +80,7 @@ class _DietRun(MeasuringRun):
     def __init__(
         self, options: Options, diagnostics: Sequence[Diagnostic], *, quick: bool, fix: bool
     ) -> None:
-        super().__init__(options)
-        self.diagnostics += diagnostics
+        super().__init__(options, diagnostics)
         self.quick = quick
         self.fix = fix
         self.files = read_course(options.root).value

@@ -22,6 +22,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Declarations, MjcfModel
+from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source, Span
@@ -30,7 +31,6 @@ from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelText, ModelTextError, open_model, saved
 from coursebuild.numerics.pruning.readers import Reader, Readers, readers_of
-from coursebuild.numerics.reports.bench import Machine
 from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
 from coursebuild.numerics.scene import SceneError
 from coursebuild.pipeline.reports import CannotError

@@ -18,8 +18,8 @@ from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import resolve_inside, write_atomic
+from coursebuild.core.model.results import Machine
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
-from coursebuild.numerics.reports.bench import Machine
 from coursebuild.numerics.reports.records import RecordError, ReportFailure, ReportKind
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
@@ -49,11 +49,13 @@ class MeasuringRun:
     local = True
     """Whether what is found says something of this machine only."""
 
-    def __init__(self, options: Options, *, again: bool = False) -> None:
+    def __init__(
+        self, options: Options, diagnostics: Iterable[Diagnostic] = (), *, again: bool = False
+    ) -> None:
         self.options = options
         self.again = again
         """Whether nothing is taken from what is kept, nor kept."""
-        self.diagnostics: list[Diagnostic] = []
+        self.diagnostics = list(diagnostics)
         self.failures: list[ReportFailure] = []
         self.remarks: list[str] = []
         self.progress = Progress(quiet=options.quiet)

@@ -91,8 +91,10 @@ class _CaseRun(MeasuringRun):
         from coursebuild.numerics.cases import measure_case
         from coursebuild.numerics.problems import problem_named
 
-        measure = lambda: measure_case(problem_named(name))  # noqa: E731
-        return self.once(name, "stability", (name, *state), CaseReport, measure)
+        parts = (name, *state)
+        return self.once(
+            name, "stability", parts, CaseReport, lambda: measure_case(problem_named(name))
+        )
 
 
 def _known() -> tuple[str, ...]:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports.bench import (
-    Machine,
     MeasuredSetting,
     OrderRow,
     ScenarioReport,

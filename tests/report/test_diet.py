@@ -6,7 +6,7 @@ import json
 
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.bench import Machine
+from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports.diet import (
     EQUAL,
     IDENTICAL,

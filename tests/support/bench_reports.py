@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports.bench import (
-    Machine,
     MeasuredSetting,
     OrderRow,
     RowVerdict,

@@ -322,3 +322,16 @@ class Results(Struct, frozen=True):
     engine: str
     """Version of MuJoCo that ran the scripts."""
     trials: tuple[TrialResult, ...] = ()
+
+
+class Machine(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where something was measured; times mean nothing without it."""
+
+    engine: str
+    """Version of MuJoCo."""
+    python: str
+    numpy: str
+    system: str
+    """Operating system and kind of processor, such as `Linux x86_64`."""
+    cpu: str
+    """What the processor calls itself; empty where it does not say."""

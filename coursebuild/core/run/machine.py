@@ -9,8 +9,8 @@ import platform
 import subprocess
 from pathlib import Path
 
+from coursebuild.core.model.results import Machine
 from coursebuild.core.run.versions import engine_version, package_version, python_version
-from coursebuild.numerics.reports.bench import Machine
 
 _INFO = Path("/proc/cpuinfo")
 _NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")

@@ -13,8 +13,9 @@ from collections.abc import Iterator
 from markupsafe import Markup, escape
 from msgspec import Struct
 
+from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.strings import Strings
-from coursebuild.numerics.reports.bench import Machine, ScenarioReport
+from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.cases import ReferenceLine
 
 _MINUS = "\u2212"

@@ -24,9 +24,10 @@ from coursebuild.features.bench.scenarios import plots, scenario_view
 
 if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter
+    from coursebuild.core.model.results import Machine
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.library import Library
-    from coursebuild.numerics.reports.bench import Machine, ScenarioReport
+    from coursebuild.numerics.reports.bench import ScenarioReport
 
 
 class ShownBench(Struct, frozen=True):

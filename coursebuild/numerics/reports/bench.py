@@ -5,20 +5,8 @@ Entry point: `SceneReport`.
 
 from __future__ import annotations
 
+from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Record
-
-
-class Machine(Record, frozen=True):
-    """Where it was measured; times mean nothing without it."""
-
-    engine: str
-    """Version of MuJoCo."""
-    python: str
-    numpy: str
-    system: str
-    """Operating system and kind of processor, such as `Linux x86_64`."""
-    cpu: str
-    """What the processor calls itself; empty where it does not say."""
 
 
 class MeasuredSetting(Record, frozen=True):

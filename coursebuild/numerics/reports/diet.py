@@ -5,8 +5,8 @@ Entry point: `DietReport`.
 
 from __future__ import annotations
 
+from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Record
-from coursebuild.numerics.reports.bench import Machine
 
 IDENTICAL = "bit-identical"
 """Without it every bit is the same, and a reason says why that does not hang on the scenarios."""
