@@ -18,6 +18,7 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.checks.compiled import scenarios_of_no_model
 from coursebuild.core.files.course_features import load_course_features
 from coursebuild.core.files.read import read_course, read_sources
 from coursebuild.core.model import Course, Declarations, Document, Lesson, Level, Page, Status
@@ -160,11 +161,8 @@ class _Loader:
             model = source.path.removesuffix(".toml") + ".xml"
             if model.removeprefix("models/").removesuffix(".xml") not in models:
                 if model not in self.files.unreadable:
-                    message = f"there is no model {model} to which these scenarios belong"
-                    near = nearest(model, (m.source.path for m in self.files.models))
-                    help = f"is it `{near}`?" if near is not None else "put it beside its model"
-                    place = source.span(0, 0)
-                    self.found.append(diagnose("scenario-model", place, message, help=help))
+                    paths = [one.source.path for one in self.files.models]
+                    self.found.append(scenarios_of_no_model(source, paths))
             elif parsed.value is not None:
                 found.append(parsed.value)
         return tuple(found)

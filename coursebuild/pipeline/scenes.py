@@ -19,20 +19,18 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.checks.compiled import check_scenarios
+from coursebuild.core.checks.compiled import broken_model, check_scenarios, scenarios_of_no_model
 from coursebuild.core.files.read import CourseFiles, read_course
 from coursebuild.core.model import Declarations, MjcfModel, Visible
-from coursebuild.core.model.results import CompileResult, ModelFacts
+from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.run.mjcf import compile_models, model_files, readable_error
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    diagnose,
     did_you_mean,
     nearest,
     sort_diagnostics,
 )
-from coursebuild.core.text.source import Source, Span
 from coursebuild.pipeline.options import UsageError
 
 _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
@@ -82,7 +80,7 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Scenes:
     results = compile_models(root, chosen) if chosen else ()
     for model, result in zip(chosen, results, strict=True):
         if result.facts is None:
-            found.append(_broken(model, result))
+            found.append(broken_model(model, result, readable_error))
             continue
         says = declared.get(model.name)
         if says is not None:
@@ -179,30 +177,5 @@ def _declared(
             declared[name] = parsed.value
             found += parsed.diagnostics
         elif every and f"models/{name}.xml" not in {*paths, *files.unreadable}:
-            found.append(_without_model(source, paths))
+            found.append(scenarios_of_no_model(source, paths))
     return declared, found
-
-
-def _without_model(source: Source, models: set[str]) -> Diagnostic:
-    model = source.path.removesuffix(".toml") + ".xml"
-    near = nearest(model, models)
-    help = f"is it `{near}`?" if near is not None else "put it beside its model"
-    message = f"there is no model {model} to which these scenarios belong"
-    return diagnose("scenario-model", source.span(0, 0), message, help=help)
-
-
-def _broken(model: MjcfModel, result: CompileResult) -> Diagnostic:
-    message = f"the model `{model.name}` does not compile: {readable_error(result.error)}"
-    return diagnose("model-error", _line(model.source, result.line), message)
-
-
-def _line(source: Source, line: int | None) -> Span:
-    """The text of a line, without the space around it."""
-    if line is None or not 1 <= line <= len(source.line_starts):
-        return source.span(0, 0)
-    text = source.line_text(line)
-    start = source.line_starts[line - 1]
-    if not text.strip():
-        return source.span(start, start + len(text))
-    indent = len(text) - len(text.lstrip())
-    return source.span(start + indent, start + len(text.rstrip()))

@@ -15,8 +15,10 @@ from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
+    Cells,
     FigureLine,
     ReferenceLine,
+    merged,
 )
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
@@ -130,19 +132,19 @@ def _case(report: CaseReport, style: Style) -> str:
         lines.append(f"  {report.note}")
     if report.boundaries:
         rows = [(line.integrator, _boundary(line)) for line in report.boundaries]
-        lines += _table(_BOUNDARY, _merged(rows))
+        lines += _table(_BOUNDARY, rows)
         lines += [f"  {_islands(one, style)}" for one in report.boundaries if not one.monotone]
     for name in dict.fromkeys(line.name for line in report.figures):
         found = [line for line in report.figures if line.name == name]
         rows = [(line.integrator, _figure(line)) for line in found]
-        lines += _table((name, "exact", "difference"), _merged(rows))
-    fitted: list[tuple[str, tuple[str, ...]]] = [
+        lines += _table((name, "exact", "difference"), rows)
+    fitted: list[tuple[str, Cells]] = [
         (o.integrator, (_order(o.position), _order(o.attitude), _order(o.velocity)))
         for o in report.orders
         if (o.position, o.attitude, o.velocity) != (None, None, None)
     ]
     if fitted:
-        lines += _table(_ORDERS, _merged(fitted))
+        lines += _table(_ORDERS, fitted)
     softened = sorted({line.timestep for line in report.errors if line.refsafe})
     if softened:
         shown = ", ".join(f"{h:g}" for h in softened)
@@ -163,7 +165,7 @@ def _reference(line: ReferenceLine) -> list[str]:
     return said
 
 
-def _boundary(line: BoundaryLine) -> tuple[str, ...]:
+def _boundary(line: BoundaryLine) -> Cells:
     theory = _seconds(line.theory) if line.theory else ""
     if line.formula and not line.theory:
         theory = "all" if line.theory is None else "none"
@@ -185,7 +187,7 @@ def _largest(line: BoundaryLine) -> str:
     return _seconds(line.largest)
 
 
-def _figure(line: FigureLine) -> tuple[str, ...]:
+def _figure(line: FigureLine) -> Cells:
     unit = f" {line.unit}" if line.unit else ""
     measured = "not finite" if line.measured is None else f"{line.measured:.10g}{unit}"
     exact = "" if line.exact is None else f"{line.exact:.10g}{unit}"
@@ -203,15 +205,8 @@ def _seconds(value: float) -> str:
     return f"{value:.6g} s"
 
 
-def _merged(rows: Sequence[tuple[str, tuple[str, ...]]]) -> list[tuple[str, ...]]:
-    """Rows with the integrators behind, those of equal rows together."""
-    together: dict[tuple[str, ...], list[str]] = {}
-    for integrator, cells in rows:
-        together.setdefault(cells, []).append(integrator)
-    return [(*cells, ", ".join(names)) for cells, names in together.items()]
-
-
-def _table(titles: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Rows under their titles, in columns."""
-    columns = zip((*titles, ""), zip(*rows, strict=True), strict=True)
+def _table(titles: Cells, rows: Sequence[tuple[str, Cells]]) -> list[str]:
+    """What is said of integrators under its titles, in columns; their names stand behind."""
+    lines = [(*cells, names) for cells, names in merged(rows).items()]
+    columns = zip((*titles, ""), zip(*lines, strict=True), strict=True)
     return [f"  {line}" for line in table([Column(t, cells, left=True) for t, cells in columns])]

@@ -14,7 +14,7 @@ Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, mo
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
@@ -24,12 +24,13 @@ from coursebuild.core.model import (
     DeclaredScenario,
     FeatureBlock,
     Mjcf,
+    MjcfModel,
     document_blocks,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.registry import features, kind_of_block
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
+from coursebuild.core.text.source import Excerpt, Source, Span
 
 _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
@@ -88,9 +89,7 @@ def check_compiled(
     for model in course.models:
         result = models[model.name]
         if result.error and model.name not in parts:
-            span = _line(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
-            message = f"the model `{model.name}` does not compile: {readable(result.error)}"
-            found.append(diagnose("model-error", span, message))
+            found.append(broken_model(model, result, readable))
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
         found += _check_text(text, result, readable)
@@ -110,6 +109,24 @@ def check_compiled(
         if facts_of_model is not None:
             found += check_scenarios(declared, facts_of_model)
     return tuple(found)
+
+
+def broken_model(
+    model: MjcfModel, result: CompileResult, readable: Callable[[str], str]
+) -> Diagnostic:
+    """Why a model does not compile."""
+    span = _line(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
+    message = f"the model `{model.name}` does not compile: {readable(result.error)}"
+    return diagnose("model-error", span, message)
+
+
+def scenarios_of_no_model(source: Source, models: Collection[str]) -> Diagnostic:
+    """Of a file of scenarios beside which there is none of the models, given by their paths."""
+    model = source.path.removesuffix(".toml") + ".xml"
+    near = nearest(model, models)
+    help = f"is it `{near}`?" if near is not None else "put it beside its model"
+    message = f"there is no model {model} to which these scenarios belong"
+    return diagnose("scenario-model", source.span(0, 0), message, help=help)
 
 
 def _place(block: Mjcf | FeatureBlock) -> tuple[str, int]:

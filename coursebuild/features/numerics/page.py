@@ -25,7 +25,14 @@ from coursebuild.features.bench.figures import (
     sentence,
 )
 from coursebuild.features.bench.scenarios import ORDERS, largest, lost_runs
-from coursebuild.numerics.reports.cases import BoundaryLine, CaseReport, ErrorLine, FigureLine
+from coursebuild.numerics.reports.cases import (
+    BoundaryLine,
+    CaseReport,
+    Cells,
+    ErrorLine,
+    FigureLine,
+    merged,
+)
 from coursebuild.numerics.reports.points import FLOORS, integrator_rank, seconds_text, status_text
 from coursebuild.numerics.reports.records import STABILITY
 
@@ -43,8 +50,8 @@ _BOUNDARY = (
     "measured.remark",
 )
 _FIGURE = ("numerics.measured", "numerics.exact", "measured.difference")
-_Rows = list[tuple[tuple[str, ...], str]]
-"""Cells, and the integrator that they are of."""
+_Rows = list[tuple[str, Cells]]
+"""Integrators, and what is said of each."""
 
 
 class CaseView(Struct, frozen=True):
@@ -109,27 +116,19 @@ def _about(words: Strings, report: CaseReport) -> list[str]:
     return told if found is None else [*told, *about_reference(words, found.kind, found)]
 
 
-def _merged(rows: _Rows) -> tuple[list[str], list[tuple[str, ...]]]:
-    """The integrators, those of equal rows together, and the rows."""
-    together: dict[tuple[str, ...], list[str]] = {}
-    for cells, integrator in rows:
-        together.setdefault(cells, []).append(integrator)
-    return [", ".join(names) for names in together.values()], list(together)
-
-
 def _grid(
     words: Strings, label: str, titles: Sequence[str], rows: _Rows, *, left: str = ""
 ) -> Grid | None:
     if not rows:
         return None
-    names, cells = _merged(rows)
-    columns = [(words("measured.integrator"), names)]
-    columns += [(title, [row[n] for row in cells]) for n, title in enumerate(titles)]
+    found = merged(rows)
+    columns = [(words("measured.integrator"), list(found.values()))]
+    columns += [(title, [row[n] for row in found]) for n, title in enumerate(titles)]
     return grid(label, columns, words=(left,))
 
 
 def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
-    rows = [(_boundary(words, line), line.integrator) for line in report.boundaries]
+    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
     titles = [words(key) for key in _BOUNDARY]
     label = words("numerics.boundaries", title=report.title)
     return _grid(words, label, titles, rows, left=words("measured.remark"))
@@ -162,8 +161,8 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
     parts: list[FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):
         lines = [line for line in report.figures if line.name == name]
-        some, rows = _merged([(_figure(words, line), line.integrator) for line in lines])
-        names += some
+        rows = merged((line.integrator, _figure(words, line)) for line in lines)
+        names += rows.values()
         cells += rows
         unit, sources = lines[0].unit, dict.fromkeys(one.source for one in lines if one.source)
         title = sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
@@ -188,7 +187,7 @@ def _orders(words: Strings, report: CaseReport) -> Grid | None:
     rows: _Rows = []
     for one in shown:
         values = (one.position, one.attitude, one.velocity)
-        rows.append((tuple("" if v is None else f"{v:.3f}" for v in values), one.integrator))
+        rows.append((one.integrator, tuple("" if v is None else f"{v:.3f}" for v in values)))
     titles = [words(key) for _, key in ORDERS]
     return _grid(words, words("numerics.orders", title=report.title), titles, rows)
 

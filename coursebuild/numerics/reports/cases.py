@@ -1,9 +1,12 @@
 """What was measured on a hard case.
 
-Entry point: `CaseReport`.
+Entry point: `CaseReport`; `merged`, integrators of which the same is said.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeAlias
 
 from coursebuild.numerics.reports import Record
 from coursebuild.numerics.reports.bench import OrderRow
@@ -96,3 +99,14 @@ class CaseReport(Record, frozen=True):
     figures: tuple[FigureLine, ...]
     orders: tuple[OrderRow, ...]
     errors: tuple[ErrorLine, ...]
+
+
+Cells: TypeAlias = tuple[str, ...]
+
+
+def merged(rows: Iterable[tuple[str, Cells]]) -> dict[Cells, str]:
+    """What is said of integrators, and the names of those of which it is said."""
+    together: dict[Cells, list[str]] = {}
+    for integrator, cells in rows:
+        together.setdefault(cells, []).append(integrator)
+    return {cells: ", ".join(names) for cells, names in together.items()}
