@@ -18,7 +18,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.write import write_atomic
-from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.machine import machine
 from coursebuild.core.scripts.dependencies import (
     Dependency,
@@ -33,7 +33,6 @@ from coursebuild.core.scripts.dependencies import (
 from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.scripts.remembered import RunRecord
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.numerics.reports.bench import Machine
 from coursebuild.numerics.reports.records import FOLDER
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.remember import States
