@@ -28,6 +28,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
+# Checkers in Java run for seconds only, in which compiling more costs more than it saves.
+os.environ["JDK_JAVA_OPTIONS"] = "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC -Xss4m"
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
