@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, NewType, Protocol, TypeAlias, TypeVar
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -24,17 +24,18 @@ from msgspec import Struct
 from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline, MjcfModel, Target
 from coursebuild.core.model.results import (
     CompileResult,
+    FileList,
     ModelFacts,
     OutputFile,
     Results,
     ScriptRun,
+    SiteFile,
     TrialResult,
 )
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
 
 if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
-    from coursebuild.core.model.results import FileList, SiteFile
     from coursebuild.core.pages.added_files import ExportContext, SiteContext
     from coursebuild.core.pages.assets import Assets
     from coursebuild.core.pages.context import PageContext
@@ -46,6 +47,22 @@ if TYPE_CHECKING:  # the layers above, of which a feature's functions take value
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
     from coursebuild.pipeline.remember import Memory
+else:  # names alone, which `help` can show: nothing above is imported
+    for above in (
+        "Assets",
+        "ExportContext",
+        "Fence",
+        "Inputs",
+        "Library",
+        "Memory",
+        "PageContext",
+        "PageInputs",
+        "Place",
+        "SiteContext",
+        "TextParser",
+        "Tools",
+    ):
+        globals()[above] = NewType(above, object)
 
 B = TypeVar("B", bound=FeatureBlock)
 
