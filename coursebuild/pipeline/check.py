@@ -1,21 +1,23 @@
 """`coursebuild check`: verify the course, or some lessons of it; publish nothing.
 
-Entry point: `check(options, names)`.
+Entry points: `check(options, names)`; `read_and_verify`, which a build begins with as well.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.model import Course, Status
+from coursebuild.core.model import Course
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.scripts.extract import extract
-from coursebuild.core.text.diagnostics import Diagnostic, Severity, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
@@ -23,7 +25,7 @@ from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verified, verify
-from coursebuild.report import Report, ScriptLine
+from coursebuild.report import Report
 from coursebuild.report.values import plural
 
 if TYPE_CHECKING:
@@ -48,55 +50,87 @@ def check(
     """
     progress = Progress(quiet=options.quiet)
     with project_lock(options.root, progress.say):
-        return _check(options, names, progress, shard, timings, sensitivity, truth)
+        with Documents(options.store, options.jobs, progress.stage) as documents:
+            checked = read_and_verify(options, progress, documents, names, shard=shard)
+        course, verified = checked.course, checked.verified
+        if course is None or verified is None:
+            return checked.report()
+        if timings is not None:
+            from coursebuild.pipeline.shards import write_timings
+
+            write_timings(timings, _seconds(verified), _names(course))
+        told = unproven(course) if truth else ()
+        sensitive, found = None, [one for one in told if isinstance(one, Diagnostic)]
+        if sensitivity:
+            sensitive, warnings = _sensitivity(course, options, progress, verified, checked.chosen)
+            found += warnings
+        remarks = [one for one in told if isinstance(one, str)]
+        if shard is not None:
+            remarks.append(_part(shard, verified))
+        return replace(checked.report(found), remarks=tuple(remarks), sensitivity=sensitive)
 
 
-def _check(
+class CheckedCourse(Struct, frozen=True):
+    """A course, what running it found, and all that is wrong with it."""
+
+    began: float
+    """When the command began, by `time.monotonic`."""
+    diagnostics: tuple[Diagnostic, ...]
+    chosen: Selection
+    """What the command is about."""
+    course: Course | None = None
+    """Nothing where the map cannot be read; likewise the others."""
+    verified: Verified | None = None
+    reports: Reports = Reports()
+    """Those that pages may show."""
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether nothing is wrong but what warnings say."""
+        errors = (d for d in self.diagnostics if d.severity is Severity.ERROR)
+        return self.course is not None and not any(True for _ in errors)
+
+    def report(self, more: Iterable[Diagnostic] = ()) -> Report:
+        """The report; `more` is what else was found."""
+        found = (*self.diagnostics, *more)
+        course, verified, chosen = self.course, self.verified, self.chosen
+        if course is None or verified is None:
+            return judge(None, found, self.began)
+        report = judge(
+            course,
+            found,
+            self.began,
+            scripts=verified.scripts,
+            lessons=len(chosen.lessons),
+            documents=chosen.documents,
+            labs=verified.labs,
+        )
+        return replace(report, depends=depends_on(course, verified.results))
+
+
+def read_and_verify(
     options: Options,
-    names: tuple[str, ...],
     progress: Progress,
-    shard: Shard | None,
-    timings: str | None,
-    sensitivity: bool,
-    truth: bool,
-) -> Report:
+    documents: Documents,
+    names: tuple[str, ...] = (),
+    *,
+    static: bool = False,
+    shard: Shard | None = None,
+) -> CheckedCourse:
+    """What `check`, `build` and `export` do: read a course, check it, run it.
+
+    The caller holds the course's lock. `static`: with what pages are made of.
+    """
     began = time.monotonic()
-    with Documents(options.store, options.jobs, progress.stage) as documents:
-        loaded = load(options.root, documents)
+    loaded = load(options.root, documents)
     course = loaded.course
     if course is None:
-        return judge(None, loaded.diagnostics, began)
+        return CheckedCourse(began, loaded.diagnostics, Selection((), (), None))
     chosen = select(course, names, options.root)
-    verified = verify(course, options, progress, chosen.documents, shard=shard)
-    if timings is not None:
-        from coursebuild.pipeline.shards import write_timings
-
-        write_timings(timings, _seconds(verified), _names(course))
-    found = [*loaded.diagnostics, *verified.diagnostics]
-    found += no_lessons(course)
-    sensitive = None
-    if sensitivity:
-        sensitive, warnings = _sensitivity(course, options, progress, verified, chosen)
-        found += warnings
-    told = unproven(course) if truth else ()
-    found += [one for one in told if isinstance(one, Diagnostic)]
-    found += shown_reports(options.root, course).diagnostics
-    if shard is None or not any(True for _ in extract(course).value):
-        found += _no_scripts(course, chosen, verified.scripts, found)
-    remarks = [one for one in told if isinstance(one, str)]
-    if shard is not None:
-        remarks.append(_part(shard, verified))
-    report = judge(
-        course,
-        found,
-        began,
-        scripts=verified.scripts,
-        lessons=len(chosen.lessons),
-        documents=chosen.documents,
-        labs=verified.labs,
-        remarks=tuple(remarks),
-    )
-    return replace(report, depends=depends_on(course, verified.results), sensitivity=sensitive)
+    verified = verify(course, options, progress, chosen.documents, static=static, shard=shard)
+    reports = shown_reports(options.root, course)
+    found = (*loaded.diagnostics, *verified.diagnostics, *reports.diagnostics)
+    return CheckedCourse(began, found, chosen, course, verified, reports.value)
 
 
 def _sensitivity(
@@ -127,33 +161,3 @@ def _seconds(verified: Verified) -> dict[str, float]:
 
 def _names(course: Course) -> list[str]:
     return [*(e.path for e in extract(course).value), *feature_trials(course)]
-
-
-def no_lessons(course: Course) -> list[Diagnostic]:
-    """A course with nothing to publish is a mistake, not a success."""
-    if any(lesson.status is not Status.PLANNED for lesson in course.lessons):
-        return []
-    message = "no lesson of the course is written"
-    help = "write a file in content/lessons, and give its entry in the map a `status`"
-    return [diagnose("no-lessons", course.map.span(0, 0), message, help=help)]
-
-
-def _no_scripts(
-    course: Course, chosen: Selection, scripts: Sequence[ScriptLine], found: Sequence[Diagnostic]
-) -> list[Diagnostic]:
-    """That nothing was verified, where no other mistake says why."""
-    wrong = {d.span.path for d in found if d.severity is Severity.ERROR}
-    explained = wrong if chosen.documents is None else wrong & {*chosen.documents, course.map.path}
-    if explained or any(line.status not in ("skipped", "norun") for line in scripts):
-        return []
-    which = "none that can run here" if scripts else "none"
-    message = f"no script was run, so that nothing was verified: {_chosen(chosen)} {which}"
-    help = "a script is a block that begins with ```` ```python file=examples/….py ````"
-    return [diagnose("no-scripts", course.map.span(0, 0), message, help="" if scripts else help)]
-
-
-def _chosen(chosen: Selection) -> str:
-    if chosen.documents is None:
-        return "the course has"
-    ids = [*(lesson.id for lesson in chosen.lessons), *(page.id for page in chosen.pages)]
-    return f"{', '.join(ids)} {'have' if len(ids) > 1 else 'has'}"

@@ -51,17 +51,20 @@ def export(options: Options, name: str, out: Path | None) -> Report:
     check_target(options.root, place, exporter.mark, archive=exporter.archive)
     progress = Progress(quiet=options.quiet)
     make = functools.partial(_exported, exporter)
-    with project_lock(options.root, progress.say), prepare(options, progress, make) as prepared:
-        if not prepared.report.ok:
-            return replace(prepared.report, remarks=("nothing was written",))
-        if not prepared.files:
+    with (
+        project_lock(options.root, progress.say),
+        prepare(options, progress, make) as (report, made),
+    ):
+        if made is None:
+            return replace(report, remarks=("nothing was written",))
+        if not made.files:
             raise EffectError(f"the course has nothing that `export {name}` could write")
         with progress.stage("packing"):
             write = write_archive if exporter.archive else write_single
-            size = write(place, prepared.files)
-    count = len(prepared.files)
+            size = write(place, made.files)
+    count = len(made.files)
     said = f"wrote {f'{count} files to ' if exporter.archive else ''}{out}, {_size(size)}"
-    return replace(prepared.report, remarks=(said,), depends=None)
+    return replace(report, remarks=(said,), depends=None)
 
 
 def _size(count: int) -> str:

@@ -14,16 +14,17 @@ Documents may be summaries. Formulas are no part of this: see `pipeline.document
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, Trials
-from coursebuild.core.model import Course, FeatureBlock, document_blocks
+from coursebuild.core.model import Course, FeatureBlock, Status, document_blocks
 from coursebuild.core.model.results import (
     CompileResult,
+    Outcome,
     Results,
     ScriptRun,
     TrialLine,
@@ -36,7 +37,7 @@ from coursebuild.core.scripts.bindings import HeldLines, document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.findings import script_findings
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs
@@ -110,6 +111,7 @@ def verify(
 
         found += repeat_findings(course, chosen, memory.differing)
     found += check_runs(course, runs)
+    found += _nothing(course, () if shard is not None else runs)
     results = Results(runs, verdicts, (), models, python_version(), engine_version(), tried)
     scripts_ran = script_lines(chosen, runs, verdicts)
     labs = tuple(trial.line for trial in tried)
@@ -133,6 +135,20 @@ def _again(
     memory = Memory(options.root, options.store, fresh=True)
     again = run(scripts, options, progress, "running again what differs", memory, run_all)
     return {one.path: one for one in again}
+
+
+def _nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
+    """That there is nothing to publish, or that nothing of it was verified."""
+    place = course.map.span(0, 0)
+    if all(lesson.status is Status.PLANNED for lesson in course.lessons):
+        message = "no lesson of the course is written"
+        help = "write a file in content/lessons, and give its entry in the map a `status`"
+        yield diagnose("no-lessons", place, message, help=help)
+    skipped = [run for run in runs if run.outcome is Outcome.SKIPPED]
+    if skipped and all(run.outcome in (Outcome.SKIPPED, Outcome.NORUN) for run in runs):
+        missing = sorted({name for run in skipped for name in run.missing})
+        message = "no script can run here, so that nothing was verified"
+        yield diagnose("no-scripts", place, message, help=f"install {', '.join(missing)}")
 
 
 def _chosen(

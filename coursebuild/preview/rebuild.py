@@ -27,7 +27,6 @@ from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.run.runner import RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.pipeline.check import no_lessons
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
@@ -176,7 +175,7 @@ class BackgroundRebuild:
                 raise SupersededError from None
             raise
         self._options.store.fresh = False  # what was made anew once holds from now on
-        session.take_results(course, verified, no_lessons(course))
+        session.take_results(course, verified)
         self._run_again(scripts, verified.results.verdicts)
 
     def _run_all(self, scripts: Sequence[Extraction]) -> Callable[..., tuple[ScriptRun, ...]]:

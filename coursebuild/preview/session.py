@@ -262,15 +262,13 @@ class Session:
 
     # --- what background work found
 
-    def take_results(
-        self, course: Course, verified: Verified, others: Iterable[Diagnostic] = ()
-    ) -> None:
-        """Take what verifying a course found, and what else is wrong with it."""
+    def take_results(self, course: Course, verified: Verified) -> None:
+        """Take what verifying a course found."""
         results, trials = verified.results, self._trials
         if results.trials != self._results.trials:
             trials = publish_trials(results, self._assets)
         with self.changed:
-            self.found_by_running = (*verified.diagnostics, *others)
+            self.found_by_running = verified.diagnostics
             self._results, self._trials = results, trials
             self._ran = {extraction.path: extraction for extraction in extract(course).value}
             if self.course is not None:

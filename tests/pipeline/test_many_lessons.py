@@ -45,9 +45,9 @@ def peak(folder: Folder) -> int:
     gc.freeze()  # else what other tests left decides how long garbage lies about
     tracemalloc.start()
     try:
-        with prepare(folder.options(), Progress(quiet=True)) as prepared:
-            assert prepared.report.ok, prepared.report.diagnostics
-            for file in prepared.files:
+        with prepare(folder.options(), Progress(quiet=True)) as (report, site):
+            assert site is not None, report.diagnostics
+            for file in site.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
                     assert isinstance(file, CachedFile)
                     file.make()

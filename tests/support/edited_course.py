@@ -91,10 +91,10 @@ def options(folder: Folder) -> Options:
 
 def drawn(folder: Folder) -> set[str]:
     """The pages that a build draws anew, in words of their own."""
-    with prepare(options(folder), Progress(quiet=True)) as prepared:
-        assert prepared.report.ok, prepared.report.diagnostics
-        assert len(set(prepared.drawn)) == len(prepared.drawn)
-        return set(prepared.drawn)
+    with prepare(options(folder), Progress(quiet=True)) as (report, site):
+        assert site is not None, report.diagnostics
+        assert len(set(site.drawn)) == len(site.drawn)
+        return set(site.drawn)
 
 
 @pytest.fixture

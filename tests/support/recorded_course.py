@@ -71,9 +71,9 @@ class Course:
     def drawn(self) -> set[str]:
         """The pages that a build draws now."""
         options = Options(self.folder.root, jobs=1, quiet=True)
-        with prepare(options, Progress(quiet=True)) as prepared:
-            assert prepared.report.ok, prepared.report.diagnostics
-            for file in prepared.files:
+        with prepare(options, Progress(quiet=True)) as (report, site):
+            assert site is not None, report.diagnostics
+            for file in site.files:
                 if file.path.endswith(".html"):
                     file.make()
-            return set(prepared.drawn)
+            return set(site.drawn)

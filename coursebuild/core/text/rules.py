@@ -51,7 +51,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "An entry of `[[silence]]` names an unknown rule or an error, or gives no reason.",
     ),
     ("no-lessons", "error", "The course has no lesson to publish."),
-    ("no-scripts", "error", "A check ran no script, so that it verified nothing."),
+    ("no-scripts", "warning", "No script can run here, so that nothing is verified."),
     # fields of JSON and TOML
     ("json-syntax", "error", "The JSON in a fence is malformed."),
     ("field-unknown", "error", "A field that nothing reads."),
