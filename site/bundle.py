@@ -64,7 +64,6 @@ _AHEAD = (
     "site/prepare_templates.py",
     "coursebuild/core/pages/assets.py",
     "coursebuild/core/pages/compressed.py",
-    "coursebuild/core/pages/cutting.py",
     "coursebuild/core/pages/fonts.py",
     "coursebuild/core/pages/templates.py",
     "templates/icon.svg",

@@ -1,109 +1,157 @@
-"""Cuts the fonts that come with the tool cut already: see `coursebuild/core/engine/prepared.py`.
+"""Makes the fonts that come with the tool ready to be cut, and cuts those that most courses need.
 
     python site/prepare_fonts.py FOLDER [OLD]
 
 `site/bundle.py` calls it with the bundle that it makes, and the one that there was, from which the
-results are taken where nothing has changed.
+results are taken where nothing has changed. See `coursebuild/core/pages/fonts.py`.
+
+1. The weights that no style sheet asks for are cut away, and so are hints and most names.
+2. In a font for mathematics the larger radicals become as narrow as the smallest: Chromium gives
+   every root room for the widest of them, and leaves what is not needed as a gap behind the root.
+3. What fonts hold and measure is noted in their list, so that none is read for it.
 """
 
 import hashlib
+import io
 import json
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
+
+from fontTools import subset
+from fontTools.ttLib import TTFont
+from fontTools.varLib import instancer
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from msgspec.structs import replace
+from coursebuild.core.pages import fonts
 
-from coursebuild.core.pages import cutting, fonts
+PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
+FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, PER_MILLE.split()), strict=True))
+"""How often characters stand in English text, per thousand."""
 
-OFTEN = (
-    *range(0x20, 0x7F),
-    *range(0xA0, 0x100),
-    *range(0x2C6, 0x2DE),  # accents
-    *range(0x300, 0x339),
-    *range(0x391, 0x3F7),  # Greek
-    *range(0x2010, 0x2065),  # punctuation
-    *range(0x20D0, 0x20F0),
-    *range(0x2100, 0x2150),  # letters in use as symbols
-    *range(0x2190, 0x2300),  # arrows, operators, relations
-    *range(0x2308, 0x230C),
-    *range(0x23B4, 0x23B6),
-    *range(0x23DC, 0x23E2),  # braces above and below
-    *(0x25A1, 0x25B3, 0x25BD, 0x25CB, 0x25EF, 0x25FB),
-    *range(0x27C0, 0x2800),
-    *range(0x2A00, 0x2A10),
-    *range(0x2A7D, 0x2AB1),
-    *range(0x1D400, 0x1D800),  # letters in the styles of mathematics
-)
-"""Code points that formulas use at all often."""
+WEIGHTS = {fonts.TEXT: (400, 700), fonts.CODE: (400, 700)}
+"""The weights that the style sheet uses."""
+WIDEST = 1.07
+"""A radical's advance width in those of the smallest: what is more than 1 stays as a thin space."""
 
 
-def prepared(bundle: Path) -> dict[str, bytes]:
-    """The files, by name."""
-    files: dict[str, bytes] = {}
-    cuts: dict[str, str] = {}
-    smaller: dict[str, dict[str, str]] = {}
-    listed = fonts.read_faces((bundle / "fonts" / "fonts.json").read_bytes())
-    faces = [(face, (bundle / "fonts" / face.file).read_bytes()) for face in listed]
-    ready: dict[str, bytes] = {}
-    for face, data in faces:
-        often = set(map(chr, OFTEN)) if face.family == fonts.MATH else cutting.covered(data)
-        characters = "".join(sorted(often & cutting.covered(data)))
-        made = fonts.ready_font(fonts.FontJob(face, data, characters))
-        ready[face.file] = made
-        name = face.file.replace(".woff2", ".ttf")
-        files[name] = made
-        key = f"{fonts.VERSION}/{hashlib.sha256(data).hexdigest()}"
-        smaller[key] = {"file": name, "characters": characters}
-    for job in fonts.font_jobs(faces, "".join(fonts.BASE), ""):
-        files[job.face.file] = fonts.finest_font(replace(job, data=ready[job.face.file]))
-        cuts[job.key] = job.face.file
-    listing = {"made_from": made_from(bundle), "cuts": cuts, "smaller": smaller}
-    text = json.dumps(listing, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
-    return {**files, "fonts.json": text.encode()}
+def ready(data: bytes, weights: tuple[int, int] | None) -> TTFont:
+    """A font with these weights only, if it has several."""
+    options = subset.Options()
+    options.hinting = False
+    options.notdef_outline = True
+    options.layout_features = ["*"]
+    options.name_IDs = [0, 1, 2, 3, 4, 5, 6, 13, 14]
+    options.recalc_timestamp = False
+    font = TTFont(io.BytesIO(data), recalcTimestamp=False)
+    subsetter = subset.Subsetter(options)
+    subsetter.populate(unicodes=font.getBestCmap())
+    subsetter.subset(font)
+    if weights is not None and "fvar" in font:
+        instancer.instantiateVariableFont(font, {"wght": weights}, inplace=True)
+    narrow_radicals(font)
+    font.flavor = None
+    return font
+
+
+def narrow_radicals(font: TTFont) -> None:
+    """Press the larger radicals, and the pieces of the largest, together; done twice is done once.
+
+    MathML Core: the preferred inline size of a stretched operator is that of its widest variant.
+    """
+    smallest = font.getBestCmap().get(ord(fonts.RADICAL))
+    if smallest is None or "MATH" not in font or "glyf" not in font:
+        return
+    variants = font["MATH"].table.MathVariants
+    drawn = dict(
+        zip(variants.VertGlyphCoverage.glyphs, variants.VertGlyphConstruction, strict=True)
+    ).get(smallest)
+    if drawn is None:
+        return
+    names = {variant.VariantGlyph for variant in drawn.MathGlyphVariantRecord}
+    if drawn.GlyphAssembly is not None:
+        names |= {part.glyph for part in drawn.GlyphAssembly.PartRecords}
+    advances, glyphs = font["hmtx"], font["glyf"]
+    widest = round(WIDEST * advances[smallest][0])
+    for name in sorted(names):
+        advance, _ = advances[name]
+        glyph = glyphs[name]
+        if advance > widest and glyph.numberOfContours > 0:
+            glyph.coordinates.scale((widest / advance, 1))
+            glyph.coordinates.toInt()
+            glyph.recalcBounds(glyphs)
+            advances[name] = (widest, glyph.xMin)
+
+
+def measured(font: TTFont) -> tuple[float, float, float, float] | None:
+    """Mean advance width, weighted by `FREQUENCY`, ascent, descent and line gap of a font, in em.
+
+    Nothing for a font without the letters of `FREQUENCY`.
+    """
+    names, advances = font.getBestCmap(), font["hmtx"]
+    if not all(ord(c) in names for c in FREQUENCY):
+        return None
+    em, head = font["head"].unitsPerEm, font["hhea"]
+    total = sum(advances[names[ord(c)]][0] * weight for c, weight in FREQUENCY.items())
+    width = total / sum(FREQUENCY.values()) / em
+    return width, head.ascent / em, -head.descent / em, head.lineGap / em
+
+
+def prepare(folder: Path, cuts: Path) -> None:
+    """Put ready fonts in the place of those in a folder, and cut some into another."""
+    listing = folder / "fonts.json"
+    faces: list[dict[str, Any]] = json.loads(listing.read_bytes())
+    for face in faces:
+        source = folder / face["file"]
+        face["file"] = source.with_suffix(".ttf").name
+        data = source.read_bytes()
+        source.unlink()
+        with TTFont(io.BytesIO(data)) as whole:
+            face["measure"] = measured(whole)
+        weights = WEIGHTS.get(face["family"])
+        face["weight"] = weights or face["weight"]
+        with ready(data, weights) as font:
+            characters = "".join(sorted(map(chr, font.getBestCmap())))
+            face["characters"] = fonts.unicode_range(characters)
+            font.save(folder / face["file"])
+    listing.write_text(json.dumps(faces, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    named: dict[str, str] = {}
+    known = fonts.read_faces(listing.read_bytes())
+    given = [(face, (folder / face.file).read_bytes()) for face in known]
+    for job in fonts.font_jobs(given, "".join(fonts.BASE), ""):
+        named[job.key] = job.face.file.replace(".ttf", ".woff2")
+        (cuts / named[job.key]).write_bytes(fonts.subset_font(job))
+    text = json.dumps(named, indent=1, sort_keys=True)
+    (cuts / "fonts.json").write_text(f"{text}\n", encoding="utf-8")
 
 
 def made_from(bundle: Path) -> str:
     """A hash of the fonts and of what cuts them."""
     digest = hashlib.sha256()
-    for path in map(Path, (__file__, fonts.__file__, cutting.__file__)):
+    for path in (*map(Path, (__file__, fonts.__file__)), *sorted((bundle / "fonts").iterdir())):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())
-    for face in fonts.read_faces((bundle / "fonts" / "fonts.json").read_bytes()):
-        whole = replace(face, characters="", measure=None)  # which may not be noted yet
-        digest.update(f"{whole}\0".encode() + (bundle / "fonts" / face.file).read_bytes())
     return digest.hexdigest()
 
 
-def noted(bundle: Path) -> bytes:
-    """The list of the fonts, with what is otherwise found by reading them."""
-    path = bundle / "fonts" / "fonts.json"
-    faces = json.loads(path.read_bytes())
-    for face in faces:
-        data = (bundle / "fonts" / face["file"]).read_bytes()
-        face["characters"] = fonts.unicode_range("".join(sorted(cutting.covered(data))))
-        face["measure"] = cutting.measured(data)
-    return (json.dumps(faces, indent=2, ensure_ascii=False) + "\n").encode()
-
-
 def main(bundle: Path, old: Path | None) -> None:
-    """Write them into the bundle."""
-    target = bundle / "prepared"
-    if old is not None and is_from(old / "prepared" / "fonts.json", made_from(bundle)):
-        shutil.copytree(old / "prepared", target)
+    """Prepare the fonts of a bundle."""
+    target, stamp = bundle / "prepared", made_from(bundle)
+    target.mkdir()
+    if old is not None and has(old / "prepared" / "fonts.txt", stamp):
+        shutil.rmtree(bundle / "fonts")
+        shutil.copytree(old / "fonts", bundle / "fonts")
+        for path in (old / "prepared").glob("*.woff2"):
+            shutil.copy(path, target)
+        shutil.copy(old / "prepared" / "fonts.json", target)
     else:
-        target.mkdir()
-        for name, data in prepared(bundle).items():
-            (target / name).write_bytes(data)
-    (bundle / "fonts" / "fonts.json").write_bytes(noted(bundle))
+        prepare(bundle / "fonts", target)
+    (target / "fonts.txt").write_text(stamp, encoding="utf-8")
 
 
-def is_from(listing: Path, digest: str) -> bool:
-    """Whether there are files that were made from this."""
-    try:
-        return bool(json.loads(listing.read_bytes())["made_from"] == digest)
-    except (OSError, ValueError, KeyError):
-        return False
+def has(path: Path, text: str) -> bool:
+    """Whether a file has a text."""
+    return path.is_file() and path.read_text(encoding="utf-8") == text
 
 
 if __name__ == "__main__":

@@ -24,7 +24,6 @@ from coursebuild.core.engine.prepared import (
     prepared_copy,
     prepared_cut,
     prepared_folder,
-    prepared_source,
 )
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
@@ -245,13 +244,12 @@ class SiteMaker:
 
 
 def _cut_font(store: Memo, job: FontJob) -> bytes:
-    """A cut font: cut already, or cut now from the smallest font that has all that it needs."""
+    """A cut font: made ahead, or kept, or cut now."""
 
     def make() -> bytes:
-        from coursebuild.core.pages.fonts import VERSION, subset_font
+        from coursebuild.core.pages.fonts import subset_font
 
-        source = prepared_source(job.data, job.characters, VERSION)
-        return subset_font(job if source is None else replace(job, data=source))
+        return subset_font(job)
 
     return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make)
 

@@ -50,6 +50,7 @@ _TYPES = {
     ".webp": "image/webp",
     ".gif": "image/gif",
     ".ico": "image/x-icon",
+    ".ttf": "font/ttf",
     ".woff2": "font/woff2",
     ".wasm": "application/wasm",
     ".zip": "application/zip",

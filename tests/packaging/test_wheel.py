@@ -48,6 +48,7 @@ def test_wheel_holds_the_packages_and_nothing_beside_them(
     root: Path, names: list[str], full_name: str
 ) -> None:
     code = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in below(root / part)}
+    code |= {f"coursebuild/templates/{p}" for p in below(root / "templates")}
     assert {name for name in names if name.endswith((".py", "/py.typed"))} == {
         name for name in code if name.endswith((".py", "/py.typed"))
     }

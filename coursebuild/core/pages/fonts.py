@@ -1,14 +1,14 @@
 """Fonts cut down to the characters that a site uses, and fallbacks of the same measure.
 
 Entry points: `read_faces`, `font_jobs` (which files to make, from which characters), `subset_font`
-(one job, bytes to bytes), `ready_font` (what of that can be done before a course is known),
-`face_rules` (the `@font-face` rules).
+(one job, bytes to bytes), `face_rules` (the `@font-face` rules).
 
-1. A face is a file of the bundle with its family, style, range of weights and range of characters.
-2. A job keeps of a face what the pages use; a face of which they use nothing is left out. The
-   weights outside the range that the style sheet asks for are cut away, the optical size axis
-   stays. Of a font for mathematics the MATH table stays with all its variants and pieces of
-   brackets.
+1. A face is a font of the bundle with its family, style, range of weights and characters.
+   `site/prepare_fonts.py` has done what does not depend on a course: of a font only the weights are
+   there that the style sheet asks for, and it is not compressed.
+2. A job keeps of a face what the pages use; a face of which they use nothing is left out. HarfBuzz
+   chooses the glyphs, of a font for mathematics with all variants and pieces of brackets; fontTools
+   compresses them.
 3. While a font loads, text is set in a local one, scaled so that lines break and stand as they
    will: see `FALLBACKS`.
 
@@ -19,26 +19,20 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import json
+import io
 from collections.abc import Iterable
-from typing import Any
 
+import msgspec
 from msgspec import Struct
 
 TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
 """Families, as the bundle names them."""
 
-WEIGHTS = {TEXT: (400, 700), CODE: (400, 700)}
-"""The weights that the style sheet uses."""
-
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·½×éöü–—‘’“”…•−")
 """Characters that are always kept, so that few edits change a font."""
 
-VERSION = 5
+_VERSION = 6
 """Part of a job's key: to be raised when the way of cutting changes."""
-_QUALITY = 10
-"""Of compression: the finest, 11, would take half of the time of cutting for a hundredth of the
-bytes."""
 
 
 class Face(Struct, frozen=True):
@@ -51,10 +45,11 @@ class Face(Struct, frozen=True):
     weight: tuple[int, int]
     unicode_range: str | None
     """CSS syntax; `None`: the whole font."""
-    characters: str = ""
-    """Those that it has a glyph for, as a `unicode-range`; empty where nobody has looked."""
+    characters: str
+    """Those that it has a glyph for, as a `unicode-range`."""
     measure: tuple[float, float, float, float] | None = None
-    """See `measured`; nothing where nobody has looked."""
+    """Mean advance width of English text, ascent, descent and line gap, in em; nothing for a font
+    without the letters."""
 
 
 class FontJob(Struct, frozen=True):
@@ -69,24 +64,13 @@ class FontJob(Struct, frozen=True):
     def key(self) -> str:
         """A name for the result: the same key, the same bytes."""
         digest = hashlib.sha256(self.data)
-        digest.update(f"{VERSION}/{WEIGHTS.get(self.face.family)}/{self.characters}".encode())
+        digest.update(f"{_VERSION}/{self.characters}".encode())
         return digest.hexdigest()
 
 
 def read_faces(listing: bytes) -> tuple[Face, ...]:
     """The faces that `fonts.json` lists."""
-    return tuple(map(_face, json.loads(listing)))
-
-
-def _face(entry: dict[str, Any]) -> Face:
-    measure = entry.get("measure")
-    return Face(
-        **{
-            **entry,
-            "weight": tuple(entry["weight"]),
-            "measure": None if measure is None else tuple(measure),
-        }
-    )
+    return msgspec.json.decode(listing, type=tuple[Face, ...])
 
 
 def font_jobs(
@@ -98,7 +82,7 @@ def font_jobs(
     for face, data in faces:
         wanted = BASE | set(text) if face.family != MATH else _mathematical(mathematics)
         taken = given.setdefault((face.family, face.style), set())
-        kept = (wanted & _characters(face, data)) - taken
+        kept = (wanted & characters_in(face.characters)) - taken
         if face.unicode_range is not None:
             kept &= characters_in(face.unicode_range)
         if kept and (mathematics or face.family != MATH):
@@ -132,7 +116,7 @@ def unicode_range(characters: str) -> str:
 
 def _mathematical(characters: str) -> set[str]:
     """Characters of formulas with the italics that a browser makes of single letters."""
-    wanted = {*characters, *map(chr, range(0x20, 0x7F)), _RADICAL}
+    wanted = {*characters, *map(chr, range(0x20, 0x7F)), RADICAL}
     return wanted | {italic for c in wanted if (italic := italic_letter(c))}
 
 
@@ -152,7 +136,7 @@ def italic_letter(character: str) -> str:
     return _ITALIC_SYMBOLS.get(character, "")
 
 
-_RADICAL = "√"
+RADICAL = "√"
 """Drawn for roots without standing in their text."""
 
 _ITALIC_SYMBOLS = {
@@ -170,37 +154,27 @@ _ITALIC_SYMBOLS = {
 }
 
 
-def _characters(face: Face, data: bytes) -> frozenset[str]:
-    if face.characters:
-        return characters_in(face.characters)
-    from coursebuild.core.pages.cutting import covered
-
-    return covered(data)
-
-
-@functools.lru_cache(maxsize=64)
 def subset_font(job: FontJob) -> bytes:
-    """The font with the job's characters only, as WOFF2. The same job gives the same bytes.
+    """The font with the job's characters only, as WOFF2. The same job gives the same bytes."""
+    import uharfbuzz  # which a run without a new font does not need
+    from fontTools.ttLib import TTFont
 
-    The job's data may be what `ready_font` made: then it takes a tenth of the time.
-    """
-    return _cut(job, "woff2", _QUALITY)
-
-
-def finest_font(job: FontJob) -> bytes:
-    """The same a hundredth smaller, for twice the time: for fonts that are cut once for all."""
-    return _cut(job, "woff2", 11)
-
-
-def ready_font(job: FontJob) -> bytes:
-    """The font with the job's characters only, to cut smaller ones from; not compressed."""
-    return _cut(job, None, 0)
-
-
-def _cut(job: FontJob, flavor: str | None, quality: int) -> bytes:
-    from coursebuild.core.pages.cutting import cut  # which a run without a new font does not need
-
-    return cut(job.data, job.characters, WEIGHTS.get(job.face.family), flavor, quality)
+    wanted = uharfbuzz.SubsetInput()
+    wanted.flags = uharfbuzz.SubsetFlags.NO_HINTING | uharfbuzz.SubsetFlags.NOTDEF_OUTLINE
+    wanted.unicode_set.update(map(ord, job.characters))
+    for everything in (
+        wanted.layout_feature_tag_set,
+        wanted.name_id_set,
+        wanted.name_lang_id_set,
+    ):
+        everything.clear()
+        everything.invert()
+    part = wanted.subset(uharfbuzz.Face(job.data)).blob.data
+    out = io.BytesIO()
+    with TTFont(io.BytesIO(part), recalcTimestamp=False) as font:
+        font.flavor = "woff2"
+        font.save(out)
+    return out.getvalue()
 
 
 # --------------------------------------------------------------------------------- fallbacks
@@ -214,7 +188,7 @@ class Fallback(Struct, frozen=True):
     style: str
     locals: tuple[str, ...]
     width: float
-    """Their mean advance width in em, weighted by `cutting.FREQUENCY`."""
+    """Their mean advance width of English text in em."""
 
 
 FALLBACKS = (
@@ -237,22 +211,17 @@ def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
     files = tuple(files)
     for job, url in files:
         face = job.face
-        low, high = WEIGHTS.get(face.family, face.weight)
+        low, high = face.weight
         weight = f"{low} {high}" if low != high else str(low)
         whole = face.unicode_range is None
+        form = "woff2" if url.endswith(".woff2") else "truetype"
         rules.append(
             f'@font-face{{font-family:"{face.family}";font-style:{face.style};font-weight:{weight};font-display:swap;'
-            f'src:url("{url}") format("woff2")'
+            f'src:url("{url}") format("{form}")'
             + ("}" if whole else f";unicode-range:{unicode_range(job.characters)}}}")
         )
     rules += [rule for fallback in FALLBACKS for rule in _fallback_rules(fallback, files)]
     return "\n".join(rules) + "\n"
-
-
-def _measured(job: FontJob) -> tuple[float, float, float, float] | None:
-    from coursebuild.core.pages.cutting import measured
-
-    return measured(job.data)
 
 
 def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) -> tuple[str, ...]:
@@ -260,8 +229,8 @@ def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) ->
     wanted = (fallback.family, fallback.style, "latin")
     for job, _ in files:
         if (job.face.family, job.face.style, job.face.subset) == wanted:
-            measure = job.face.measure or _measured(job)
-            assert measure is not None
+            measure = job.face.measure
+            assert measure is not None, "a font with the Latin letters was measured"
             scale = measure[0] / fallback.width
             ascent, descent, gap = (x / scale for x in measure[1:])
             local = ",".join(f'local("{name}")' for name in fallback.locals)

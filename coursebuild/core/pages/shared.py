@@ -99,8 +99,12 @@ def shared_files(
     def own_script(feature: Feature, part: PagePart) -> str:
         return publish(f"{feature.name}.js", page_script(part.code.encode()))
 
-    jobs = needed_fonts(assets, facts)
-    fonts_made = [(job, publish(f"fonts/{job.face.file}", subset(job))) for job in jobs]
+    def font(job: fonts.FontJob) -> str:
+        data = subset(job)
+        stem, _, ending = job.face.file.rpartition(".")
+        return publish(f"fonts/{stem}.{'woff2' if data.startswith(b'wOF2') else ending}", data)
+
+    fonts_made = [(job, font(job)) for job in needed_fonts(assets, facts)]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
     own = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
     scripts = [

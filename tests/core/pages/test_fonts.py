@@ -6,19 +6,15 @@ import io
 
 import pytest
 from fontTools.ttLib import TTFont
-from msgspec.structs import replace
 
-from coursebuild.core.engine.prepared import prepared_source
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.fonts import (
     CODE,
     MATH,
     TEXT,
-    VERSION,
     FontJob,
     characters_in,
     face_rules,
-    finest_font,
     font_jobs,
     italic_letter,
     read_faces,
@@ -30,14 +26,9 @@ FORMULAS = "I=∫Vρ(‖𝐫‖2𝟙−⊤)dω∑√{}[]⟨⟩≥·˙ˆ𝝎mkc�
 
 
 def jobs(assets: Assets, text: str, mathematics: str = FORMULAS) -> tuple[FontJob, ...]:
-    """As a build has them: what is cut is the smaller font made ahead, where that is enough."""
     faces = read_faces(assets.file("fonts/fonts.json"))
     data = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
-    return tuple(map(prepared, font_jobs(data, text, mathematics)))
-
-
-def prepared(job: FontJob) -> FontJob:
-    return replace(job, data=prepared_source(job.data, job.characters, VERSION) or job.data)
+    return font_jobs(data, text, mathematics)
 
 
 def only(found: tuple[FontJob, ...], family: str, style: str = "normal") -> list[FontJob]:
@@ -130,7 +121,7 @@ def test_the_same_job_gives_the_same_bytes_and_key(assets: Assets) -> None:
     assert [job.key for job in one] == [job.key for job in two]
     small, again = (only(jobs(assets, "привет"), CODE)[1] for _ in range(2))
     assert small.face.subset == "cyrillic"
-    assert finest_font(small) == finest_font(again), "`subset_font` would have kept the first"
+    assert subset_font(small) == subset_font(again)
     assert {job.key for job in one}.isdisjoint(
         job.key for job in jobs(assets, "text é ñ", FORMULAS + "ℵ") if job.face.subset == "latin"
     )
@@ -147,6 +138,21 @@ def test_characters_of_a_unicode_range(css: str, text: str) -> None:
 
 def test_unicode_range_joins_characters_that_follow_each_other() -> None:
     assert unicode_range("abce") == "U+61-63, U+65"
+
+
+def test_every_name_that_a_font_refers_to_is_there(assets: Assets) -> None:
+    for job in jobs(assets, "λ", "x"):
+        font = font_of(job)
+        axes = font["fvar"].axes if "fvar" in font else []
+        wanted = {1, 2, 4, 6, *(axis.axisNameID for axis in axes)}
+        assert wanted <= {name.nameID for name in font["name"].names}
+
+
+def test_the_list_of_fonts_says_what_they_hold(assets: Assets) -> None:
+    for face in read_faces(assets.file("fonts/fonts.json")):
+        font = TTFont(io.BytesIO(assets.file(f"fonts/{face.file}")), lazy=True)
+        assert characters_in(face.characters) == set(map(chr, font.getBestCmap()))
+        assert (face.measure is not None) == (face.subset == "latin")
 
 
 def test_rules_have_fallbacks_of_the_same_measure(assets: Assets) -> None:
