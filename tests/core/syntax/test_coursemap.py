@@ -146,15 +146,6 @@ def test_callouts_are_the_built_in_ones_and_the_courses_own() -> None:
     assert kinds["note"] == built_in["note"]
 
 
-def test_every_course_has_the_kinds_of_the_contract() -> None:
-    assert {kind.name for kind in CALLOUTS} == {
-        *("established", "derivation", "implementation", "recommendation", "research"),
-        *("unverified", "version", "warning", "try", "solution", "note", "tip"),
-        *("important", "caution"),
-    }
-    assert all(kind.label and kind.promise for kind in CALLOUTS)
-
-
 def test_the_least_that_a_map_needs() -> None:
     course = parse('[course]\ntitle = "T"\n').value
     assert course is not None
