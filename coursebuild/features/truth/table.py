@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from coursebuild.core.pages.library import Library
     from coursebuild.core.pages.urls import Place
 
-_COLUMNS = ("part", "numbers", *KINDS, "open", "share")
+_COLUMNS = ("part", "share", "numbers", *KINDS, "open")
 _RIGHT: Literal["right"] = "right"
 
 
@@ -64,7 +64,7 @@ def values(library: Library, place: Place, block: TruthTable) -> TruthRows:
 def _figures(claims: Claims) -> tuple[str, ...]:
     counts = (claims.all, claims.bound, claims.computed, claims.given, len(claims.open))
     share = f"{claims.share} %" if claims.all else "–"
-    return (*map(str, counts), share)
+    return (share, *map(str, counts))
 
 
 def _table(page: PageContext, block: TruthTable) -> Table:
