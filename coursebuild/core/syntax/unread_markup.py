@@ -23,9 +23,7 @@ _MATH_HELP = (
 )
 
 _ESCAPED = re.compile(r"(?:\\[()\[\]]|\s)+")
-_SIGNS = re.compile(
-    r"\{|\[\[|\]\[|\[[!@]|\^\[|^\[TOC|!!!|\?\?\?|:::|===? ?\S|\\[([]|\\\w+\{|\$`", re.I | re.M
-)
+_SIGNS = re.compile(r"[{\[\\$]|==|!!!|\?\?\?|:::")
 """What markup of other tools cannot do without."""
 _NUMBER = r"(?<![\w.])[-+\u2212]?\d[\w.,]*"
 _FOREIGN: dict[str, tuple[str, str, str]] = {
@@ -133,7 +131,8 @@ def unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
 def _foreign(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Diagnostic]:
     """Markup that another tool would read."""
     whole = content.text
-    if not _SIGNS.search(whole):
+    escaped = "\\(" in whole or "\\[" in whole
+    if not escaped and not any(_SIGNS.search(text) for _, text in texts):
         return
     parts, end = list[str](), 0
     for at, text in texts:
