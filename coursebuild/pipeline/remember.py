@@ -216,7 +216,8 @@ class Memory:
             why,
             run.stdout,
             run.stderr,
-            *(_watched(run.trace) if run.trace is not None else ()),
+            *(_watched(run.trace) if run.trace is not None else ((), False, ())),
+            run.figures,
         )
         key = ""
         if not why:

@@ -34,6 +34,7 @@ from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.findings import held_lines, script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity, diagnose
 from coursebuild.core.text.source import Source
+from coursebuild.pipeline.figures import figures_of, write_figures
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
@@ -80,9 +81,11 @@ def _update(
     for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
         edits = {source: changes for source, changes in edits.items() if source.path != path}
     remarks, unwritten = _write(options, edits, dry_run=dry_run)
+    drawn, unsaved = write_figures(course, chosen.documents, first, options, dry_run=dry_run)
+    remarks, unwritten = (*remarks, *drawn), [*unwritten, *unsaved]
     if options.long and not dry_run:
         keep_runs(scripts, first, options)
-    now = loaded if dry_run or not edits else load(options.root)
+    now = loaded if dry_run or not remarks else load(options.root)
     found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
     found += check_recorded_runs(scripts, options)
     found += _afterwards(course, now.course or course, scripts, first, again)
@@ -172,8 +175,9 @@ def _is_touched(
 def _with_recordings(
     course: Course, chosen: Selection, runnable: Sequence[Extraction]
 ) -> tuple[Extraction, ...]:
-    """The scripts that have an output to bring up to date."""
+    """The scripts that have an output or a figure to bring up to date."""
     wanted = {recording.script for recording in recorded_outputs(course, chosen.documents)}
+    wanted |= {figure.script for figure in figures_of(course, chosen.documents)}
     return tuple(e for e in runnable if e.path in wanted)
 
 

@@ -36,8 +36,10 @@ from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.bindings import HeldLines, document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs
@@ -112,6 +114,7 @@ def verify(
         found += repeat_findings(course, chosen, memory.differing)
     found += check_runs(course, runs)
     found += _nothing(course, () if shard is not None else runs)
+    found += figure_findings(course, runs, functools.partial(read_recorded, options.root))
     results = Results(runs, verdicts, (), models, python_version(), engine_version(), tried)
     scripts_ran = script_lines(chosen, runs, verdicts)
     labs = tuple(trial.line for trial in tried)

@@ -52,6 +52,7 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.equations import equation_ids
+from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
@@ -159,6 +160,7 @@ def document_links(course: Course, document: Document, known: LinkTargets) -> It
 
     `known` is what the course offers.
     """
+    drawn = {figure.span for figure in recorded_figures(document)}
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
             yield from _check_html(block, document, known)
@@ -166,7 +168,7 @@ def document_links(course: Course, document: Document, known: LinkTargets) -> It
             if isinstance(inline, Link):
                 target = resolve(inline.target, course, document.source.path)
                 yield from _check_link(inline, target, document, known)
-            elif isinstance(inline, Image):
+            elif isinstance(inline, Image) and inline.url_span not in drawn:
                 yield from _check_media("the image ", inline.url, inline.url_span, document, known)
             elif isinstance(inline, RawInline):
                 yield from _check_html(inline, document, known)

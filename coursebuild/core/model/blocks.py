@@ -34,6 +34,8 @@ class Paragraph(Struct, frozen=True):
     span: Span
     children: tuple[Inline, ...]
     tight: bool = False
+    figure: bool = False
+    """Whether it begins with `Figure:` and shows an image, whose caption the rest of it is."""
 
 
 class ListItem(Struct, frozen=True):
@@ -132,6 +134,13 @@ class Table(Struct, frozen=True):
     rows: tuple[tuple[Cell, ...], ...]
 
 
+class FigureName(Struct, frozen=True):
+    """A file that a script draws, as it saves it: `flip.svg`."""
+
+    name: str
+    span: Span
+
+
 class Script(Struct, frozen=True):
     """A complete script: ```` ```python file=examples/x.py ````."""
 
@@ -159,6 +168,8 @@ class Script(Struct, frozen=True):
     """Folders of the project that it may write into."""
     once: bool = False
     """Whether the course keeps what it printed, and it runs only when that is asked for."""
+    figures: tuple[FigureName, ...] = ()
+    """What it draws."""
 
 
 class Mode(enum.Enum):

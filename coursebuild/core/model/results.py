@@ -53,6 +53,8 @@ class ScriptJob(Struct, frozen=True):
     """Variables that the course sets."""
     writes: tuple[str, ...] = ()
     """Folders of the project that it may write into."""
+    figures: tuple[str, ...] = ()
+    """Names of the files that it draws."""
 
 
 class Sign(enum.Enum):
@@ -135,6 +137,8 @@ class ScriptRun(Struct, frozen=True):
     """What it looked at; `None` where nobody watched."""
     recorded: str = ""
     """When and where it was made, of a run that the course keeps."""
+    figures: tuple[tuple[str, bytes], ...] = ()
+    """The files that it was to draw and did, by name."""
 
 
 class DriftKind(enum.Enum):

@@ -64,6 +64,8 @@ def without_prose(document: Document) -> Document:
 def _kept_of(block: Block) -> Iterator[Block]:
     """What stays of a block, without the blocks in it, which come by themselves."""
     match block:
+        case Paragraph() if block.figure:
+            yield replace(block, children=_inlines(block))
         case Paragraph() | HtmlFlow() | Table():
             yield from _text(block.span, _inlines(block))
         case Heading():

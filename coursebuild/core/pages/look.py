@@ -14,6 +14,7 @@ from msgspec import Struct, field
 from coursebuild.core.model import (
     Callout,
     FeatureBlock,
+    Image,
     Mjcf,
     NumberBinding,
     PlainCode,
@@ -39,6 +40,10 @@ class Context(Protocol):
 
     def url(self, url: str) -> str:
         """The address of an image that is written as `url`."""
+        ...
+
+    def drawn_by(self, image: Image) -> Markup:
+        """What says which script has drawn an image; empty where none has."""
         ...
 
     def math(self, tex: str) -> Markup:

@@ -172,6 +172,8 @@ class _Writer:
     def block(self, block: Block) -> str:
         """One block, with its line end unless it is a paragraph of a tight list."""
         match block:
+            case Paragraph() if block.figure:
+                return self._figure(block)
             case Paragraph():
                 inner = self.inlines(block.children)
                 return inner if block.tight else f"<p>{inner}</p>\n"
@@ -199,6 +201,17 @@ class _Writer:
                 return self.context.block(block)
             case _:
                 assert_never(block)
+
+    def _figure(self, paragraph: Paragraph) -> str:
+        """An image with the rest of its paragraph as its caption."""
+        image = next(one for one in paragraph.children if isinstance(one, Image))
+        words = self.inlines(one for one in paragraph.children if one is not image)
+        caption = words.removeprefix("Figure:").strip()
+        drawn = self.context.drawn_by(image)
+        lines = "\n".join(part for part in (caption, str(drawn)) if part)
+        said = f"<figcaption>{lines}</figcaption>\n" if lines else ""
+        kind = " figure-lines" if image.url.endswith(".svg") and drawn else ""
+        return f'<figure class="figure{kind}">\n{self._image(image)}\n{said}</figure>\n'
 
     def _heading(self, heading: Heading) -> str:
         inner, name = self.inlines(heading.children), f"h{heading.level}"

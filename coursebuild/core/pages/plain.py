@@ -16,6 +16,7 @@ from coursebuild.core.model import (
     Document,
     ExampleTarget,
     FeatureBlock,
+    Image,
     LessonTarget,
     LevelTarget,
     Mjcf,
@@ -79,6 +80,10 @@ class PlainContext:
     def url(self, url: str) -> str:
         """The address as written."""
         return url
+
+    def drawn_by(self, image: Image) -> Markup:
+        """Nothing."""
+        return Markup()
 
     def math(self, tex: str) -> Markup:
         """The TeX between its delimiters."""

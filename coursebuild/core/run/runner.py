@@ -269,7 +269,7 @@ class _Work:
         if worker.job is not None and (report := worker.take_report()) is not None:
             index, worker.job = worker.job, None
             worker.rested = False
-            self._finish(index, _script_run(self.jobs[index].path, *report))
+            self._finish(index, _script_run(self.jobs[index], *report))
             self.next(worker)
         return True
 
@@ -293,6 +293,7 @@ class _Work:
             "library": self.library,
             "folders": [f"{self.root}/{folder}" for folder in job.packages],
             "writes": [f"{self.root}/{folder}" for folder in job.writes],
+            "figures": list(job.figures),
             "perturbation": job.perturbation,
         }
         return json.dumps(request).encode()
@@ -318,7 +319,12 @@ def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
 
 
 def _script_run(
-    path: str, report: supervisor.ChildReport, out: bytes, err: bytes, trace: bytes
+    job: ScriptJob,
+    report: supervisor.ChildReport,
+    out: bytes,
+    err: bytes,
+    trace: bytes,
+    drawn: bytes,
 ) -> ScriptRun:
     stdout, is_text = _decode(out)
     outcome, status = _outcome(report)
@@ -326,8 +332,13 @@ def _script_run(
         outcome = Outcome.ENCODING
     if len(err) == STDERR_KEPT:
         err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]  # a letter cut in two
+    figures, at = [], 0
+    for name, size in zip(job.figures, report["figures"], strict=False):
+        if size >= 0:
+            figures.append((name, drawn[at : at + size]))
+            at += size
     return ScriptRun(
-        path,
+        job.path,
         outcome,
         status,
         stdout,
@@ -335,6 +346,7 @@ def _script_run(
         report["seconds"],
         missing=tuple(report["missing"]),
         trace=_trace(json.loads(trace)) if trace else None,
+        figures=tuple(figures),
     )
 
 

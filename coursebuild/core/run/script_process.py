@@ -14,6 +14,7 @@ import builtins
 import contextlib
 import ctypes
 import importlib
+import io
 import os
 import sys
 import traceback
@@ -52,6 +53,8 @@ class Job(TypedDict):
     """Folders of the project to import from before."""
     writes: list[str]
     """Folders of the project that the script may write into."""
+    figures: list[str]
+    """Names of files that it draws, in its working directory."""
     perturbation: int
     """The direction in which initial states are moved (`initial_state_perturbation`); 0: none."""
 
@@ -201,6 +204,8 @@ class ScriptProcess:
         atexit.register(mujoco_watching.finish)
         with open(self.path, "rb") as file:  # noqa: PTH123 (time counts)
             text = file.read()
+        if job["figures"]:
+            keep_figures(job, self._environment["TMPDIR"])
         tracer.install()
         tracer.begin(standard)
         return compile(text, self.path, "exec", dont_inherit=True)
@@ -220,6 +225,31 @@ class ScriptProcess:
         root, temporary = self.job["root"], self._environment["TMPDIR"]
         writable = self.job["writes"]
         return Tracer(root, temporary, installed, self._notes, self._sink, writable)
+
+
+def figure_path(temporary: str, name: str) -> str:
+    """Where a figure is drawn, given the script's temporary folder."""
+    return f"{temporary}/figures-of-this-script/{name}"
+
+
+def keep_figures(job: Job, temporary: str) -> None:
+    """From now on, what is written to a figure goes to the script's temporary folder.
+
+    So the project stays as it is, and two runs at once have each its own.
+    """
+    root = job["root"].rstrip("/")
+    drawn = {f"{root}/{name}": figure_path(temporary, name) for name in job["figures"]}
+    os.mkdir(os.path.dirname(next(iter(drawn.values()))))  # noqa: PTH102, PTH120 (time counts)
+    real_open = builtins.open
+
+    def open_figure(file: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
+        if isinstance(file, str | os.PathLike):
+            path = drawn.get(os.path.abspath(file))  # noqa: PTH100
+            if path is not None and ("r" not in mode or os.path.exists(path)):  # noqa: PTH110
+                file = path
+        return real_open(file, mode, *args, **kwargs)
+
+    builtins.open = io.open = open_figure
 
 
 def report_error(error: BaseException) -> None:

@@ -15,7 +15,7 @@ one thread, so that it may fork.
 
 The protocol: from the tool JSON objects (`Job`), each after its length in 4 bytes; to it for each
 one JSON object (`ChildReport`) after its length, and then the bytes of the script's output, of the
-end of its error output and of its trace.
+end of its error output, of its trace and of the figures that it drew.
 """
 
 from __future__ import annotations
@@ -40,15 +40,17 @@ import time
 import traceback
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import Literal, TypedDict
+from typing import Literal, TypeAlias, TypedDict
 
 from coursebuild.core.run.notes import Notes, read_notes
-from coursebuild.core.run.script_process import Job, Preloaded, ScriptProcess
+from coursebuild.core.run.script_process import Job, Preloaded, ScriptProcess, figure_path
 from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched, has_ended
 
 LENGTH = struct.Struct(">I")
 PROGRAM = str(Path(__file__).with_name("worker_main.py"))
 
+FIGURE_LIMIT = 4 << 20
+"""Bytes that a figure may have."""
 _NOTES = ".notes"
 """What the folder of a script's notes is called, after its temporary folder."""
 _NOTES_BYTES = 1 << 20
@@ -89,7 +91,7 @@ def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
         script, status = None, end.code
     except Exception:  # a bug: the tool shows it as what the script has said
         answer = _unstartable(traceback.format_exc())
-        _send(reports, json.dumps(answer[0]).encode(), *answer[1:])
+        _answer(reports, answer)
         script, status = None, 70
     else:
         status = 0
@@ -115,6 +117,12 @@ class ChildReport(TypedDict):
     stderr: int
     trace: int
     """Length in bytes of the `Notes` as JSON; 0 where nobody watched."""
+    figures: list[int]
+    """Lengths in bytes of the figures of the job; -1 of one that it did not draw."""
+
+
+_Answer: TypeAlias = tuple[ChildReport, bytes, bytes, bytes, list[bytes]]
+"""A report, with the script's output, error output, trace and figures."""
 
 
 def _alone(start: _Start, bare: Collection[str]) -> ScriptProcess:
@@ -159,15 +167,15 @@ class _Supervisor:
             answer = self._serve(job)
             if isinstance(answer, ScriptProcess):
                 return answer
-            _send(self.reports, json.dumps(answer[0]).encode(), *answer[1:])
+            _answer(self.reports, answer)
         return None
 
-    def _serve(self, job: Job) -> tuple[ChildReport, bytes, bytes, bytes] | ScriptProcess:
+    def _serve(self, job: Job) -> _Answer | ScriptProcess:
         folder_of_script = Path(job["root"], job["path"]).parent
         path = [str(folder_of_script), *job["folders"]]
         missing = missing_modules(job["requires"], path, job["library"])
         if missing:
-            return _report("missing", missing=missing), b"", b"", b""
+            return _report("missing", missing=missing), b"", b"", b"", []
         if not os.path.isfile(f"{job['root']}/{job['path']}"):  # noqa: PTH113 (here time counts)
             return _unstartable(f"there is no file {job['path']}\n")
         environment = dict(job["environment"])
@@ -193,7 +201,7 @@ class _Supervisor:
                 run.watch(self.jobs, parent)
             finally:
                 run.end()
-            return _finished(run, launched.notes)
+            return _finished(run, launched.notes, _drawn(folder, job["figures"]))
         finally:
             if folder and not isinstance(launched, ScriptProcess):
                 remove_folder(folder)
@@ -332,9 +340,25 @@ def _temporary(scratch: str) -> str:
                 Path(scratch).mkdir(mode=0o700)
 
 
+def _drawn(folder: str, names: Sequence[str]) -> list[bytes | None]:
+    """The figures in a script's temporary folder; `None` for what it did not draw.
+
+    One that is too large is cut, so that it is none that can be shown.
+    """
+    found: list[bytes | None] = []
+    for name in names:
+        path = Path(figure_path(folder, name))
+        try:
+            with path.open("rb") as file:
+                found.append(file.read(FIGURE_LIMIT + 1) if path.is_file() else None)
+        except OSError:
+            found.append(None)
+    return found
+
+
 def _finished(
-    run: Watched, notes: Callable[[], Notes | None]
-) -> tuple[ChildReport, bytes, bytes, bytes]:
+    run: Watched, notes: Callable[[], Notes | None], figures: Sequence[bytes | None]
+) -> _Answer:
     stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
     stderr = _OUR_FRAME.sub(b"", stderr)
     noted = notes()
@@ -347,12 +371,13 @@ def _finished(
         "stdout": len(stdout),
         "stderr": len(stderr),
         "trace": len(trace),
+        "figures": [-1 if data is None else len(data) for data in figures],
     }
-    return report, stdout, stderr, trace
+    return report, stdout, stderr, trace, [data for data in figures if data is not None]
 
 
-def _unstartable(text: str) -> tuple[ChildReport, bytes, bytes, bytes]:
-    return _report("unstartable", status=2, stderr=text), b"", text.encode(), b""
+def _unstartable(text: str) -> _Answer:
+    return _report("unstartable", status=2, stderr=text), b"", text.encode(), b"", []
 
 
 def _report(
@@ -370,6 +395,7 @@ def _report(
         "stdout": 0,
         "stderr": len(stderr.encode()),
         "trace": 0,
+        "figures": [],
     }
 
 
@@ -404,6 +430,11 @@ def _read_exactly(fd: int, count: int) -> bytes | None:
             return None
         data += chunk
     return data
+
+
+def _answer(fd: int, answer: _Answer) -> None:
+    report, stdout, stderr, trace, figures = answer
+    _send(fd, json.dumps(report).encode(), stdout, stderr, trace, *figures)
 
 
 def _send(fd: int, header: bytes, *blobs: bytes) -> None:

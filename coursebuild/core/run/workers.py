@@ -6,6 +6,7 @@ Entry point: `Worker`.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 import select
@@ -90,8 +91,8 @@ class Worker:
         self._buffer += data
         return bool(data)
 
-    def take_report(self) -> tuple[supervisor.ChildReport, bytes, bytes, bytes] | None:
-        """A whole report with the script's output, error output and trace, if it is here."""
+    def take_report(self) -> tuple[supervisor.ChildReport, bytes, bytes, bytes, bytes] | None:
+        """A whole report with output, error output, trace and figures, if it is here."""
         size = supervisor.LENGTH.size
         if len(self._buffer) < size:
             return None
@@ -103,11 +104,13 @@ class Worker:
         ends = [at + report["stdout"]]
         ends += [ends[-1] + report["stderr"]]
         ends += [ends[-1] + report["trace"]]
+        ends += [ends[-1] + sum(max(size, 0) for size in report["figures"])]
         if len(self._buffer) < ends[-1]:
             return None
         data = bytes(self._buffer)
         self._buffer.clear()
-        return report, data[at : ends[0]], data[ends[0] : ends[1]], data[ends[1] :]
+        out, err, trace, figures = (data[a:b] for a, b in itertools.pairwise([at, *ends]))
+        return report, out, err, trace, figures
 
     def status(self) -> int:
         """What ended it, once it is gone: minus a signal's number, or an exit status."""

@@ -107,6 +107,8 @@ def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) 
         more.append(("packages of the course", " ".join(job.packages)))
     if job.writes:
         more.append(("folders that it may write into", " ".join(job.writes)))
+    if job.figures:
+        more.append(("figures that it draws", " ".join(job.figures)))
     if job.perturbation:
         more.append((_PERTURBATION, str(job.perturbation)))
     around = tuple(sorted((*around, *more)))

@@ -106,9 +106,14 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
             each.packages,
             each.environment,
             each.script.writes,
+            tuple(figure.name for figure in each.script.figures),
         )
         for each in extractions
     )
+
+
+def _names(script: Script) -> tuple[str, ...]:
+    return tuple(figure.name for figure in script.figures)
 
 
 def _key(path: str) -> str:

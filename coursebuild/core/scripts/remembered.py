@@ -41,6 +41,7 @@ class RunRecord(Struct, frozen=True):
     divergences: tuple[Divergence, ...] = ()
     moved: bool = False
     states: tuple[str, ...] = ()
+    figures: tuple[tuple[str, bytes], ...] = ()
 
     def run(self, places: Iterable[tuple[str, str]]) -> ScriptRun:
         """The run as if it had been made here; see `to_bytes` for the places."""
@@ -67,6 +68,7 @@ class RunRecord(Struct, frozen=True):
                 moved=self.moved,
                 states=self.states,
             ),
+            figures=self.figures,
         )
 
 

@@ -33,6 +33,8 @@ class ParsingState:
         self.diagnostics: list[Diagnostic] = []
         self.script: str | None = None
         """The path of the nearest script above."""
+        self.figures: list[str] = []
+        """Names of figures of scripts above that no paragraph has shown yet."""
         self.script_wrong = False
         """Whether the nearest script above has no path that it may have."""
         self.closes_indented = False

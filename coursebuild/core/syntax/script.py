@@ -1,7 +1,7 @@
 """Python blocks: scripts that are extracted and run, and code that is only shown.
 
-Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `norun`, `diverges`,
-`writes` of a script; `fragment` of code that need not parse; `show` of code that is
+Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `figure`, `norun`,
+`diverges`, `writes` of a script; `fragment` of code that need not parse; `show` of code that is
 that of a file.
 """
 
@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Iterator
 
 from coursebuild.core.model import PlainCode, Script, SourcePart
+from coursebuild.core.model.blocks import FigureName
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import FenceKeys, Word, words_of
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
@@ -24,7 +25,7 @@ DEFAULT_TIMEOUT = 60.0
 LONGEST_TIMEOUT = 86400.0
 """Seconds."""
 
-_VALUES = ("timeout", "requires", "args", "writes", "record")
+_VALUES = ("timeout", "requires", "args", "writes", "record", "figure")
 _FLAGS = ("norun", "diverges", "deep")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
@@ -36,6 +37,7 @@ _SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"
 }
 _PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
 _OURS = ("content", "models", "examples", "features", "public")
+_FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png)", re.ASCII)
 _ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
@@ -97,6 +99,7 @@ def _script(
         message = f"`{record.value}` is not a way to record"
         help = "write `record=once`"
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
+    figures = tuple(_figures(keys.get("figure"), diagnostics))
     if wrong:
         return None
     return Script(
@@ -114,6 +117,7 @@ def _script(
         keys.get("deep") is not None,
         writes,
         once=record is not None,
+        figures=figures,
     )
 
 
@@ -136,6 +140,21 @@ def _timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
         message = f"`{word.value}` s is more than a day"
     diagnostics.append(diagnose("fence-key-value", word.value_span, message))
     return DEFAULT_TIMEOUT
+
+
+def _figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[FigureName]:
+    if word is None or word.value_text is None:
+        return
+    text, at = word.value_text, 0
+    for name in text.text.split(","):
+        span = text.span(at, at + len(name))
+        at += len(name) + 1
+        if _FIGURE.fullmatch(name):
+            yield FigureName(name, span)
+        else:
+            message = f"`{name}` is no name of a figure"
+            help = "it is a file name that ends in `.svg` or `.png`, as in `figure=flip.svg`"
+            diagnostics.append(diagnose("fence-key-value", span, message, help=help))
 
 
 def _modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:

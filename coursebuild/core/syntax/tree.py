@@ -40,6 +40,7 @@ from coursebuild.core.syntax.attributes import Braces, read_label
 from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_ours, read_fence
+from coursebuild.core.syntax.figure import WORD, read_figure
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
 from coursebuild.core.syntax.html import Balance, media_of, tags
 from coursebuild.core.syntax.inlines import InlineReader
@@ -138,6 +139,9 @@ class TextReader:
                 return recording
         elif not self.nested and (kind := self._next_kind()) is not None:
             self.session.diagnostics += near_caption(children, span, kind)
+        if not self.nested and content.text.startswith(WORD):
+            children, shown = read_figure(children, span, self.session.figures)
+            return Paragraph(span, children, token.hidden, shown)
         return Paragraph(span, children, token.hidden)
 
     def _next_kind(self) -> str | None:

@@ -117,6 +117,10 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("footnote-undefined", "error", "A footnote is referred to and never written."),
     ("footnote-unused", "warning", "A footnote is written and never referred to."),
     ("footnote-repeated", "error", "A footnote is written twice."),
+    ("figure-unshown", "error", "A script draws a figure that no paragraph below it shows."),
+    ("figure-missing", "error", "A script does not draw the figure that it is to draw."),
+    ("figure-unreadable", "error", "What a script drew cannot be shown."),
+    ("figure-drift", "error", "A recorded figure differs from what its script draws now."),
     (
         "image-remote",
         "error",

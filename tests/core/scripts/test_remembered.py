@@ -72,7 +72,7 @@ def test_json_that_is_no_record(data: st.DataObject) -> None:
     wrong = st.sampled_from([None, {}, [[]], {"a": 1}, [1]])
     value[name] = data.draw(wrong)
     assert from_bytes(json.dumps(value).encode()) is None
-    if name not in ("stdout", "stderr", "divergences", "moved", "states"):
+    if name not in ("stdout", "stderr", "divergences", "moved", "states", "figures"):
         del value[name]
         assert from_bytes(json.dumps(value).encode()) is None
 

@@ -1,0 +1,95 @@
+"""Drawings as they are recorded, and how one differs from another."""
+
+from __future__ import annotations
+
+import io
+
+from PIL import Image
+
+from coursebuild.core.scripts.figures import difference, drawn_file
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {}">{}</svg>'
+
+
+def svg(inside: str, size: str = "100 50") -> bytes:
+    return SVG.format(size, inside).encode()
+
+
+def recorded(inside: str) -> bytes:
+    drawn = drawn_file("x.svg", svg(inside))
+    assert isinstance(drawn, bytes), drawn
+    return drawn
+
+
+def png(size: tuple[int, int] = (20, 10), spots: dict[tuple[int, int], int] | None = None) -> bytes:
+    image = Image.new("L", size, 255)
+    for place, value in (spots or {}).items():
+        image.putpixel(place, value)
+    data = io.BytesIO()
+    image.save(data, "PNG")
+    return data.getvalue()
+
+
+def test_what_changes_from_run_to_run_is_not_recorded() -> None:
+    one = recorded(
+        '<!-- made today --><metadata>2026-11-22</metadata><defs><path id="m4f2a" d="M0 0"/></defs>'
+        '<use href="#m4f2a"/><g clip-path="url(#p1)"/><clipPath id="p1"/>'
+    )
+    two = recorded(
+        '<!-- made later --><metadata>2027-01-01</metadata><defs><path id="m9c1b" d="M0 0"/></defs>'
+        '<use href="#m9c1b"/><g clip-path="url(#p7)"/><clipPath id="p7"/>'
+    )
+    assert one == two
+    assert b"20" not in one.replace(b"2000/svg", b"") and b"made" not in one
+
+
+DIFFERENT = {
+    '<path d="M0 0L10.05 1"/>': "",
+    '<path d="M0 0L12.5 1"/>': "1 of its parts moved, by up to 2.5% of its size",
+    '<path d="M0 0L10 1" fill="red"/>': "it has 7 parts where 6 are recorded",
+    '<path d="M0 0H10 1"/>': "other words or colours in 1 of its parts",
+    '<path d="M0 0L1e999 1"/>': "1 of its parts moved, by up to inf% of its size",
+    '<path d="M0 0L10 1"/><text>a</text>': "it has 8 parts where 6 are recorded",
+}
+
+
+def test_svg_differs_by_parts_words_and_places() -> None:
+    base = recorded('<path d="M0 0L10 1"/>')
+    told = {inside: difference("x.svg", base, recorded(inside)) for inside in DIFFERENT}
+    assert told == DIFFERENT
+
+
+def test_png_differs_by_pixels() -> None:
+    base = png()
+    assert difference("x.png", base, png(spots={(3, 3): 254})) == ""
+    told = difference("x.png", base, png(spots={(3, 4): 0, (7, 8): 0}))
+    assert told == "pixels differ in columns 3 to 8, rows 4 to 9"
+    told = difference("x.png", base, png((10, 10)))
+    assert told == "it has 10×10 pixels where 20×10 are recorded"
+    assert difference("x.png", b"no", base) == "the recorded file is no PNG"
+
+
+def test_what_cannot_be_shown_is_told() -> None:
+    bomb = b'<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg xmlns="http://www.w3.org/2000/svg">&a;</svg>'
+    told = [
+        drawn_file("x.svg", data)
+        for data in (
+            b"",
+            b"<p/>",
+            bomb,
+            svg('<g onload="f()"/>'),
+            svg('<a href="javascript:f()"/>'),
+            svg("<foreignObject/>"),
+            svg('<image href="https://example.org/x.png"/>'),
+        )
+    ]
+    assert told == [
+        "is no SVG: no element found: line 1, column 0",
+        "is no SVG: its root is another element",
+        "declares entities",
+        "holds active content, `g`",
+        "leads to `javascript:f()`",
+        "holds active content, `foreignObject`",
+        "leads to `https://example.org/x.png`",
+    ]
+    assert drawn_file("x.png", png()[:50]) == "is no PNG"

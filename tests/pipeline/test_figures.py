@@ -1,0 +1,76 @@
+"""Figures of scripts: drawn, recorded by `update`, compared by `check`, shown by `build`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from support.scratch_course import Folder, block
+
+pytestmark = pytest.mark.site
+
+Make = Callable[..., Folder]
+
+LINE = """from pathlib import Path
+
+with open("line.svg", "w") as file:
+    file.write('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9">')
+    file.write('<path d="M0 0L{end} 9"/></svg>')
+print("drawn", len(Path("line.svg").read_text()) > 9)
+"""
+
+
+def drawing(path: str, end: float) -> str:
+    return block(path, LINE.format(end=end), "drawn True", info="figure=line.svg")
+
+
+def lesson(end: float) -> str:
+    return f"## A line\n\n{drawing('line.py', end)}Figure: ![A line](line.svg) It *rises*.\n"
+
+
+def test_figure_is_recorded_compared_and_shown(make: Make) -> None:
+    folder = make(lesson(9))
+    first = folder.run("check")
+    assert first.status == 1
+    assert "figure-drift]: nothing is recorded yet of what `examples/line.py` draws" in first.out
+    updated = folder.run("update")
+    assert updated.status == 0, updated.out
+    assert "drew content/lessons/line.svg" in updated.out
+    assert not (folder.root / "line.svg").exists()
+    assert folder.run("check").status == 0
+    assert folder.run("build").status == 0
+    page = (folder.root / "public/lessons/1.1-one.html").read_text()
+    assert 'alt="A line"' in page
+    assert "It <em>rises</em>." in page
+    assert '<a class="drawn-by" href="#line.py">Drawn by examples/line.py</a>' in page
+    folder.write(folder.lesson(), lesson(5))
+    drifted = folder.run("check")
+    assert "figure-drift]: the recorded figure differs from this run: 1 of its parts moved" in (
+        drifted.out
+    )
+    assert folder.run("update", "--dry-run").out.count("would draw content/lessons/line.svg") == 1
+    assert folder.run("check").status == 1
+    assert folder.run("update").status == 0
+    assert folder.run("check").status == 0
+
+
+def test_figure_of_a_remembered_run_is_compared(make: Make) -> None:
+    folder = make(lesson(9))
+    folder.run("update")
+    drawn = folder.root / "content/lessons/line.svg"
+    drawn.write_bytes(drawn.read_bytes().replace(b"L9 9", b"L4 9"))
+    told = folder.run("check")
+    assert "cached" in told.out
+    assert "the recorded figure differs from this run" in told.out
+
+
+def test_scripts_that_draw_under_one_name_do_not_meet(make: Make) -> None:
+    other = drawing("other.py", 3)
+    folder = make(lesson(9), f"## Other\n\n{other}Figure: ![Another](other/line.svg)\n")
+    folder.write("line.svg", "the author's own")
+    assert folder.run("update").status == 0
+    assert folder.run("check").status == 0
+    assert b"L9 9" in (folder.root / "content/lessons/line.svg").read_bytes()
+    assert b"L3 9" in (folder.root / "content/lessons/other/line.svg").read_bytes()
+    assert (folder.root / "line.svg").read_text() == "the author's own"
