@@ -17,7 +17,7 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.importer.contents import read_contents
 from coursebuild.importer.context import LessonContext
 from coursebuild.importer.course_json import read_course_json
-from coursebuild.importer.course_map import Text, map_text, texts_of
+from coursebuild.importer.course_map import ImportedText, map_text, texts_of
 from coursebuild.importer.lesson import lesson_text
 from coursebuild.importer.prose import labels
 from coursebuild.importer.values import TEXTS, Files, Leftover, SourceCourse, files_of, stem_of
@@ -82,7 +82,7 @@ def write_course(course: Converted, folder: Path, source: Path) -> None:
         write_atomic(target, path, data, expected=None)
 
 
-def _ids(texts: Sequence[Text]) -> dict[str, str]:
+def _ids(texts: Sequence[ImportedText]) -> dict[str, str]:
     """Ids of lessons, by those that they had and by those that they have."""
     lessons = [text for text in texts if text.link.startswith("lesson:")]
     slugs = {text.source.slug: text.id for text in lessons if text.source.slug}
@@ -91,7 +91,7 @@ def _ids(texts: Sequence[Text]) -> dict[str, str]:
 
 
 def _lessons(
-    course: SourceCourse, texts: Sequence[Text], files: Files
+    course: SourceCourse, texts: Sequence[ImportedText], files: Files
 ) -> tuple[dict[str, bytes], list[Leftover], dict[str, str]]:
     """The files of lessons and pages, what was left, and kinds of callouts of the course's own."""
     written = [text for text in texts if text.path]
@@ -125,7 +125,7 @@ def _lessons(
     return out, left, callouts
 
 
-def _script_path(text: Text) -> str:
+def _script_path(text: ImportedText) -> str:
     words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
     return f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
 

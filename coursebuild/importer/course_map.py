@@ -1,6 +1,6 @@
 """The map of the new course.
 
-Entry points: `Text`, a lesson or page on its way; `texts_of`, `map_text`.
+Entry points: `ImportedText`, a lesson or page on its way; `texts_of`, `map_text`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
 """Words for the status of a lesson that is written; with any other one it is a draft."""
 
 
-class Text(Struct, frozen=True):
+class ImportedText(Struct, frozen=True):
     """A lesson or page on its way into the new course."""
 
     source: SourceLesson
@@ -51,7 +51,7 @@ def level_id(level: SourceLevel, number: int) -> str:
     return level.id if re.fullmatch("[A-Za-z0-9]+", level.id) else str(number)
 
 
-def texts_of(course: SourceCourse, files: Files) -> tuple[Text, ...]:
+def texts_of(course: SourceCourse, files: Files) -> tuple[ImportedText, ...]:
     """All lessons in the order of the course, then its pages.
 
     Raises:
@@ -69,10 +69,10 @@ def texts_of(course: SourceCourse, files: Files) -> tuple[Text, ...]:
     return tuple(found)
 
 
-def _text(source: SourceLesson, id: str, files: Files, *, page: bool = False) -> Text:
+def _text(source: SourceLesson, id: str, files: Files, *, page: bool = False) -> ImportedText:
     title, slug = source.title, source.slug
     if not source.path:
-        return Text(source, id, slug_of(slug or title or id), title or id, "", (), {})
+        return ImportedText(source, id, slug_of(slug or title or id), title or id, "", (), {})
     found, segments, pictures = read_segments(files[source.path], source.path)
     title = " ".join((title or found or name_of(source.path)).split())
     slug = slug_of(slug or name_of(source.path))
@@ -81,12 +81,12 @@ def _text(source: SourceLesson, id: str, files: Files, *, page: bool = False) ->
     if page and not source.id:
         id = slug_of(title)
     path = f"content/pages/{id}.md" if page else f"content/lessons/{id}-{slug}.md"
-    return Text(source, id, slug, title, path, tuple(segments), pictures)
+    return ImportedText(source, id, slug, title, path, tuple(segments), pictures)
 
 
 def map_text(
     course: SourceCourse,
-    texts: Sequence[Text],
+    texts: Sequence[ImportedText],
     ids: Mapping[str, str],
     callouts: Mapping[str, str],
 ) -> str:
@@ -96,7 +96,7 @@ def map_text(
 
 def _map(
     course: SourceCourse,
-    texts: Sequence[Text],
+    texts: Sequence[ImportedText],
     ids: Mapping[str, str],
     callouts: Mapping[str, str],
 ) -> Iterator[str]:

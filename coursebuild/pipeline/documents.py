@@ -30,7 +30,7 @@ from coursebuild.pipeline.reading import (
     DrawnPage,
     PageReader,
     PageRequest,
-    Text,
+    SourceText,
     prepare_to_read,
 )
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 Value = TypeVar("Value")
 Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
-Request: TypeAlias = Text | PageRequest
+Request: TypeAlias = SourceText | PageRequest
 
 
 def _silent(name: str) -> AbstractContextManager[None]:
@@ -62,7 +62,7 @@ class Documents(Parser):
         self._store = store
         self._stage = stage
         self._jobs = jobs
-        self._texts: dict[str, Text] = {}
+        self._texts: dict[str, SourceText] = {}
         self._summaries: dict[str, DocumentSummary] = {}
         self._fingerprint: tuple[Course, str | None] | None = None
         self._readers: dict[str, int] = {}
@@ -116,7 +116,7 @@ class Documents(Parser):
 
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Have the summaries of sources, of which it is said which are lessons."""
-        texts = [Text.of(source, callouts, lesson=lesson) for source, lesson in sources]
+        texts = [SourceText.of(source, callouts, lesson=lesson) for source, lesson in sources]
         missing = [text for text in texts if not self._has(text)]
         if len(missing) >= _MANY:
             prepare_to_read(missing[0])
@@ -126,7 +126,7 @@ class Documents(Parser):
             if reader is not None:
                 self._readers[text.source.path] = reader
 
-    def _has(self, text: Text) -> bool:
+    def _has(self, text: SourceText) -> bool:
         """Whether the summary of a text is known, or in the store."""
         known = self._texts.get(text.source.path)
         if known is not None and known.key == text.key:
@@ -137,7 +137,7 @@ class Documents(Parser):
             self._take(text, summary)
         return summary is not None
 
-    def _take(self, text: Text, summary: DocumentSummary | None) -> None:
+    def _take(self, text: SourceText, summary: DocumentSummary | None) -> None:
         assert summary is not None, "what was just encoded can be decoded"
         self._texts[text.source.path] = text
         self._summaries[text.source.path] = summary

@@ -22,7 +22,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage
-from coursebuild.core.pages.frame import Frame, Names
+from coursebuild.core.pages.frame import Names, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import has
 from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
@@ -33,7 +33,7 @@ from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
 from coursebuild.pipeline.page_index import PageKeys
-from coursebuild.pipeline.reading import PAGES, DrawnPage, PageRequest, Text
+from coursebuild.pipeline.reading import PAGES, DrawnPage, PageRequest, SourceText
 
 
 class SitePage(Struct, frozen=True):
@@ -119,12 +119,12 @@ class Pages:
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
         key = self._frame_key(names)
-        frame = Frame(self._library, names)
+        frame = PageFrame(self._library, names)
         for path, page in self._pages.items():
             make = functools.partial(self._framed, path, frame)
             yield CachedFile(path, key_of(page.key, key), make)
 
-    def _framed(self, path: str, frame: Frame) -> bytes:
+    def _framed(self, path: str, frame: PageFrame) -> bytes:
         return framed(self._drawn(path), frame)
 
     def _frame_key(self, names: Names) -> str:
@@ -225,13 +225,13 @@ def _decoded(data: bytes) -> PageRecord:
     return record
 
 
-def framed(page: DrawnPage, frame: Frame) -> bytes:
+def framed(page: DrawnPage, frame: PageFrame) -> bytes:
     """A page as it is published."""
     record = page.record
     return frame.around(record.head, record.parts, page.body.decode()).encode()
 
 
-def text_of(entry: PageEntry, library: Library) -> Text | None:
+def text_of(entry: PageEntry, library: Library) -> SourceText | None:
     """The text of the document that a page shows, if it shows one."""
     document = entry.document(library)
     if document is None:
@@ -239,7 +239,7 @@ def text_of(entry: PageEntry, library: Library) -> Text | None:
     callouts = frozenset(kind.name for kind in library.course.callouts)
     lesson = library.lessons.get(entry.id)
     is_lesson = lesson is not None and lesson.document is document
-    return Text.of(document.source, callouts, lesson=is_lesson)
+    return SourceText.of(document.source, callouts, lesson=is_lesson)
 
 
 def page_request(entry: PageEntry, library: Library) -> PageRequest:

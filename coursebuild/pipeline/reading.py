@@ -1,7 +1,7 @@
 """Texts read and pages drawn, one at a time, here or in a copy of this process.
 
-Entry point: `PageReader`: `read` takes a `Text` and gives its `DocumentSummary`, `draw` takes a
-`PageRequest` and gives a `DrawnPage`. Both keep what they make.
+Entry point: `PageReader`: `read` takes a `SourceText` and gives its `DocumentSummary`, `draw` takes
+a `PageRequest` and gives a `DrawnPage`. Both keep what they make.
 
 A document and its formulas stay for the drawing. Those that an earlier build has read, or another
 process, are parsed again, and their MathML comes from the store. What draws is imported when there
@@ -57,7 +57,7 @@ _ROOM = 700_000
 again, so that memory does not grow with the course."""
 
 
-class Text(Struct, frozen=True):
+class SourceText(Struct, frozen=True):
     """A text that holds a document."""
 
     source: Source
@@ -67,7 +67,7 @@ class Text(Struct, frozen=True):
     """A hash of all that its summary depends on."""
 
     @classmethod
-    def of(cls, source: Source, callouts: frozenset[str], *, lesson: bool) -> Text:
+    def of(cls, source: Source, callouts: frozenset[str], *, lesson: bool) -> SourceText:
         """With its key."""
         key = step_key("summary", lesson, callouts, source.path, source.digest)
         return cls(source, callouts, lesson, key)
@@ -93,7 +93,7 @@ class PageRequest(Struct, frozen=True):
 
     packed: bytes
     """Its inputs, as its key is made from them."""
-    text: Text | None
+    text: SourceText | None
     """That of its document, if it has one."""
     language: str
     """Of the interface."""
@@ -129,7 +129,7 @@ _HEAVY = (
 )
 
 
-def prepare_to_read(sample: Text) -> None:
+def prepare_to_read(sample: SourceText) -> None:
     """Import and make what reading and drawing need, so that copies of this process share it."""
     for name in _HEAVY:
         importlib.import_module(name)
@@ -152,7 +152,7 @@ class PageReader:
         self._store = store
         self._lock = threading.RLock()
         self._engine: MathEngine | None = None
-        self._waiting: dict[str, tuple[Text, _Whole]] = {}
+        self._waiting: dict[str, tuple[SourceText, _Whole]] = {}
         """Documents that were read and not drawn yet, by path."""
         self._room = _ROOM
         self._tools: dict[str, Tools] = {}
@@ -163,15 +163,15 @@ class PageReader:
             self._engine.close()
             self._engine = None
 
-    def answer(self, request: Text | PageRequest) -> bytes:
+    def answer(self, request: SourceText | PageRequest) -> bytes:
         """The summary of a text, or the record of a page, encoded."""
-        if isinstance(request, Text):
+        if isinstance(request, SourceText):
             return self.read(request)
         return encode(self.draw(request).record)
 
     # --- reading
 
-    def read(self, text: Text) -> bytes:
+    def read(self, text: SourceText) -> bytes:
         """The summary of a text, encoded."""
         with self._lock:
             whole = self._whole(text)
@@ -192,14 +192,14 @@ class PageReader:
             self._keep(text, whole)
             return data
 
-    def _keep(self, text: Text, whole: _Whole) -> None:
+    def _keep(self, text: SourceText, whole: _Whole) -> None:
         """Keep a document until it is drawn, as far as there is room."""
         size = len(text.source.text)
         if size <= self._room:
             self._waiting[text.source.path] = text, whole
             self._room -= size
 
-    def _whole(self, text: Text) -> _Whole:
+    def _whole(self, text: SourceText) -> _Whole:
         """A document with its formulas."""
         known = self._waiting.pop(text.source.path, None)
         if known is not None:
@@ -256,7 +256,7 @@ class PageReader:
             self._store.put(PAGES, request.key, encode(page), local=True)
             return page
 
-    def context(self, text: Text, inputs: PageInputs, language: str) -> PageContext:
+    def context(self, text: SourceText, inputs: PageInputs, language: str) -> PageContext:
         """A document with all its text, on its page."""
         from coursebuild.core.pages.context import PageContext
 

@@ -21,7 +21,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import OutputFile, SiteFile
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.frame import Frame
+from coursebuild.core.pages.frame import PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
@@ -39,7 +39,7 @@ _SITES = 3
 class ServedPage(Struct, frozen=True):
     """The text of a page, and what it was made from."""
 
-    frame: Frame
+    frame: PageFrame
     """Others where the course or what pages share is another."""
     key: str
     page: DrawnPage
@@ -66,7 +66,7 @@ class Files:
         self._pages: dict[str, ServedPage] = {}
         self._last_good: dict[str, str] = {}
         """Keys of pages as they are in the site that was made last, by site path."""
-        self._frame: Frame | None = None
+        self._frame: PageFrame | None = None
         self._sites: list[tuple[Site, Mapping[str, SiteFile]]] = []
         self._feature_files: Mapping[str, OutputFile] = {}
         """Files of features that pages already show, though no site was made with them yet."""
@@ -113,7 +113,7 @@ class Files:
     def _set_frame(self, library: Library) -> None:
         names = self._sites[-1][0].names
         assert names is not None
-        self._frame = Frame(library, names)
+        self._frame = PageFrame(library, names)
 
     # --- what may be asked
 

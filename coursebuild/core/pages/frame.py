@@ -1,6 +1,6 @@
 """A page without its frame, and the frame: head, site navigation, foot.
 
-Entry point: `Frame`, what stands around the body of each page.
+Entry point: `PageFrame`, what stands around the body of each page.
 
 Pages are drawn in two steps because a page's head names the style sheet by its content, and the
 style sheet holds the fonts' names, which depend on every character of every page.
@@ -109,7 +109,7 @@ def parts_of(body: str, kind: str) -> tuple[str, ...]:
     )
 
 
-class Frame(Struct, frozen=True):
+class PageFrame(Struct, frozen=True):
     """What stands around every page of a site."""
 
     library: Library

@@ -8,16 +8,12 @@ asked only about words that are not among the common ones.
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
 
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.core.text.source import Excerpt
-
-if TYPE_CHECKING:
-    from pint import UnitRegistry
+from coursebuild.core.text.units import pint_registry
 
 COMMON = tuple(
     """
@@ -53,22 +49,13 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         return
     for found in _WORDS.finditer(unit.text):
         word = found[0].replace("\u2126", "Ω")
-        if word in COMMON or (word != "rads" and _pint().parse_unit_name(word)):
+        if word in COMMON or (word != "rads" and pint_registry().parse_unit_name(word)):
             continue  # of rads Pint says that they are a dose of radiation
         likely = _likely(word)
         help = "leave it out, and say in words what is counted"
         help = f"did you mean `{likely}`?" if likely else help
         message = f"there is no unit `{word}`"
         yield diagnose("unit-unknown", unit.span(*found.span()), message, help=help)
-
-
-@functools.cache
-def _pint() -> UnitRegistry[Any]:
-    from pint import UnitRegistry
-
-    registry: UnitRegistry[Any] = UnitRegistry()
-    registry.define("@alias turn = rev")
-    return registry
 
 
 def _likely(word: str) -> str:

@@ -1,7 +1,7 @@
 """Units as authors write them: `kg m²`, `N*m/rad`, `mm`.
 
-Entry point: `find_unit(text)`. Those of mechanics are known here. Of others Pint is asked, whose
-import takes longer than a page does to be built.
+Entry points: `find_unit(text)`, `pint_registry()`. Units of mechanics are known here. Of others
+Pint is asked, whose import takes longer than a page does to be built.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _common(name: str) -> Unit | None:
 
 def _ask_pint(text: str) -> Unit | None:
     try:
-        base = _registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
+        base = pint_registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
         powers = sorted((str(n)[1:-1], Fraction(p)) for n, p in base.dimensionality.items())
         return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
     except Exception:  # what Pint's reader of expressions raises is not said anywhere
@@ -88,7 +88,10 @@ def _ask_pint(text: str) -> Unit | None:
 
 
 @functools.cache
-def _registry() -> Any:
+def pint_registry() -> Any:
+    """Pint's units, which take a second to be read."""
     import pint
 
-    return pint.UnitRegistry(cache_folder=None)
+    registry: Any = pint.UnitRegistry(cache_folder=None)
+    registry.define("@alias turn = rev")
+    return registry

@@ -24,14 +24,14 @@ from msgspec.structs import replace
 
 from coursebuild.features.arithmetic.evaluate import EXACT, WrongDimensions, evaluate, say
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
-from coursebuild.features.arithmetic.statements import Side, Statement, read_statements
+from coursebuild.features.arithmetic.statements import FormulaSide, Statement, read_statements
 
 _RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
 _CLOSE = 1e-12
 _ORDER = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}
 
 
-class Finding(Struct, frozen=True):
+class FormulaFinding(Struct, frozen=True):
     """What was found of two sides of a formula, at a stretch of its TeX."""
 
     kind: Literal["holds", "wrong", "unread"]
@@ -55,14 +55,14 @@ class ShownNumber(Struct, frozen=True):
 
 
 @functools.lru_cache(maxsize=1024)
-def check_arithmetic(tex: str) -> tuple[Finding, ...]:
+def check_arithmetic(tex: str) -> tuple[FormulaFinding, ...]:
     """What was found of the numbers that a formula holds against each other."""
     if not _RELATION.search(tex) or not re.search("[0-9]", tex):
         return ()
     return tuple(found for one in read_statements(tex) for found in _chain(one))
 
 
-def _chain(statement: Statement) -> Iterator[Finding]:
+def _chain(statement: Statement) -> Iterator[FormulaFinding]:
     sides = _without_common_unit(statement.sides)
     for left, right, relation in zip(sides, sides[1:], statement.relations, strict=False):
         if not (left.numeric and right.numeric):
@@ -70,17 +70,17 @@ def _chain(statement: Statement) -> Iterator[Finding]:
         try:
             wrong = _mistake(left.understood(), right.understood(), relation)
         except WrongDimensions as found:
-            yield Finding("wrong", found.start, found.end, found.reason)
+            yield FormulaFinding("wrong", found.start, found.end, found.reason)
         except NotUnderstood as found:
-            yield Finding("unread", found.start, found.end, found.reason)
+            yield FormulaFinding("unread", found.start, found.end, found.reason)
         else:
             if wrong is None:
-                yield Finding("holds", left.start, right.end)
+                yield FormulaFinding("holds", left.start, right.end)
             else:
-                yield Finding("wrong", *wrong)
+                yield FormulaFinding("wrong", *wrong)
 
 
-def _without_common_unit(sides: tuple[Side, ...]) -> tuple[Side, ...]:
+def _without_common_unit(sides: tuple[FormulaSide, ...]) -> tuple[FormulaSide, ...]:
     """The sides without their unit, where no other unit is in any of them."""
     known = [s.expression for s in sides if isinstance(s.expression, Expression)]
     units = {one.text for side in known for one in side.walk() if one.kind == "unit"} - {"%", "deg"}

@@ -27,7 +27,7 @@ class WrongDimensions(NotUnderstood):
     """That quantities of different dimensions meet."""
 
 
-class Quantity(Struct, frozen=True):
+class PhysicalQuantity(Struct, frozen=True):
     """A value in base units of the SI."""
 
     value: Any
@@ -70,8 +70,10 @@ EXACT = Arithmetic(
 
 
 def evaluate(
-    expression: Expression, arithmetic: Arithmetic, symbols: Mapping[str, Quantity] | None = None
-) -> Quantity:
+    expression: Expression,
+    arithmetic: Arithmetic,
+    symbols: Mapping[str, PhysicalQuantity] | None = None,
+) -> PhysicalQuantity:
     """What an expression comes to.
 
     Raises:
@@ -84,10 +86,10 @@ def evaluate(
 
 
 class _Evaluator:
-    def __init__(self, arithmetic: Arithmetic, symbols: Mapping[str, Quantity]) -> None:
+    def __init__(self, arithmetic: Arithmetic, symbols: Mapping[str, PhysicalQuantity]) -> None:
         self.arithmetic, self.symbols = arithmetic, symbols
 
-    def of(self, one: Expression) -> Quantity:
+    def of(self, one: Expression) -> PhysicalQuantity:
         """What an expression comes to."""
         try:
             return self._of(one)
@@ -96,12 +98,12 @@ class _Evaluator:
         except (ValueError, TypeError):
             raise one.not_understood("it is no real number") from None
 
-    def _of(self, one: Expression) -> Quantity:
+    def _of(self, one: Expression) -> PhysicalQuantity:
         match one.kind:
             case "number":
                 if len(one.text) > _LONGEST:
                     raise OverflowError
-                return Quantity(self.arithmetic.number(one.text))
+                return PhysicalQuantity(self.arithmetic.number(one.text))
             case "symbol":
                 return self._symbol(one)
             case "unit":
@@ -111,16 +113,16 @@ class _Evaluator:
             case "*":
                 left, right = map(self.of, one.parts)
                 dimension = multiply(left.dimension, right.dimension)
-                return Quantity(left.value * right.value, dimension)
+                return PhysicalQuantity(left.value * right.value, dimension)
             case "/":
                 left, right = map(self.of, one.parts)
                 dimension = multiply(left.dimension, right.dimension, -1)
-                return Quantity(left.value / right.value, dimension)
+                return PhysicalQuantity(left.value / right.value, dimension)
             case "^":
                 return self._power(one)
             case "abs":
                 (inner,) = map(self.of, one.parts)
-                return Quantity(abs(inner.value), inner.dimension)
+                return PhysicalQuantity(abs(inner.value), inner.dimension)
             case "derivative" | "integral":
                 return self._calculus(one)
             case name:
@@ -128,39 +130,41 @@ class _Evaluator:
                 if inner.dimension:
                     reason = f"`\\{name}` is of {say(inner.dimension)}, and not of a number"
                     raise WrongDimensions(reason, one.start, one.end)
-                return Quantity(self.arithmetic.functions[name](inner.value))
+                return PhysicalQuantity(self.arithmetic.functions[name](inner.value))
 
-    def _symbol(self, one: Expression) -> Quantity:
+    def _symbol(self, one: Expression) -> PhysicalQuantity:
         known = self.symbols.get(one.text)
         if known is not None:
             return known
         if one.text not in self.arithmetic.constants:
             reason = f"no lesson says what `{one.text}` is, or several differ in its unit"
             raise one.not_understood(reason)
-        return Quantity(self.arithmetic.constants[one.text])
+        return PhysicalQuantity(self.arithmetic.constants[one.text])
 
-    def _unit(self, one: Expression) -> Quantity:
+    def _unit(self, one: Expression) -> PhysicalQuantity:
         if one.text == "%":
-            return Quantity(self.arithmetic.number("0.01"))
+            return PhysicalQuantity(self.arithmetic.number("0.01"))
         if one.text == "deg":
-            return Quantity(self.arithmetic.constants[r"\pi"] / 180)
+            return PhysicalQuantity(self.arithmetic.constants[r"\pi"] / 180)
         unit = find_unit(one.text)
         if unit is None:
             raise one.not_understood(f"`{one.text}` is no unit that is known")
-        return Quantity(self.arithmetic.number(str(unit.size)), unit.dimension)
+        return PhysicalQuantity(self.arithmetic.number(str(unit.size)), unit.dimension)
 
-    def _sum(self, one: Expression) -> Quantity:
+    def _sum(self, one: Expression) -> PhysicalQuantity:
         first, *rest = map(self.of, one.parts)
         if not rest:
-            return Quantity(-first.value, first.dimension)
+            return PhysicalQuantity(-first.value, first.dimension)
         (second,) = rest
         if first.dimension != second.dimension and 0 not in (first.value, second.value):
             reason = f"{say(first.dimension)} and {say(second.dimension)} are added"
             raise WrongDimensions(reason, one.start, one.end)
         sign = 1 if one.kind == "+" else -1
-        return Quantity(first.value + sign * second.value, first.dimension or second.dimension)
+        return PhysicalQuantity(
+            first.value + sign * second.value, first.dimension or second.dimension
+        )
 
-    def _power(self, one: Expression) -> Quantity:
+    def _power(self, one: Expression) -> PhysicalQuantity:
         base, exponent = map(self.of, one.parts)
         if exponent.dimension:
             reason = f"an exponent is {say(exponent.dimension)}, and no number"
@@ -169,9 +173,9 @@ class _Evaluator:
         if base.dimension:
             power = _Evaluator(EXACT, {}).of(one.parts[1]).value
             dimension = multiply((), base.dimension, Fraction(power).limit_denominator(1000))
-        return Quantity(self.arithmetic.power(base.value, exponent.value), dimension)
+        return PhysicalQuantity(self.arithmetic.power(base.value, exponent.value), dimension)
 
-    def _calculus(self, one: Expression) -> Quantity:
+    def _calculus(self, one: Expression) -> PhysicalQuantity:
         what, by, *ends = one.parts
         if self.arithmetic.calculus is None or (one.kind == "integral" and not ends):
             raise one.not_understood("it is no number")
@@ -179,7 +183,7 @@ class _Evaluator:
         dimension: list[Dimension] = []
 
         def function(value: Any) -> Any:
-            inner = {**self.symbols, by.text: Quantity(value, at.dimension)}
+            inner = {**self.symbols, by.text: PhysicalQuantity(value, at.dimension)}
             found = _Evaluator(self.arithmetic, inner).of(what)
             dimension[:] = [found.dimension]
             return found.value
@@ -187,7 +191,7 @@ class _Evaluator:
         places = [self.of(end).value for end in ends] or [at.value]
         value = self.arithmetic.calculus(function, *places)
         sign = 1 if ends else -1
-        return Quantity(value, multiply(dimension[0], at.dimension, sign))
+        return PhysicalQuantity(value, multiply(dimension[0], at.dimension, sign))
 
 
 def say(dimension: Dimension) -> str:

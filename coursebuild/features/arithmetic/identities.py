@@ -13,10 +13,10 @@ from itertools import pairwise
 from typing import Any
 
 from coursebuild.core.text.units import Dimension
-from coursebuild.features.arithmetic.chains import Finding
+from coursebuild.features.arithmetic.chains import FormulaFinding
 from coursebuild.features.arithmetic.evaluate import (
     Arithmetic,
-    Quantity,
+    PhysicalQuantity,
     WrongDimensions,
     evaluate,
     say,
@@ -30,11 +30,11 @@ _MOST_BITS = 1000
 """Of an exponent."""
 
 
-def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[Finding]:
+def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[FormulaFinding]:
     """What does not hold, or is not understood, in a formula of these symbols."""
     statements = read_statements(tex)
     if not any(statement.relations for statement in statements):
-        yield Finding("unread", 0, len(tex), "it is no equation")
+        yield FormulaFinding("unread", 0, len(tex), "it is no equation")
     for statement in statements:
         for (left, right), relation in zip(
             pairwise(statement.sides), statement.relations, strict=True
@@ -44,14 +44,14 @@ def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[Findi
                     raise NotUnderstood("it is no equation", left.start, right.end)
                 yield from _compare(left.understood(), right.understood(), symbols)
             except WrongDimensions as found:
-                yield Finding("wrong", found.start, found.end, found.reason)
+                yield FormulaFinding("wrong", found.start, found.end, found.reason)
             except NotUnderstood as found:
-                yield Finding("unread", found.start, found.end, found.reason)
+                yield FormulaFinding("unread", found.start, found.end, found.reason)
 
 
 def _compare(
     left: Expression, right: Expression, symbols: Mapping[str, Dimension]
-) -> Iterator[Finding]:
+) -> Iterator[FormulaFinding]:
     import mpmath
 
     left, right = _without_integral(left, right)
@@ -63,17 +63,19 @@ def _compare(
         arithmetic = _precise(mpmath.mp)
         for _ in range(_POINTS):
             point = {name: mpmath.mpf(round(draw.uniform(0.5, 2), 3)) for name in names}
-            values = {name: Quantity(value, symbols[name]) for name, value in point.items()}
+            values = {name: PhysicalQuantity(value, symbols[name]) for name, value in point.items()}
             one, other = (evaluate(side, arithmetic, values) for side in (left, right))
             if one.dimension != other.dimension and 0 not in (one.value, other.value):
                 message = f"{say(one.dimension)} is held against {say(other.dimension)}"
-                yield Finding("wrong", right.start, right.end, message)
+                yield FormulaFinding("wrong", right.start, right.end, message)
                 return
             if abs(one.value - other.value) > _CLOSE * (abs(one.value) + abs(other.value)):
                 at = ", ".join(f"{name} = {float(value):g}" for name, value in point.items())
                 sides = " and ".join(mpmath.nstr(side.value, 6) for side in (one, other))
                 where = f" where {at}" if at else ""
-                yield Finding("wrong", right.start, right.end, f"the sides are {sides}{where}")
+                yield FormulaFinding(
+                    "wrong", right.start, right.end, f"the sides are {sides}{where}"
+                )
                 return
 
 

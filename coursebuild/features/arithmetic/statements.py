@@ -41,7 +41,7 @@ _OPENING = frozenset(("{", "(", "[", r"\{", r"\begin", r"\langle"))
 _CLOSING = frozenset(("}", ")", "]", r"\}", r"\end", r"\rangle"))
 
 
-class Side(Struct, frozen=True):
+class FormulaSide(Struct, frozen=True):
     """One side of a relation, and where it stands in the TeX."""
 
     start: int
@@ -65,7 +65,7 @@ class Side(Struct, frozen=True):
 class Statement(Struct, frozen=True):
     """Sides with the relations between them: `=`, `≈`, `<` …, or `?` for one of other kinds."""
 
-    sides: tuple[Side, ...]
+    sides: tuple[FormulaSide, ...]
     relations: tuple[str, ...]
 
 
@@ -77,7 +77,7 @@ def read_statements(tex: str) -> tuple[Statement, ...]:
 
 def _statements(tex: str) -> Iterator[Statement]:
     tex = _ENVIRONMENT.sub(lambda found: " " * len(found[0]), tex)
-    sides: list[Side] = []
+    sides: list[FormulaSide] = []
     relations: list[str] = []
     for start, end, sign in _pieces(tex):
         if SPACE.sub("", tex[start:end]).strip("."):
@@ -111,13 +111,13 @@ def _pieces(tex: str) -> Iterator[tuple[int, int, str]]:
     yield start, len(tex), ""
 
 
-def _side(tex: str, start: int, end: int) -> Side:
+def _side(tex: str, start: int, end: int) -> FormulaSide:
     try:
         found = read_expression(tex, start, end)
     except NotUnderstood as reason:
         rest = _WORDS.sub("", tex[start:end])
         numeric = re.search("[0-9]", rest) is not None and re.search("[A-Za-z]", rest) is None
-        return Side(start, end, reason, numeric)
+        return FormulaSide(start, end, reason, numeric)
     symbols = (one.text for one in found.walk() if one.kind == "symbol")
     numeric = all(name in CONSTANTS for name in symbols) and not found.has("derivative", "integral")
-    return Side(start, end, found, numeric)
+    return FormulaSide(start, end, found, numeric)

@@ -24,7 +24,7 @@ _SIZES = {"qpos": "nq", "qvel": "nv", "qacc": "nv", "ctrl": "nu", "act": "na"}
 """Arrays whose length is a size of the model."""
 
 
-class Reference(Struct, frozen=True):
+class NamedPart(Struct, frozen=True):
     """A name with dots in the code of a lab, or an element of what it names."""
 
     path: tuple[str, ...]
@@ -36,13 +36,13 @@ class Reference(Struct, frozen=True):
     """Of all of it, brackets included."""
 
 
-def references(lab: Lab) -> list[Reference]:
+def references(lab: Lab) -> list[NamedPart]:
     """All that the pieces of a lab name outside of themselves."""
     code = dict(lab.code)
     return [one for piece in pieces(lab) for one in _references(code[piece.entry])]
 
 
-def _references(code: Excerpt) -> Iterator[Reference]:
+def _references(code: Excerpt) -> Iterator[NamedPart]:
     written = code.text.encode("utf-8", "replace")
     nodes = list(walk(parse(code.text)))
     own = {text_of(name) for node in nodes for name in _declared(node)}
@@ -60,9 +60,9 @@ def _references(code: Excerpt) -> Iterator[Reference]:
         places = tuple(map(place, parts))
         index = outer.child_by_field_name("index") if outer is not None else None
         if outer is not None and index is not None and text_of(index).isdecimal():
-            yield Reference(path, places, int(text_of(index)), place(outer))
+            yield NamedPart(path, places, int(text_of(index)), place(outer))
         else:
-            yield Reference(path, places)
+            yield NamedPart(path, places)
 
 
 def _declared(node: Node) -> Iterator[Node]:
@@ -81,7 +81,7 @@ def _is_part(node: Node, outer: Node | None) -> bool:
 
 
 def name_diagnostics(
-    named: Sequence[Reference], found: Sequence[dict[str, Any]]
+    named: Sequence[NamedPart], found: Sequence[dict[str, Any]]
 ) -> Iterator[Diagnostic]:
     """What does not exist; `found` is what the engine says of each."""
     for reference, one in zip(named, found, strict=True):

@@ -46,7 +46,7 @@ from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.expressions import Expression
-from coursebuild.features.arithmetic.statements import Side, read_statements
+from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
 
 KINDS = ("bound", "computed", "given")
 """The fields of `Claims` that count what is proven."""
@@ -210,7 +210,7 @@ def _is_address(link: Link) -> bool:
     return isinstance(link.target, UrlTarget) and shown in link.target.url
 
 
-def _is_claim(side: Side, tex: str) -> bool:
+def _is_claim(side: FormulaSide, tex: str) -> bool:
     if not isinstance(side.expression, Expression):
         return side.numeric or _DECIMAL.search(tex, side.start, side.end) is not None
     parts = tuple(side.expression.walk())
