@@ -56,7 +56,8 @@ def courses(*texts: str) -> tuple[Course, Course]:
     """A course of these lessons and the last as a page: whole, and of summaries."""
     parsed = parse_course_map(Source("content/course.toml", MAP))
     assert parsed.value is not None
-    whole = [document(f"content/{i}.md", text) for i, text in enumerate(texts)]
+    read = (document(f"content/{i}.md", text) for i, text in enumerate(texts))
+    whole = [replace(one, summaries=summarize(one, known_mathml({})).value) for one in read]
     kept = [from_store(one) for one in whole]
     return with_documents(parsed.value, whole), with_documents(parsed.value, kept)
 
