@@ -58,8 +58,10 @@ def convert(folder: Path) -> Converted:
             for name in text.source.prerequisites
             if name not in ids
         ]
-    out |= dict(_models(files))
-    out["content/course.toml"] = map_text(course, texts, ids, callouts).encode()
+    packages = dict(_packages(files, texts))
+    out |= {**packages, **dict(_models(files))}
+    toml = map_text(course, texts, ids, callouts, has_packages=bool(packages))
+    out["content/course.toml"] = toml.encode()
     out[".gitignore"] = _IGNORED
     return Converted(dict(sorted(out.items())), (*course.left, *left))
 
@@ -128,6 +130,19 @@ def _lessons(
 def _script_path(text: ImportedText) -> str:
     words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
     return f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
+
+
+def _packages(files: Files, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:
+    """Packages of the course's own that its lessons import, below `src`."""
+    code = "\n".join(segment.text for text in texts for segment in text.segments)
+    imported = set(re.findall(r"^[ \t]*(?:from|import)[ \t]+(\w+)", code, re.MULTILINE))
+    roots = [posixpath.dirname(path) for path in files if path.endswith("/__init__.py")]
+    for root in roots:
+        name = posixpath.basename(root)
+        if name in imported and posixpath.dirname(root) not in roots:
+            for path, file in files.items():
+                if path.startswith(f"{root}/"):
+                    yield f"src/{name}/{path.removeprefix(f'{root}/')}", file.read_bytes()
 
 
 def _models(files: Files) -> Iterator[tuple[str, bytes]]:

@@ -89,9 +89,12 @@ def map_text(
     texts: Sequence[ImportedText],
     ids: Mapping[str, str],
     callouts: Mapping[str, str],
+    *,
+    has_packages: bool,
 ) -> str:
     """The text of `course.toml`; `ids` are those of lessons now, by those that they had."""
-    return "\n".join(_map(course, texts, ids, callouts)) + "\n"
+    packages = ("src",) if has_packages else ()
+    return "\n".join(_map(course, texts, ids, callouts, packages)) + "\n"
 
 
 def _map(
@@ -99,9 +102,12 @@ def _map(
     texts: Sequence[ImportedText],
     ids: Mapping[str, str],
     callouts: Mapping[str, str],
+    packages: tuple[str, ...],
 ) -> Iterator[str]:
     yield "[course]"
-    yield from _fields(title=course.title, summary=course.summary, language=course.language)
+    yield from _fields(
+        title=course.title, summary=course.summary, language=course.language, packages=packages
+    )
     yield from ("", "[verify]", 'compare = "digits"')
     if callouts:
         yield from ("", "[callouts]")
