@@ -29,7 +29,7 @@ Prose of {n} with $x_{n}$ and [the next](lesson:{next}).[^n]
 
 {script}
 > [!note] Remark
-> ![dot](../images/dot.png) and ==more==.
+> ![dot](../images/dot.png) and *more*.
 
 $$
 E = {n}

@@ -1,13 +1,30 @@
 """IMS QTI 2.1: the quizzes as a package for question banks."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 from coursebuild.core.features import Exporter, Feature
-from coursebuild.features.qti.package import package_files
+
+if TYPE_CHECKING:
+    from coursebuild.core.model.results import SiteFile
+    from coursebuild.core.pages.added_files import ExportContext
+    from coursebuild.core.text.diagnostics import Diagnostic
+
+
+def export(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
+    """The files of the package; without quizzes installed it says what is missing."""
+    from coursebuild.features.qti.package import package_files
+
+    return package_files(context)
+
 
 QTI = Exporter(
     name="qti",
     summary="its quizzes as IMS QTI 2.1",
     file="quizzes-qti.zip",
     mark="imsmanifest.xml",
-    make=package_files,
+    make=export,
 )
 FEATURE = Feature(name="qti", needs=("quiz",), exporters=(QTI,))
