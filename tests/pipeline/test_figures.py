@@ -65,6 +65,14 @@ def test_figure_of_a_remembered_run_is_compared(make: Make) -> None:
     assert "the recorded figure differs from this run" in told.out
 
 
+def test_figure_of_a_run_that_the_course_keeps_stays_as_it_was(make: Make) -> None:
+    once = block("line.py", LINE.format(end=9), "drawn True", info="figure=line.svg record=once")
+    folder = make(f"## A line\n\n{once}Figure: ![A line](line.svg)\n")
+    assert folder.run("update", "--long").status == 0
+    checked = folder.run("check")
+    assert checked.status == 0, checked.out
+
+
 def test_scripts_that_draw_under_one_name_do_not_meet(make: Make) -> None:
     other = drawing("other.py", 3)
     folder = make(lesson(9), f"## Other\n\n{other}Figure: ![Another](other/line.svg)\n")
