@@ -15,9 +15,9 @@ from collections.abc import Callable
 from msgspec import Struct
 
 from coursebuild.core.model import Label, Meaning
-from coursebuild.core.syntax.units import check_unit
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt
+from coursebuild.core.text.units import check_unit
 
 Report = Callable[[Diagnostic], None]
 

@@ -1,18 +1,22 @@
 """Units as authors write them: `kg m²`, `N*m/rad`, `mm`.
 
-Entry points: `find_unit(text)`, `pint_registry()`. Units of mechanics are known here. Of others
-Pint is asked, whose import takes longer than a page does to be built.
+Entry points: `find_unit`, how large a unit is; `check_unit`, what is wrong with one, and which was
+likely meant. Units of mechanics are known here. Of others Pint is asked, whose import takes longer
+than a page does to be built.
 """
 
 from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import Any, TypeAlias
 
 from msgspec import Struct
+
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.core.text.source import Excerpt
 
 Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
 """Powers of base quantities, as of length and time, in the order of their names."""
@@ -23,6 +27,30 @@ _BASES = {"m": ("length", 0), "g": ("mass", -3), "s": ("time", 0)}
 _DERIVED = {"N": "kg*m/s^2", "J": "N*m", "W": "J/s", "Pa": "N/m^2", "Hz": "1/s", "rad": "1"}
 _FACTOR = re.compile(r"(^|[*/])(1|[^\W\d_]+)(?:\^\(?(-?\d)\)?)?")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
+
+COMMON = tuple(
+    """
+    m km cm mm μm nm g kg mg s ms μs min h d N kN mN J kJ W kW Pa kPa V mV A mA C F H T K mol Hz kHz
+    rad mrad deg ° % Ω l L °C
+    """.split()
+)
+"""Units of which nothing need be asked, and those that are proposed."""
+_NAMES = {
+    **{"meter": "m", "metre": "m", "second": "s", "gram": "g", "kilogram": "kg", "newton": "N"},
+    **{"joule": "J", "watt": "W", "pascal": "Pa", "radian": "rad", "degree": "°", "hertz": "Hz"},
+    **{"minute": "min", "hour": "h", "kelvin": "K", "volt": "V", "ampere": "A", "percent": "%"},
+}
+_JOINED = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
+"""Units that are often written without the space between them."""
+
+_WORD = r"(?:°C|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰])"
+_POWER = r"(?:\^?(?:[-−]?\d{1,2}|\{[-−]?\d{1,2}\}|\([-−]?\d{1,2}(?:/\d)?\))|[⁻⁰¹²³⁴-⁹]+)"
+_BETWEEN = r"(?: ?[·⋅×*/.] ?| )"
+_WRITTEN = rf"(?:1|{_WORD}{_POWER}?)"
+_PRODUCT = rf"{_WRITTEN}(?:{_BETWEEN}{_WRITTEN})*"
+_GROUP = rf"(?:{_WRITTEN}|\({_PRODUCT}\){_POWER}?)"
+_UNIT = re.compile(rf"{_GROUP}(?:{_BETWEEN}{_GROUP})*")
+_WORDS = re.compile(_WORD)
 
 
 class Unit(Struct, frozen=True):
@@ -80,7 +108,7 @@ def _common(name: str) -> Unit | None:
 
 def _ask_pint(text: str) -> Unit | None:
     try:
-        base = pint_registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
+        base = _registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
         powers = sorted((str(n)[1:-1], Fraction(p)) for n, p in base.dimensionality.items())
         return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
     except Exception:  # what Pint's reader of expressions raises is not said anywhere
@@ -88,10 +116,41 @@ def _ask_pint(text: str) -> Unit | None:
 
 
 @functools.cache
-def pint_registry() -> Any:
+def _registry() -> Any:
     """Pint's units, which take a second to be read."""
     import pint
 
     registry: Any = pint.UnitRegistry(cache_folder=None)
     registry.define("@alias turn = rev")
     return registry
+
+
+def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
+    """What is wrong with a unit, which may be empty."""
+    if len(unit.text) > 100 or not _UNIT.fullmatch(unit.text.strip() or "1"):
+        message = f"`{unit.text.strip()}` cannot be read as a unit"
+        help = "write it as in `kg m^2`, `m/s²` or `N m/rad`"
+        yield diagnose("unit-unknown", unit.span(), message, help=help)
+        return
+    for found in _WORDS.finditer(unit.text):
+        word = found[0].replace("\u2126", "Ω")
+        if word in COMMON or (word != "rads" and _registry().parse_unit_name(word)):
+            continue  # of rads Pint says that they are a dose of radiation
+        likely = _likely(word)
+        help = "leave it out, and say in words what is counted"
+        help = f"did you mean `{likely}`?" if likely else help
+        message = f"there is no unit `{word}`"
+        yield diagnose("unit-unknown", unit.span(*found.span()), message, help=help)
+
+
+def _likely(word: str) -> str:
+    """The unit that a word was likely meant to be; empty where none is like it."""
+    for known in COMMON:
+        if known.casefold() == word.casefold():
+            return known
+    for left in _JOINED:
+        rest = word.removeprefix(left)
+        if rest != word and rest in _JOINED:
+            return f"{left} {rest}"
+    near = nearest(word, (*COMMON, *_NAMES), cutoff=0.7) or ""
+    return _NAMES.get(near, near)

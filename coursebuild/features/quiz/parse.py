@@ -23,10 +23,10 @@ from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
-from coursebuild.core.syntax.units import check_unit
 from coursebuild.core.syntax.wording import JSON
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.units import check_unit
 from coursebuild.features.quiz.keys import QuestionKeys
 from coursebuild.features.quiz.model import (
     AnyQuestion,

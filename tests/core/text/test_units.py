@@ -6,8 +6,8 @@ import json
 import subprocess
 import sys
 
-from coursebuild.core.syntax.units import COMMON, check_unit
 from coursebuild.core.text.source import Excerpt, Source
+from coursebuild.core.text.units import COMMON, check_unit
 
 USUAL = (
     *(
@@ -70,7 +70,7 @@ def test_common_units_are_known_to_pint_which_is_not_asked() -> None:
     assert [unit for unit in COMMON if unit not in registry] == []
     code = (
         "import json, sys\n"
-        "from coursebuild.core.syntax.units import check_unit\n"
+        "from coursebuild.core.text.units import check_unit\n"
         "from coursebuild.core.text.source import Source\n"
         "for unit in json.loads(sys.argv[1]): list(check_unit(Source('a', unit).excerpt()))\n"
         "assert 'pint' not in sys.modules\n"
