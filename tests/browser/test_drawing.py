@@ -10,7 +10,8 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from support.built_sites import Site
-from support.lab_page import lab, watched
+from support.lab_course import PAGE
+from support.lab_page import lab, until, watched
 
 pytestmark = pytest.mark.browser
 
@@ -125,3 +126,23 @@ def test_with_a_graphics_processor_there_are_shadows_too(
         darker = without - np.array(page.evaluate(GREENS, ENDLESS)) > 15
         assert 500 < darker.sum() < 0.2 * darker.size
         assert said == []
+
+
+def test_text_of_plots_has_its_size_on_dense_screens(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    for density in (1, 2, 3):
+        with browsers["plain"].new_context(device_scale_factor=density) as context:
+            context.add_init_script(
+                "const { prototype } = CanvasRenderingContext2D, { fillText } = prototype\n"
+                "window.sizes = new Set()\n"
+                "prototype.fillText = function (...all) {\n"
+                "  window.sizes.add(parseFloat(this.font) / devicePixelRatio)\n"
+                "  return fillText.apply(this, all)\n"
+                "}"
+            )
+            page, _ = watched(context)
+            page.goto(base + PAGE)
+            lab(page, state=None)
+            until(page, "() => sizes.size > 0")
+            assert page.evaluate("[...sizes]") == [12], density

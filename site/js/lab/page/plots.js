@@ -13,7 +13,7 @@ import { spread } from './spread.js'
 
 const HEIGHT = 170 // CSS pixels
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 4], [12, 3]]
-const FONT = 11.5 // CSS pixels
+const FONT = 12 // CSS pixels; whole, since uPlot scales only the digits next to `px`
 const GAP = 6
 const LINEAR = 1 // uPlot's kinds of scales
 const LOGARITHMIC = 3
