@@ -28,8 +28,9 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"core.run"}),
     frozenset({"features"}),
     frozenset({"pipeline"}),
-    frozenset({"preview", "importer"}),
+    frozenset({"preview"}),
     frozenset({"cli"}),
+    frozenset({"features.commands"}),
     frozenset({"__main__"}),
 )
 OUTSIDE = {"__init__", "core.__init__"}
@@ -94,7 +95,12 @@ def part_of(path: Path) -> str:
 
 
 def part(names: tuple[str, ...]) -> str:
-    """The core's folders are parts of their own."""
+    """The core's folders are parts of their own, and so are the commands of features.
+
+    These are imported by name alone, when they are given, so they may import everything.
+    """
+    if names[0] == "features" and names[2:3] == ("commands",):
+        return "features.commands"
     return ".".join(names[: 2 if names[0] == "core" else 1])
 
 

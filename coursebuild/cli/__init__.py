@@ -6,8 +6,8 @@ usage. Heavy imports happen in the command that needs them.
 - `unchanged`: a command with nothing to do, which loads no more than that
 - `running`: memory, and what a command ends with
 - `interrupts`: Ctrl-C and SIGTERM, wherever they come
-- `arguments`: what can be said
-- `commands`: one function for each command
+- `arguments`: what can be said; each command of every course has a module of its own (`build`,
+  `check`, …), and features have further ones
 - `output`: what is written where, and the status that says it too
 """
 

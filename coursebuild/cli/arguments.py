@@ -1,27 +1,35 @@
 """What can be said on the command line.
 
-Entry point: `parser(given)`.
+Entry points: `parser(given)`; `options_of`, what arguments say to every command; and what several
+commands take: `add_lessons`, `add_format` and others.
+
+A command is a name, a summary, and a module with `declare(parser)`, which adds its arguments, and
+`run(arguments)`, which gives the exit status. Features add theirs (`core.features.Command`). Only
+the module of the command that is given is imported.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import importlib
+import os
+from collections.abc import Iterator, Sequence
 
-from coursebuild.cli.commands import (
-    bench_command,
-    build_command,
-    check_command,
-    diet_command,
-    explain_command,
-    export_command,
-    extract_command,
-    import_command,
-    schema_command,
-    serve_command,
-    stability_command,
-    update_command,
-)
+TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
+if TYPE_CHECKING:
+    from coursebuild.pipeline.options import Options
+
+_COMMANDS = {
+    "build": "verify everything and publish the site",
+    "check": "verify, publish nothing",
+    "update": "bring recorded outputs up to date",
+    "extract": "write the scripts to examples/",
+    "serve": "preview: build, serve, rebuild and reload on change",
+    "export": "verify everything and write the course as one file",
+    "explain": "say why something would run again, and what depends on it",
+    "schema": "print a JSON Schema for an editor",
+}
+"""Those of every course, each in the module of its name."""
 
 
 def parser(given: Sequence[str]) -> argparse.ArgumentParser:
@@ -47,238 +55,73 @@ def parser(given: Sequence[str]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(
         title="commands", metavar="COMMAND", required=True, prog=parser.prog
     )
-    for name, summary, function, declare in _COMMANDS:
-        if name not in given:
+    word = _command_word(given)
+    for name, summary, module in _commands(with_features=word not in (*_COMMANDS, "--version")):
+        if name != word:
             commands.add_parser(name, help=summary, add_help=False)
             continue
         command = commands.add_parser(name, help=summary, description=summary, allow_abbrev=False)
-        command.set_defaults(command=function)
-        declare(command)
+        code = importlib.import_module(module)
+        command.set_defaults(command=code.run)
+        code.declare(command)
     return parser
 
 
-# --- what each command takes
+def _command_word(given: Sequence[str]) -> str:
+    """The first word that is no folder behind `-C`; empty where there is none."""
+    before = ("", *given)
+    words = (word for last, word in zip(before, given, strict=False) if last != "-C")
+    return next((word for word in words if word == "--version" or not word.startswith("-")), "")
 
 
-def _build(parser: argparse.ArgumentParser) -> None:
-    _running(parser)
-    parser.add_argument(
-        "--out",
-        default="public",
-        metavar="FOLDER",
-        help="where the site goes, from the course's folder (default: %(default)s)",
-    )
+def _commands(*, with_features: bool) -> Iterator[tuple[str, str, str]]:
+    """Name, summary and module of each command."""
+    for name, summary in _COMMANDS.items():
+        yield name, summary, f"coursebuild.cli.{name}"
+    if with_features:  # which takes longer than all the rest
+        from coursebuild.core.registry import features
+
+        for feature in features():
+            for command in feature.commands:
+                yield command.name, command.summary, command.module
 
 
-def _check(parser: argparse.ArgumentParser) -> None:
-    _running(parser)
-    _lessons(parser)
-    _format(parser, "text", "json", "junit", "sarif", "github")
-    _parts(parser)
-    parser.add_argument(
-        "--executor",
-        metavar="PLACE",
-        default=None,
-        help="run the scripts on a Dask cluster: dask://HOST:PORT",
-    )
-    _long(parser)
-    parser.add_argument(
-        "--sensitivity",
-        action="store_true",
-        help="move initial states by 1e-12, and say which printed digits hold",
-    )
-    parser.add_argument(
-        "--truth",
-        action="store_true",
-        help="list the numbers and the arithmetic that nothing proves",
-    )
-    parser.add_argument(
-        "--against",
-        metavar="VERSION",
-        default=None,
-        help="run the scripts with this version of MuJoCo, and say what it changes",
-    )
+def options_of(arguments: argparse.Namespace) -> Options:
+    """What the arguments say to every command."""
+    from coursebuild.pipeline.options import Options, find_course, open_executor, open_store
+
+    jobs = getattr(arguments, "jobs", None) or available_cores()
+    root = find_course(arguments.root)
+    store = None
+    if hasattr(arguments, "cache"):
+        fresh = arguments.no_cache
+        store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
+    where = getattr(arguments, "executor", None)
+    executor = None if where is None else open_executor(where)
+    quiet, long = getattr(arguments, "quiet", False), getattr(arguments, "long", False)
+    return Options(root, jobs, quiet, store, executor, long)
 
 
-def _update(parser: argparse.ArgumentParser) -> None:
-    _running(parser)
-    _lessons(parser)
-    _long(parser)
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show what would change; write nothing"
-    )
+def available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1
 
 
-def _long(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--long", action="store_true", help="run scripts too that are recorded once"
-    )
+# --- what several commands take
 
 
-def _extract(parser: argparse.ArgumentParser) -> None:
-    _quiet(parser)
-    parser.add_argument(
-        "--adopt",
-        action="store_true",
-        help="bring extracted files that were edited by hand back into their lessons",
-    )
+def add_quiet(parser: argparse.ArgumentParser) -> None:
+    """Whether only what is wrong is printed."""
+    parser.add_argument("--quiet", "-q", action="store_true", help="print only what is wrong")
 
 
-def _serve(parser: argparse.ArgumentParser) -> None:
-    _running(parser)
-    parser.add_argument(
-        "--port",
-        type=_port,
-        default=8000,
-        help="port on 127.0.0.1 (default: %(default)s; 0: any free one)",
-    )
-
-
-def _export(parser: argparse.ArgumentParser) -> None:
-    from coursebuild.core.registry import features
-
-    _running(parser)
-    known = [exporter for feature in features() for exporter in feature.exporters]
-    offers = ", ".join(f"{one.name} ({one.summary})" for one in known)
-    files = ", ".join(one.file for one in known)
-    parser.add_argument(
-        "name", metavar="NAME", help=f"{offers}, or what a feature of the course itself can write"
-    )
-    parser.add_argument(
-        "--out",
-        default=None,
-        metavar="FILE",
-        help=f"from the course's folder (default: {files})",
-    )
-
-
-def _import(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Write a course of another tool as one of coursebuild: a course.json with Markdown, "
-        "Jupyter notebooks, MyST or Quarto. Its folder is only read."
-    )
-    _running(parser)
-    parser.add_argument("folder", metavar="FOLDER", help="what to import")
-    parser.add_argument(
-        "--out",
-        default=None,
-        metavar="FOLDER",
-        help="where the new course goes (default: a folder of the same name here)",
-    )
-
-
-def _explain(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Say whether a script or lab would run again and why, and what depends on it."
-    )
-    parser.set_defaults(quiet=False)
-    parser.add_argument(
-        "path",
-        metavar="PATH",
-        help="a script, lab, lesson, page, model, or any file of the project",
-    )
-    _format(parser, "text", "json")
-
-
-def _bench(parser: argparse.ArgumentParser) -> None:
-    _quiet(parser)
-    parser.add_argument(
-        "scenes", nargs="*", metavar="SCENE", help="a model, as in models/SCENE.xml (default: all)"
-    )
-    _format(parser, "text", "json")
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer settings and rough times, for a first look"
-    )
-    parser.add_argument(
-        "--plot",
-        metavar="FILE.svg",
-        default=None,
-        help="draw error against cost; of several scenarios each into a file of its own",
-    )
-    _recorded(parser)
-    _cache(parser)
-
-
-def _stability(parser: argparse.ArgumentParser) -> None:
-    _quiet(parser)
-    parser.add_argument(
-        "problems", nargs="*", metavar="PROBLEM", help="a hard case or a family (default: all)"
-    )
-    _format(parser, "text", "json")
-    _recorded(parser)
-    _cache(parser)
-
-
-def _diet(parser: argparse.ArgumentParser) -> None:
-    _quiet(parser)
-    parser.add_argument(
-        "models", nargs="*", metavar="MODEL", help="a file of models/ (default: all)"
-    )
-    writes = parser.add_mutually_exclusive_group()
-    writes.add_argument(
-        "--fix", action="store_true", help="change what leaves every bit of the motion as it is"
-    )
-    writes.add_argument(
-        "--record", action="store_true", help="write what was found to content/reports/"
-    )
-    parser.add_argument("--quick", action="store_true", help="short runs, rough times")
-    _format(parser, "text", "json")
-    _cache(parser)
-
-
-def _schema(parser: argparse.ArgumentParser) -> None:
-    parser.description = None
-    parser.add_argument("name", metavar="NAME", help="lab, course, model, or of a feature, as quiz")
-
-
-_COMMANDS = (
-    ("build", "verify everything and publish the site", build_command, _build),
-    ("check", "verify, publish nothing", check_command, _check),
-    ("update", "bring recorded outputs up to date", update_command, _update),
-    ("extract", "write the scripts to examples/", extract_command, _extract),
-    ("serve", "preview: build, serve, rebuild and reload on change", serve_command, _serve),
-    (
-        "export",
-        "verify everything and write the course as one file",
-        export_command,
-        _export,
-    ),
-    ("import", "make a course of one that was written for another tool", import_command, _import),
-    (
-        "explain",
-        "say why something would run again, and what depends on it",
-        explain_command,
-        _explain,
-    ),
-    ("bench", "measure speed against error of the course's models", bench_command, _bench),
-    ("stability", "measure MuJoCo on hard cases, beside theory", stability_command, _stability),
-    ("diet", "say what models hold that their scenarios do not need", diet_command, _diet),
-    ("schema", "print a JSON Schema for an editor", schema_command, _schema),
-)
-
-
-# --- what several take
-
-
-def _recorded(parser: argparse.ArgumentParser) -> None:
-    """What is done with reports in the course's folder."""
-    group = parser.add_mutually_exclusive_group()
-    group.add_argument(
-        "--record", action="store_true", help="write what was measured into content/reports/"
-    )
-    group.add_argument(
-        "--check",
-        action="store_true",
-        help="measure again, and fail where a figure is not as recorded; times never are compared",
-    )
-
-
-def _cache(parser: argparse.ArgumentParser) -> None:
+def add_cache(parser: argparse.ArgumentParser) -> None:
     """What is done with results that were made before."""
     parser.add_argument(
         "--cache",
         metavar="PLACE",
-        default=None,
         help="share results at a folder or an URL such as s3://… (default: $COURSEBUILD_CACHE)",
     )
     parser.add_argument(
@@ -288,65 +131,22 @@ def _cache(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--cache-size",
-        default=None,
         metavar="SIZE",
         help="what .coursebuild may take, such as 500M (default: $COURSEBUILD_CACHE_SIZE, or 1G)",
     )
 
 
-def _quiet(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--quiet", "-q", action="store_true", help="print only what is wrong")
-
-
-def _running(parser: argparse.ArgumentParser) -> None:
+def add_running(parser: argparse.ArgumentParser) -> None:
     """What commands take that run scripts."""
-    _quiet(parser)
+    add_quiet(parser)
     parser.add_argument(
         "--jobs",
         "-j",
         type=_jobs,
-        default=None,
         metavar="N",
         help="scripts at a time (default: one a core)",
     )
-    _cache(parser)
-
-
-def _lessons(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "lessons",
-        nargs="*",
-        metavar="LESSON",
-        help="id, slug or file of a lesson or page (default: all)",
-    )
-
-
-def _format(parser: argparse.ArgumentParser, *formats: str) -> None:
-    said = "(default: %(default)s)"
-    parser.add_argument(
-        "--format",
-        choices=formats,
-        default="text",
-        help=f"how to print what was found {said}" if len(formats) > 2 else said,
-    )
-
-
-def _parts(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--shard",
-        metavar="I/N",
-        help="run only the I-th of N parts of the scripts and labs, for several machines",
-    )
-    parser.add_argument(
-        "--timings",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="how long each takes, so that the parts take equally long; the same for each part",
-    )
-    parser.add_argument(
-        "--write-timings", metavar="FILE", help="write how long each takes into this file"
-    )
+    add_cache(parser)
 
 
 def _jobs(text: str) -> int:
@@ -355,7 +155,29 @@ def _jobs(text: str) -> int:
     return int(text)
 
 
-def _port(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is no port: a whole number from 0 to 65535")
-    return int(text)
+def add_lessons(parser: argparse.ArgumentParser) -> None:
+    """The lessons and pages that a command is about."""
+    parser.add_argument(
+        "lessons",
+        nargs="*",
+        metavar="LESSON",
+        help="id, slug or file of a lesson or page (default: all)",
+    )
+
+
+def add_long(parser: argparse.ArgumentParser) -> None:
+    """What is done with scripts of which the course keeps a run."""
+    parser.add_argument(
+        "--long", action="store_true", help="run scripts too that are recorded once"
+    )
+
+
+def add_format(parser: argparse.ArgumentParser, *formats: str) -> None:
+    """The formats of what is printed."""
+    said = "(default: %(default)s)"
+    parser.add_argument(
+        "--format",
+        choices=formats,
+        default="text",
+        help=f"how to print what was found {said}" if len(formats) > 2 else said,
+    )

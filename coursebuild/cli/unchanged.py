@@ -1,6 +1,6 @@
 """A command with nothing to do: known before its arguments are read.
 
-Entry points: `said_before`, what it says then; `command_of`, the name under which that is kept.
+Entry points: `said_before`, what it says then; `run_unless_unchanged`, which keeps that.
 
 It goes by the arguments as they were given, and by what else decides what is printed. To read
 arguments takes longer than to look at the files of a course; a command that is spelled in another
@@ -12,13 +12,17 @@ from __future__ import annotations
 import os
 import sys
 
-from coursebuild.cli.output import look
+from coursebuild.cli.output import look, print_report, report_text
 from coursebuild.core.engine.up_to_date import unchanged
 from coursebuild.core.files.course_root import find_course_root
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    import argparse
+    from collections.abc import Callable, Sequence
+
+    from coursebuild.pipeline.options import Options
+    from coursebuild.report import Report
 
 COMMANDS = ("build", "check")
 """Those that may have nothing to do."""
@@ -29,7 +33,7 @@ _VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_SIZE")
 
 def said_before(given: Sequence[str]) -> str | None:
     """What this command said when all was as it is now; `None` where that is not known."""
-    command = command_of(given)
+    command = _command_of(given)
     if command is None or _ALL_ANEW in given:
         return None
     try:
@@ -39,7 +43,35 @@ def said_before(given: Sequence[str]) -> str | None:
         return None
 
 
-def command_of(given: Sequence[str]) -> tuple[str, ...] | None:
+def run_unless_unchanged(
+    arguments: argparse.Namespace,
+    name: str,
+    made: tuple[str, ...],
+    work: Callable[[Options], Report],
+) -> int:
+    """Do the work; where all is well, the same command has nothing to do as long as all stays so.
+
+    `made` is what the command leaves behind.
+    """
+    from coursebuild.cli.arguments import options_of
+    from coursebuild.core.engine.up_to_date import Watcher
+
+    options = options_of(arguments)
+    command = _command_of(arguments.given)
+    watcher = None if command is None else Watcher(str(options.root), command)
+    report = work(options)
+    status = print_report(report, "text", options)
+    if watcher is not None and report.ok and report.depends is not None:
+        from coursebuild.core.registry import package_paths
+        from coursebuild.report import unchanged_report
+
+        remark = f"nothing has changed since the last {name}"
+        said = report_text(unchanged_report(report, remark), options)
+        watcher.keep(said, (*report.depends, *package_paths()), made)
+    return status
+
+
+def _command_of(given: Sequence[str]) -> tuple[str, ...] | None:
     """The name of a command; `None` where it always works.
 
     Which course is meant is no part of it, since what was said is kept there.

@@ -1,7 +1,7 @@
 """The interface of features: how kinds of fences and pages, files of a site and exports enter.
 
 Entry point: `Feature`, with `FenceKind`, `PageKind`, `ModelPart`, `PagePart`, `PageCopy`,
-`Trials` and `Exporter`, which say what a feature has.
+`Trials`, `Exporter` and `Command`, which say what a feature has.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
@@ -233,6 +233,18 @@ class Exporter(Struct, frozen=True, kw_only=True):
     """Whether it is a ZIP archive; if not, `make` gives one file."""
 
 
+class Command(Struct, frozen=True, kw_only=True):
+    """A command: `coursebuild NAME`."""
+
+    name: str
+    summary: str
+    """What it does, in a few words for `coursebuild --help`."""
+    module: str
+    """The module of its `declare(parser)`, which adds arguments, and of its `run(arguments)`, which
+    gives the exit status. It is imported when the command is given, and may import all of
+    coursebuild: a feature lies below the commands, and what it does for one above."""
+
+
 class Trial(Struct, frozen=True):
     """Something of a course that is tried when the course is verified."""
 
@@ -336,3 +348,5 @@ class Feature(Struct, frozen=True, kw_only=True):
     """Further files of the site."""
     exporters: tuple[Exporter, ...] = ()
     """What `coursebuild export` can write."""
+    commands: tuple[Command, ...] = ()
+    """Further commands, if it is installed: one that a course brings itself has none."""

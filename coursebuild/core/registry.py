@@ -48,6 +48,8 @@ _FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
 """Folders of every site."""
 CORE_FENCES = ("mjcf", "python", "text")
 """The kinds of fences that the core reads."""
+CORE_COMMANDS = ("build", "check", "update", "extract", "serve", "export", "explain", "schema")
+"""The commands of every course, in the order in which they are named."""
 
 _INSTALLED_BY = {
     "bench": "coursebuild with its recorded reports",
@@ -108,7 +110,11 @@ def clash(added: Feature, known: Iterable[Feature]) -> str:
     if odd:
         return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
     exporters = _exporter_names((added,)) & _exporter_names(known)
-    return f"there is an export `{min(exporters)}` already" if exporters else ""
+    if exporters:
+        return f"there is an export `{min(exporters)}` already"
+    commands = {*CORE_COMMANDS, *(command.name for each in known for command in each.commands)}
+    twice = [command.name for command in added.commands if command.name in commands]
+    return f"there is a command `{twice[0]}` already" if twice else ""
 
 
 def fence_kind(name: str) -> FenceKind[Any] | None:

@@ -30,7 +30,7 @@ from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure
 from coursebuild.core.text.diagnostics import Severity
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, UsageError, select
+from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import extract_scripts, run
@@ -186,13 +186,3 @@ class _Work(Struct):
             ModelLine(path, line, mjcf.readable_error(result.error))
             for (path, line), result in zip(places, (*there, *parts), strict=True)
         )
-
-
-def forbid(given: bool, what: str) -> None:
-    """Say that something cannot be combined with `--against`.
-
-    Raises:
-        UsageError: it was given.
-    """
-    if given:
-        raise UsageError(f"--against cannot be combined with {what}")

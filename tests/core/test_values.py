@@ -97,7 +97,7 @@ class Trap(enum.Enum):
         ("coursebuild.core.text.source:Source.span", [1]),
         ("coursebuild.core.values:decode", [b""]),
         ("coursebuild.features.__main__:x", []),
-        ("coursebuild.cli.commands:build_command", [1]),
+        ("coursebuild.cli.build:run", [1]),
         ("no.such.module:X", []),
         ("coursebuild.core.model.blocks:NoSuch", []),
         ("coursebuild.core.model.blocks:Heading", []),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from support.axe import violations
-from support.scratch_course import ROOT, Done, Folder
+from support.scratch_course import GOOD, ROOT, Done, Folder
 from support.static_host import Host
 
 pytestmark = pytest.mark.site
@@ -109,6 +110,29 @@ def test_an_edit_of_an_installed_feature_is_seen(
     script.write_text(script.read_text().replace('class="tab-title"', 'class="tab-title new"'))
     assert run(folder, copied, "build").status == 0
     assert '<p class="tab-title new">' in folder.text(PAGE)
+
+
+def test_example_of_the_docs_adds_a_command(tmp_path: Path, stores: Path) -> None:
+    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    folder, package = Folder(tmp_path / "a course"), tmp_path / "coursebuild_slowest"
+    folder.fill([GOOD], stores)
+    package.mkdir()
+    for name in ("__init__", "commands"):
+        start = page.index(f"`coursebuild_slowest/{name}.py`")
+        code = page[start:].split("```python\n")[1].split("```")[0]
+        (package / f"{name}.py").write_text(code)
+    described = tmp_path / "coursebuild_slowest-1.dist-info"
+    described.mkdir()
+    (described / "METADATA").write_text("Name: coursebuild-slowest\nVersion: 1\n")
+    points = described / "entry_points.txt"
+    points.write_text("[coursebuild.features]\nslowest = coursebuild_slowest:FEATURE\n")
+    assert "list the scripts that took longest" in run(folder, tmp_path, "--help").out
+    done = run(folder, tmp_path, "slowest", "--count", "1")
+    assert done.status == 0
+    assert re.fullmatch(r" +\d+\.\d\d s  examples/hello\.py\n", done.out)
+    code = (package / "__init__.py").read_text()
+    (package / "__init__.py").write_text(code.replace('name="slowest"', 'name="check"', 1))
+    assert "there is a command `check` already" in run(folder, tmp_path, "--help").err
 
 
 @pytest.mark.parametrize(

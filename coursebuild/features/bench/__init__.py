@@ -7,7 +7,7 @@ a scenario as the page of the model does.
 
 from __future__ import annotations
 
-from coursebuild.core.features import Feature, FenceKind, ModelPart
+from coursebuild.core.features import Command, Feature, FenceKind, ModelPart
 from coursebuild.features.bench.checks import check_benches, check_keyframes
 from coursebuild.features.bench.measured import draw_measured, measured_facts, measured_view
 from coursebuild.features.bench.model import Bench
@@ -29,4 +29,16 @@ FEATURE = Feature(
     model_part=ModelPart(facts=measured_facts, values=measured_view, draw=draw_measured),
     check=check_benches,
     check_models=check_keyframes,
+    commands=(
+        Command(
+            name="bench",
+            summary="measure speed against error of the course's models",
+            module="coursebuild.features.bench.commands.bench",
+        ),
+        Command(
+            name="diet",
+            summary="say what models hold that their scenarios do not need",
+            module="coursebuild.features.bench.commands.diet",
+        ),
+    ),
 )

@@ -3,7 +3,7 @@
 There is such a page where hard cases are recorded.
 """
 
-from coursebuild.core.features import Feature, PageKind
+from coursebuild.core.features import Command, Feature, PageKind
 from coursebuild.features.numerics.page import numerics_values
 
 FEATURE = Feature(
@@ -15,6 +15,13 @@ FEATURE = Feature(
             values=numerics_values,
             exists=lambda library: bool(library.reports.cases),
             order=40,
+        ),
+    ),
+    commands=(
+        Command(
+            name="stability",
+            summary="measure MuJoCo on hard cases, beside theory",
+            module="coursebuild.features.numerics.commands",
         ),
     ),
 )

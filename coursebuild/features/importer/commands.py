@@ -1,16 +1,22 @@
-"""The scripts of an imported course, each run once: what their fences need, and what they print.
+"""`coursebuild import`: convert, write, try, check.
 
-Entry point: `try_scripts`.
+Each script of the new course is run once, which shows what its fence needs and what it prints.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
+import os
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from msgspec.structs import replace
 
+from coursebuild.cli.arguments import add_running, available_cores
+from coursebuild.cli.output import print_report
+from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course, Recording, Script
 from coursebuild.core.model.results import Outcome, ScriptRun, Sign
@@ -18,11 +24,17 @@ from coursebuild.core.scripts.edit import apply_edits, updated_body
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.importer.blocks import plain_fence
+from coursebuild.features.importer.blocks import plain_fence
+from coursebuild.features.importer.convert import convert, write_course
+from coursebuild.features.importer.values import Leftover
+from coursebuild.pipeline.check import check
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.options import Options, open_store
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs, run
+from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
+from coursebuild.pipeline.scripts import run as run_scripts
+from coursebuild.report import Report
+from coursebuild.report.values import plural
 
 _LONGEST = 900.0
 """Seconds that a script may take that was not through after the usual time."""
@@ -31,7 +43,62 @@ _ROOM = 3.0
 _MISSING = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
 
 
-def try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    parser.description = (
+        "Write a course of another tool as one of coursebuild: a course.json with Markdown, "
+        "Jupyter notebooks, MyST or Quarto. Its folder is only read."
+    )
+    add_running(parser)
+    parser.add_argument("folder", metavar="FOLDER", help="what to import")
+    parser.add_argument(
+        "--out",
+        metavar="FOLDER",
+        help="where the new course goes (default: a folder of the same name here)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Make a course of one that was written for another tool."""
+    if arguments.root is not None:
+        raise UsageError("import takes no -C: the new course's folder is named by --out")
+    source = Path(arguments.folder)
+    out = Path(arguments.out or source.resolve().name).absolute()
+    store = open_store(
+        out, arguments.cache, arguments.cache_size, os.environ, fresh=arguments.no_cache
+    )
+    options = Options(out, arguments.jobs or available_cores(), arguments.quiet, store)
+    return print_report(_import_course(source, options), "text", options)
+
+
+def _import_course(source: Path, options: Options) -> Report:
+    """Write the course in a folder as one of coursebuild to that of the options, and check it.
+
+    Raises:
+        UsageError: there is nothing to import, or the new folder is not empty enough.
+    """
+    converted = convert(source)
+    write_course(converted, options.root, source)
+    progress = Progress(quiet=options.quiet)
+    proposed = _try_scripts(options, progress)
+    report = check(options)
+    remarks = (
+        f"wrote {plural(len(converted.files), 'file')} to {options.root}",
+        *proposed,
+        *(_said(one) for one in converted.left),
+    )
+    return replace(report, remarks=(*remarks, *report.remarks), depends=None)
+
+
+def _said(left: Leftover) -> str:
+    place = f", {left.place}" if left.place else ""
+    return f"left: {left.path}{place}: {left.what}"
+
+
+# --- scripts
+
+
+def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
     """Run each script and write into the lessons what that showed; what fences got, in words."""
     course = load(options.root).course
     if course is None:
@@ -61,10 +128,12 @@ def _runs(
     scripts: Sequence[Extraction], options: Options, progress: Progress
 ) -> list[tuple[Extraction, ScriptRun]]:
     """The runs of scripts; of those that took too long with more time."""
-    runs = list(zip(scripts, run(scripts, options, progress), strict=True))
+    runs = list(zip(scripts, run_scripts(scripts, options, progress), strict=True))
     slow = [extraction for extraction, done in runs if done.outcome is Outcome.TIMEOUT]
     patient = [replace(e, script=replace(e.script, timeout=_LONGEST)) for e in slow]
-    again = {done.path: done for done in run(patient, options, progress, "running slow scripts")}
+    again = {
+        done.path: done for done in run_scripts(patient, options, progress, "running slow scripts")
+    }
     return [(extraction, again.get(extraction.path, done)) for extraction, done in runs]
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.cli import main
-from coursebuild.importer.convert import convert
+from coursebuild.features.importer.convert import convert
 
 HERE = Path(__file__).parent
 CASES = sorted(path.parent.name for path in HERE.glob("*/source"))

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from urllib.parse import unquote, urlsplit
 
-from coursebuild.importer.values import Leftover, stem_of
+from coursebuild.features.importer.values import Leftover, stem_of
 
 
 class LessonContext:

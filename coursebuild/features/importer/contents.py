@@ -15,7 +15,7 @@ from typing import Any
 from msgspec import Struct
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.importer.values import (
+from coursebuild.features.importer.values import (
     TEXTS,
     Files,
     SourceCourse,

@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from coursebuild.importer.values import Segment, read_yaml
+from coursebuild.features.importer.values import Segment, read_yaml
 
 _OPENING = re.compile(r"( {0,3})(`{3,}|~{3,}|:{3,})[ \t]*(.*?)[ \t]*")
 _ADMONITION = re.compile(r"(?:!!!|\?\?\?\+?)[ \t]+(.*\S)[ \t]*")

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.importer.lesson import read_segments
-from coursebuild.importer.values import (
+from coursebuild.features.importer.lesson import read_segments
+from coursebuild.features.importer.values import (
     Files,
     Segment,
     SourceCourse,

@@ -13,8 +13,8 @@ import itertools
 import re
 from collections.abc import Sequence
 
-from coursebuild.importer.context import LessonContext
-from coursebuild.importer.values import Segment
+from coursebuild.features.importer.context import LessonContext
+from coursebuild.features.importer.values import Segment
 
 _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
 """Of Quarto, and of MyST."""

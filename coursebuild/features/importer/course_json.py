@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.importer.values import (
+from coursebuild.features.importer.values import (
     Files,
     Leftover,
     SourceCourse,

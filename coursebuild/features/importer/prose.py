@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.importer.context import LessonContext
-from coursebuild.importer.values import name_of
+from coursebuild.features.importer.context import LessonContext
+from coursebuild.features.importer.values import name_of
 
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"

@@ -14,13 +14,20 @@ from msgspec import Struct
 
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.write import write_atomic
-from coursebuild.importer.contents import read_contents
-from coursebuild.importer.context import LessonContext
-from coursebuild.importer.course_json import read_course_json
-from coursebuild.importer.course_map import ImportedText, map_text, texts_of
-from coursebuild.importer.lesson import lesson_text
-from coursebuild.importer.prose import labels
-from coursebuild.importer.values import TEXTS, Files, Leftover, SourceCourse, files_of, stem_of
+from coursebuild.features.importer.contents import read_contents
+from coursebuild.features.importer.context import LessonContext
+from coursebuild.features.importer.course_json import read_course_json
+from coursebuild.features.importer.course_map import ImportedText, map_text, texts_of
+from coursebuild.features.importer.lesson import lesson_text
+from coursebuild.features.importer.prose import labels
+from coursebuild.features.importer.values import (
+    TEXTS,
+    Files,
+    Leftover,
+    SourceCourse,
+    files_of,
+    stem_of,
+)
 
 _IGNORED = b"public/\nexamples/\n.coursebuild/\n"
 

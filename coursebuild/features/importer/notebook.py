@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.importer.segments import read_markdown
-from coursebuild.importer.values import Segment
+from coursebuild.features.importer.segments import read_markdown
+from coursebuild.features.importer.values import Segment
 
 
 def read_notebook(text: str, name: str) -> tuple[list[Segment], dict[str, bytes]]:

@@ -1,15 +1,26 @@
 """`coursebuild import FOLDER`: a course of another tool becomes one of coursebuild.
 
-Entry point: `import_course` (`importer.write`).
-
 1. The folder's map says which lessons there are: a `course.json`, the table of contents of Jupyter
    Book, MyST or Quarto, or the files themselves (`course_json`, `contents`).
 2. Each lesson is read as segments: prose, fences and cells of code (`segments`, `notebook`).
 3. What differs between the dialects is written as coursebuild reads it (`prose`, `blocks`,
    `cells`).
 4. The course is written to a new folder, each script runs once, and says by that which keys its
-   fence needs (`trial`). Then all of it is checked.
+   fence needs (`commands`). Then all of it is checked.
 
 What has no counterpart is listed with its place, and never dropped in silence. The folder itself is
 only read.
 """
+
+from coursebuild.core.features import Command, Feature
+
+FEATURE = Feature(
+    name="importer",
+    commands=(
+        Command(
+            name="import",
+            summary="make a course of one that was written for another tool",
+            module="coursebuild.features.importer.commands",
+        ),
+    ),
+)

@@ -9,12 +9,12 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from coursebuild.importer.blocks import block_text, plain_fence
-from coursebuild.importer.cells import script_of, shown_text
-from coursebuild.importer.context import LessonContext
-from coursebuild.importer.notebook import read_notebook
-from coursebuild.importer.segments import front_matter, read_markdown, split_title
-from coursebuild.importer.values import Segment, read_text
+from coursebuild.features.importer.blocks import block_text, plain_fence
+from coursebuild.features.importer.cells import script_of, shown_text
+from coursebuild.features.importer.context import LessonContext
+from coursebuild.features.importer.notebook import read_notebook
+from coursebuild.features.importer.segments import front_matter, read_markdown, split_title
+from coursebuild.features.importer.values import Segment, read_text
 
 
 def read_segments(path: Path, name: str) -> tuple[str, list[Segment], dict[str, bytes]]:

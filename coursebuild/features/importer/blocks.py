@@ -10,11 +10,11 @@ import json
 import re
 from collections.abc import Mapping
 
-from coursebuild.importer.cells import shown_text
-from coursebuild.importer.context import LessonContext
-from coursebuild.importer.prose import displayed, rewrite
-from coursebuild.importer.segments import read_markdown
-from coursebuild.importer.values import Segment, read_yaml
+from coursebuild.features.importer.cells import shown_text
+from coursebuild.features.importer.context import LessonContext
+from coursebuild.features.importer.prose import displayed, rewrite
+from coursebuild.features.importer.segments import read_markdown
+from coursebuild.features.importer.values import Segment, read_yaml
 
 _CALLOUTS = {
     **{kind: kind for kind in ("note", "tip", "important", "warning", "caution", "try")},

@@ -1,0 +1,112 @@
+"""`coursebuild check`: verify, publish nothing."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from coursebuild.cli.arguments import add_format, add_lessons, add_long, add_running, options_of
+from coursebuild.cli.output import CLEAN, print_report, style_of, write
+from coursebuild.cli.unchanged import run_unless_unchanged
+
+TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
+if TYPE_CHECKING:
+    from coursebuild.pipeline.options import Options
+    from coursebuild.report import Report
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_running(parser)
+    add_lessons(parser)
+    add_format(parser, "text", "json", "junit", "sarif", "github")
+    parser.add_argument(
+        "--shard",
+        metavar="I/N",
+        help="run only the I-th of N parts of the scripts and labs, for several machines",
+    )
+    parser.add_argument(
+        "--timings",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="how long each takes, so that the parts take equally long; the same for each part",
+    )
+    parser.add_argument(
+        "--write-timings", metavar="FILE", help="write how long each takes into this file"
+    )
+    parser.add_argument(
+        "--executor",
+        metavar="PLACE",
+        help="run the scripts on a Dask cluster: dask://HOST:PORT",
+    )
+    add_long(parser)
+    parser.add_argument(
+        "--sensitivity",
+        action="store_true",
+        help="move initial states by 1e-12, and say which printed digits hold",
+    )
+    parser.add_argument(
+        "--truth",
+        action="store_true",
+        help="list the numbers and the arithmetic that nothing proves",
+    )
+    parser.add_argument(
+        "--against",
+        metavar="VERSION",
+        help="run the scripts with this version of MuJoCo, and say what it changes",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Tell what is wrong."""
+    if arguments.against is not None:
+        return _against(arguments)
+
+    def work(options: Options) -> Report:
+        from coursebuild.pipeline.check import check
+        from coursebuild.pipeline.shards import read_shard
+
+        return check(
+            options,
+            tuple(arguments.lessons),
+            shard=read_shard(arguments.shard, arguments.timings),
+            timings=arguments.write_timings,
+            sensitivity=arguments.sensitivity,
+            truth=arguments.truth,
+        )
+
+    # Machines are told how long it took.
+    parts = arguments.shard or arguments.timings or arguments.write_timings
+    more = arguments.sensitivity or arguments.truth or arguments.long
+    if arguments.format != "text" or parts or more:
+        options = options_of(arguments)
+        return print_report(work(options), arguments.format, options)
+    return run_unless_unchanged(arguments, "check", ("examples",), work)
+
+
+def _against(arguments: argparse.Namespace) -> int:
+    """Tell what the scripts do with another version of MuJoCo; no difference is a mistake."""
+    from coursebuild.core.files.errors import UsageError
+    from coursebuild.pipeline.against import against
+    from coursebuild.report.against import against_json, against_text
+
+    for given, what in (
+        (arguments.format not in ("text", "json"), f"--format {arguments.format}"),
+        (arguments.executor, "--executor"),
+        (arguments.shard, "--shard"),
+        (arguments.timings, "--timings"),
+        (arguments.write_timings, "--write-timings"),
+        (arguments.sensitivity, "--sensitivity"),
+        (arguments.truth, "--truth"),
+    ):
+        if given:
+            raise UsageError(f"--against cannot be combined with {what}")
+    options = options_of(arguments)
+    try:
+        report = against(options, tuple(arguments.lessons), arguments.against)
+    finally:
+        options.store.close()
+    if arguments.format == "json":
+        return write(against_json(report), CLEAN)
+    return write(against_text(report, style_of(sys.stdout), quiet=options.quiet), CLEAN)

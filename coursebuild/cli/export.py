@@ -1,0 +1,32 @@
+"""`coursebuild export`: write the course as one file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from coursebuild.cli.arguments import add_running, options_of
+from coursebuild.cli.output import print_report
+from coursebuild.core.registry import features
+from coursebuild.pipeline.export import export
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_running(parser)
+    known = [exporter for feature in features() for exporter in feature.exporters]
+    offers = ", ".join(f"{one.name} ({one.summary})" for one in known)
+    files = ", ".join(one.file for one in known)
+    parser.add_argument(
+        "name", metavar="NAME", help=f"{offers}, or what a feature of the course itself can write"
+    )
+    parser.add_argument(
+        "--out", metavar="FILE", help=f"from the course's folder (default: {files})"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the course in a form that a feature knows."""
+    options = options_of(arguments)
+    out = Path(arguments.out) if arguments.out else None
+    return print_report(export(options, arguments.name, out), "text", options)

@@ -1,0 +1,25 @@
+"""`coursebuild extract`: write the scripts to `examples/`."""
+
+from __future__ import annotations
+
+import argparse
+
+from coursebuild.cli.arguments import add_quiet, options_of
+from coursebuild.cli.output import print_report
+from coursebuild.pipeline.extract import extract
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_quiet(parser)
+    parser.add_argument(
+        "--adopt",
+        action="store_true",
+        help="bring extracted files that were edited by hand back into their lessons",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the scripts, or take over what was edited."""
+    options = options_of(arguments)
+    return print_report(extract(options, adopt=arguments.adopt), "text", options)

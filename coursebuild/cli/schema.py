@@ -1,0 +1,22 @@
+"""`coursebuild schema`: print a JSON Schema for an editor."""
+
+from __future__ import annotations
+
+import argparse
+
+from coursebuild.cli.output import CLEAN, USAGE, fail, write
+from coursebuild.core.syntax.schemas import json_schema, schema_roots
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    parser.description = None
+    parser.add_argument("name", metavar="NAME", help="lab, course, model, or of a feature, as quiz")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print what the course's files may hold."""
+    names = sorted(schema_roots())
+    if arguments.name not in names:
+        return fail(USAGE, f"there is no schema {arguments.name!r}: choose from {', '.join(names)}")
+    return write(json_schema(arguments.name).decode(), CLEAN)

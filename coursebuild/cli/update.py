@@ -1,0 +1,26 @@
+"""`coursebuild update`: bring recorded outputs up to date."""
+
+from __future__ import annotations
+
+import argparse
+
+from coursebuild.cli.arguments import add_lessons, add_long, add_running, options_of
+from coursebuild.cli.output import print_report
+from coursebuild.pipeline.update import update
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_running(parser)
+    add_lessons(parser)
+    add_long(parser)
+    parser.add_argument(
+        "--dry-run", action="store_true", help="show what would change; write nothing"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Record anew what scripts print."""
+    options = options_of(arguments)
+    report = update(options, tuple(arguments.lessons), dry_run=arguments.dry_run)
+    return print_report(report, "text", options)

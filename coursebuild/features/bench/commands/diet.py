@@ -1,0 +1,48 @@
+"""`coursebuild diet`: what models hold that their scenarios do not need."""
+
+from __future__ import annotations
+
+import argparse
+
+from msgspec.structs import replace
+
+from coursebuild.cli.arguments import add_cache, add_format, add_quiet
+from coursebuild.cli.output import CLEAN
+from coursebuild.features.bench.commands import measured, write_measured
+from coursebuild.pipeline.diet import diet
+from coursebuild.report.diet import diet_text, diet_values
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_quiet(parser)
+    parser.add_argument(
+        "models", nargs="*", metavar="MODEL", help="a file of models/ (default: all)"
+    )
+    writes = parser.add_mutually_exclusive_group()
+    writes.add_argument(
+        "--fix", action="store_true", help="change what leaves every bit of the motion as it is"
+    )
+    writes.add_argument(
+        "--record", action="store_true", help="write what was found to content/reports/"
+    )
+    parser.add_argument("--quick", action="store_true", help="short runs, rough times")
+    add_format(parser, "text", "json")
+    add_cache(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Look at models, and mend them or record what was found."""
+    how = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
+    found = measured(arguments, lambda options: diet(options, tuple(arguments.models), **how))
+    if arguments.quiet and arguments.format == "text":
+        if found.ok:
+            return CLEAN
+        found = replace(found, reports=tuple(one for one in found.reports if not one.ok))
+    return write_measured(
+        arguments,
+        found,
+        lambda style: diet_text(found.reports, style),
+        diet_values(found.reports),
+        empty="there is no model to look at\n",
+    )

@@ -1,0 +1,42 @@
+"""`coursebuild stability`: MuJoCo on hard cases, beside theory."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from coursebuild.cli.arguments import add_cache, add_format, add_quiet
+from coursebuild.cli.output import CLEAN, write
+from coursebuild.features.bench.commands import add_recorded, measured, write_measured
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.stability import check_stability, stability
+from coursebuild.report.measuring import Measurement, stability_text
+from coursebuild.report.values import json_text
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_quiet(parser)
+    parser.add_argument(
+        "problems", nargs="*", metavar="PROBLEM", help="a hard case or a family (default: all)"
+    )
+    add_format(parser, "text", "json")
+    add_recorded(parser)
+    add_cache(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, or measure again."""
+    names = tuple(arguments.problems)
+
+    def measure(options: Options) -> Measurement[Any]:
+        if arguments.check:
+            return check_stability(options, names)
+        return stability(options, names, record=arguments.record)
+
+    found = measured(arguments, measure)
+    if arguments.format == "json" and not (arguments.record or arguments.check):
+        return write(json_text(found.reports), CLEAN)
+    shown = () if arguments.check else found.reports
+    values = {"cases": found.reports}
+    return write_measured(arguments, found, lambda style: stability_text(shown, style), values)
