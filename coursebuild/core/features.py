@@ -43,10 +43,10 @@ if TYPE_CHECKING:  # the layers above, of which a feature's functions take value
     from coursebuild.core.pages.page_inputs import PageInputs
     from coursebuild.core.pages.tools import Tools
     from coursebuild.core.pages.urls import Place
-    from coursebuild.core.scripts.dependencies import Inputs
+    from coursebuild.core.run.dependencies import Inputs
+    from coursebuild.core.run.memory import Memory
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
-    from coursebuild.pipeline.remember import Memory
 else:  # names alone, which `help` can show: nothing above is imported
     for above in (
         "Assets",

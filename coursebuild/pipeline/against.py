@@ -21,18 +21,18 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.run.dependencies import Kind
 from coursebuild.core.run.environments import environment, needed, other_version
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.against import RunStanding, is_comparable, judgement, run_standings
-from coursebuild.core.scripts.dependencies import Kind
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure
 from coursebuild.core.text.diagnostics import Severity
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.verify import compile_models
 from coursebuild.report.against import AgainstReport, ModelLine, ScriptAgainst

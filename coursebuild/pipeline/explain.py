@@ -26,8 +26,7 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.registry import feature_trials
-from coursebuild.core.run.mjcf import parts
-from coursebuild.core.scripts.dependencies import (
+from coursebuild.core.run.dependencies import (
     Inputs,
     Kind,
     described,
@@ -35,13 +34,14 @@ from coursebuild.core.scripts.dependencies import (
     sought_files,
     state_changes,
 )
+from coursebuild.core.run.memory import Memory
+from coursebuild.core.run.mjcf import parts
+from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
-from coursebuild.core.scripts.remembered import RunRecord
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.records import BENCH
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
-from coursebuild.pipeline.remember import Memory
 from coursebuild.report.explained import Explained, Explanation, State
 
 

@@ -19,8 +19,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
-from coursebuild.core.run.machine import machine
-from coursebuild.core.scripts.dependencies import (
+from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
@@ -30,12 +29,13 @@ from coursebuild.core.scripts.dependencies import (
     needs,
     state_changes,
 )
+from coursebuild.core.run.machine import machine
+from coursebuild.core.run.memory import States
+from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import Extraction, jobs
-from coursebuild.core.scripts.remembered import RunRecord
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.reports.records import FOLDER
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.remember import States
 
 _OF_THE_PROJECT = (Kind.FILE, Kind.LISTING, Kind.SOUGHT)
 """What is the same on every machine that has the course."""

@@ -18,14 +18,14 @@ from coursebuild.core.files.examples import Blocked, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Recording, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
-from coursebuild.core.scripts.dependencies import Inputs
+from coursebuild.core.run.dependencies import Inputs
+from coursebuild.core.run.memory import Memory, longest_first
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import recorded_runs
-from coursebuild.pipeline.remember import Memory, longest_first
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:

@@ -15,12 +15,12 @@ from collections.abc import Collection, Sequence
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.model.sensitivity import RUNS, Sensitivity
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.sensitivity import sensitivity, worth_moving
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import recorded_outputs, run
 
 _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)

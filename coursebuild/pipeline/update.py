@@ -27,6 +27,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import RunAll, ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import apply_edits, updated_body
@@ -40,7 +41,6 @@ from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs, keep_runs
-from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,

@@ -32,6 +32,7 @@ from coursebuild.core.model.results import (
     Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.bindings import HeldLines, document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
@@ -43,7 +44,6 @@ from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs
-from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
 from coursebuild.pipeline.trials import run_with_trials
 from coursebuild.report import ScriptLine
@@ -197,7 +197,7 @@ def compile_models(
     if not course.models and not texts:
         return (), ()
     from coursebuild.core.run import mjcf
-    from coursebuild.pipeline.remember_models import compile_all
+    from coursebuild.core.run.model_memory import compile_all
 
     stage = functools.partial(progress.stage, "compiling models")
     compiled, parts = compile_all(

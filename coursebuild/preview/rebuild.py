@@ -24,12 +24,12 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun, Verdict
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.remember import Memory
 from coursebuild.pipeline.scripts import run
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now

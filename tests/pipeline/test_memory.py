@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import sealed
 from coursebuild.core.model.results import Outcome, Trace
-from coursebuild.pipeline.remember import longest_first
+from coursebuild.core.run.memory import longest_first
 from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
 
 Act = Callable[[Desk], object]

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.shared import shared_cache
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Trace
-from coursebuild.pipeline.remember import Memory
+from coursebuild.core.run.memory import Memory
 
 SCRIPT = b"print('hello')\n"
 PATH = "examples/a.py"

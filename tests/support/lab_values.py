@@ -10,6 +10,7 @@ from typing import Any
 from coursebuild.core.features import TrialContext, Tried
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CompileResult
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
@@ -20,7 +21,6 @@ from coursebuild.features.lab.inputs import SECONDS, lab_trials
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.trial import Engines, LabTrials
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.remember import Memory
 
 BALL = (
     "<mujoco><worldbody><body name='ball'><freejoint/><geom name='g' size='.1'/>"

@@ -4,8 +4,10 @@
   around them is in `surroundings`
 - what these processes do: `supervisor` (with `watching`), `script_process`; both are one program,
   `worker_main`
-- what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`), made dependencies of by
-  `notes`
+- what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`), made a trace of by
+  `notes`, and `dependencies` of that
+- `memory`: results that are kept with these (`run_record`), and found again; `model_memory` is the
+  same for compiled models
 - `dask_runner` (with `dask_task`): the same on a cluster
 - `surroundings`, `packages`, `versions`: what results depend on, as it is now
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML

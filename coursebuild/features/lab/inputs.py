@@ -12,8 +12,8 @@ from typing import Any
 
 from coursebuild.core.features import Trial
 from coursebuild.core.model import Course
+from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.scripts.extract import owners
 from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab

@@ -11,9 +11,9 @@ import json
 from msgspec import Struct
 
 from coursebuild.core.features import TrialContext
+from coursebuild.core.run.dependencies import need_of
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.dependencies import need_of
 from coursebuild.features.lab.engines.native import NativeEngine
 from coursebuild.features.lab.model import Lab
 

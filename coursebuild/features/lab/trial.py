@@ -29,8 +29,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, Tried
 from coursebuild.core.model.results import TrialLine, TrialResult
+from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
 from coursebuild.features.lab.custom import custom_lab

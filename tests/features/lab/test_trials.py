@@ -15,9 +15,9 @@ import pytest
 
 from coursebuild.core.features import Trial
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.mjcf import compile_all
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.dependencies import Inputs
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.checks import labs_in

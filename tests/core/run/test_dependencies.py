@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
-from coursebuild.core.scripts.dependencies import (
+from coursebuild.core.run.dependencies import (
     ABSENT,
     FOLDER,
     SPECIAL,

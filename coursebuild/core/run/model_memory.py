@@ -24,9 +24,9 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf, mjcf_worker, mujoco_files
+from coursebuild.core.run.dependencies import Need, need_of
+from coursebuild.core.run.memory import States
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.dependencies import Need, need_of
-from coursebuild.pipeline.remember import States
 
 _KIND = "models"
 _OWN_FAULT = "MuJoCo's compiler "

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Divergence, Outcome, Sign
-from coursebuild.core.scripts.dependencies import Dependency, Inputs, Kind
-from coursebuild.core.scripts.remembered import RunRecord, from_bytes, to_bytes
+from coursebuild.core.run.dependencies import Dependency, Inputs, Kind
+from coursebuild.core.run.run_record import RunRecord, from_bytes, to_bytes
 
 HERE = (("course", "/home/me/course"), ("prefix", "/opt/venv"), ("home", "/home/me"))
 THERE = (("course", "/ci/build"), ("prefix", "/usr"), ("home", "/root"))

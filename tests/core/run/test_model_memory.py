@@ -12,8 +12,8 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf
+from coursebuild.core.run.model_memory import compile_all
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.remember_models import compile_all
 
 pytestmark = pytest.mark.site
 

@@ -1,6 +1,6 @@
 """The result of a script as it is kept: what it depends on, and what it did.
 
-Entry points: `RunRecord`, `to_bytes`, `from_bytes`, `Record.run`.
+Entry points: `RunRecord`, `to_bytes`, `from_bytes`.
 
 Paths of the machine in what a script wrote to its error output are taken out before it is kept, and
 those of the machine that reads it are put in.
@@ -17,7 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Divergence, Outcome, ScriptRun, Trace
-from coursebuild.core.scripts.dependencies import Dependency, Inputs, Kind, sought_files
+from coursebuild.core.run.dependencies import Dependency, Inputs, Kind, sought_files
 
 REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
 _MARK = "\0"

@@ -23,9 +23,7 @@ from typing import assert_never
 from coursebuild.core.engine.digests import Clock, Digests, changed_since
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
-from coursebuild.core.run.packages import Installed
-from coursebuild.core.run.surroundings import OtherEnvironment, conditions, places
-from coursebuild.core.scripts.dependencies import (
+from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
@@ -40,7 +38,9 @@ from coursebuild.core.scripts.dependencies import (
     sought,
     state_changes,
 )
-from coursebuild.core.scripts.remembered import REMEMBERED, RunRecord, from_bytes, to_bytes
+from coursebuild.core.run.packages import Installed
+from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, to_bytes
+from coursebuild.core.run.surroundings import OtherEnvironment, conditions, places
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32
