@@ -8,7 +8,7 @@ a `Report`.
 2. `check`: the way that `check`, `build` and `export` share, up to the verdict:
    - `load`: disk → course. Its parser is `documents` (with `reading`, `fingerprints`), which parses
      only what nobody has parsed
-   - `verify`: course → results. `scripts` runs those of which no result is kept (`core.run.memory`);
+   - `verify`: course → results. `scripts` runs those of which no result is kept;
      `trials` tries what features have, as labs; `shards` leaves out the parts of other machines
    - `judge`: findings → report, and the files for which it holds
 3. `build`, with `site` (and `pages`, `page_index`): course and results → the files of a site

@@ -349,13 +349,6 @@ def test_a_damaged_result_is_told_once_and_run_again(desk: Desk) -> None:
     assert desk.recall(other) is None, "it is under the name of another"
 
 
-def test_a_store_that_cannot_be_written(desk: Desk) -> None:
-    (desk.root / ".coursebuild").write_text("in the way")
-    desk.run()
-    assert desk.recall() is None
-    assert len(desk.told) >= 1
-
-
 def test_several_commands_at_once(desk: Desk) -> None:
     threads = [threading.Thread(target=desk.run, args=(LOOKED,)) for _ in range(4)]
     for thread in threads:

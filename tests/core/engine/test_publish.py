@@ -78,12 +78,6 @@ class TestPublish:
             assert tree(out) == as_tree(site(text))
             assert names(root) == ["content", "models", "public"]
 
-    def test_files_of_the_old_site_go(self, root: Path) -> None:
-        publish(root, root / "public", site("one", "removed/lesson/index.html"))
-        publish(root, root / "public", site("two"))
-        assert tree(root / "public") == as_tree(site("two"))
-        assert not (root / "public/removed").exists()
-
     def test_same_bytes_whatever_the_umask(self, root: Path) -> None:
         old = os.umask(0o077)
         try:
@@ -119,22 +113,12 @@ class TestPublish:
         publish(root, tmp_path / "a/b/c", site("one"))
         assert tree(tmp_path / "a/b/c") == as_tree(site("one"))
 
-    def test_relative_place(self, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.chdir(root)
-        publish(root, Path("public"), site("one"))
-        assert tree(root / "public") == as_tree(site("one"))
-
     def test_file_managers_may_look(self, root: Path) -> None:
         publish(root, root / "public", site("one"))
         (root / "public/.DS_Store").touch()
         (root / "public/empty").mkdir()
         publish(root, root / "public", site("two"))
         assert tree(root / "public") == as_tree(site("two"))
-
-    def test_an_empty_site_is_a_site(self, root: Path) -> None:
-        for _ in range(2):
-            publish(root, root / "public", [])
-            assert tree(root / "public") == {}
 
     @pytest.mark.parametrize("call", ["fchmod", "mkdir", "fchmod"])
     def test_full_disk(self, root: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
@@ -166,15 +150,6 @@ class TestPublish:
         with pytest.raises(KeyboardInterrupt):
             publish(root, root / "public", broken())
         assert tree(root / "public") == as_tree(site("one"))
-        assert names(root) == ["content", "models", "public"]
-
-    def test_what_a_killed_build_left_is_used(self, root: Path) -> None:
-        publish(root, root / "public", site("one"))
-        left = root / ".public.coursebuild-new"
-        (left / "x").mkdir(parents=True)
-        (left / "x/y").touch()
-        publish(root, root / "public", site("two"))
-        assert tree(root / "public") == as_tree(site("two"))
         assert names(root) == ["content", "models", "public"]
 
     def test_killed_between_two_renames(self, root: Path) -> None:
@@ -281,11 +256,6 @@ class TestRefusal:
         (root / "public").mkdir()
         monkeypatch.setattr(os.path, "ismount", lambda path: path.name == "public")
         assert "is a mount point" in self.refused(root, root / "public")
-
-    def test_said_before_the_work(self, root: Path) -> None:
-        assert check_out(root, root / "public") == root / "public"
-        with pytest.raises(PublishRefusedError):
-            check_out(root, root)
 
 
 BUILD = """

@@ -11,52 +11,20 @@ import pytest
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.model.results import OutputFile
+from support.published_sites import Pages, texts
+from support.published_sites import pages as pages
 from support.published_sites import root as root
-from support.published_sites import texts
-
-
-class Pages:
-    """Pages whose text is their key, and which were made."""
-
-    def __init__(self) -> None:
-        self.made: list[str] = []
-
-    def __call__(self, **keys: str) -> list[SiteFile]:
-        return [
-            CachedFile(f"{path}/index.html", key, self._make(path, key))
-            for path, key in keys.items()
-        ]
-
-    def _make(self, path: str, key: str) -> Callable[[], bytes]:
-        def make() -> bytes:
-            self.made.append(path)
-            return f"{path} {key}".encode()
-
-        return make
-
-
-@pytest.fixture
-def pages() -> Pages:
-    return Pages()
 
 
 def test_only_what_has_another_key_is_made(root: Path, pages: Pages) -> None:
     out = root / "public"
-    assert publish(root, out, pages(a="1", b="1")) == ("a/index.html", "b/index.html")
-    assert publish(root, out, pages(a="1", b="2", c="1")) == ("b/index.html", "c/index.html")
-    assert pages.made == ["a", "b", "b", "c"]
-    assert texts(out) == {"a/index.html": "a 1", "b/index.html": "b 2", "c/index.html": "c 1"}
+    assert publish(root, out, pages(a="1", b="1")) == ("a.html", "b.html")
+    assert publish(root, out, pages(a="1", b="2", c="1")) == ("b.html", "c.html")
+    assert pages.made == ["a.html", "b.html", "b.html", "c.html"]
+    assert texts(out) == {"a.html": "a.html 1", "b.html": "b.html 2", "c.html": "c.html 1"}
     listed = (out / MARKER).read_text().split("\n")[1:-1]
-    assert listed == ["a/index.html", "b/index.html", "c/index.html"]
-
-
-def test_a_page_that_is_no_more_goes(root: Path, pages: Pages) -> None:
-    out = root / "public"
-    publish(root, out, pages(a="1", b="1"))
-    assert publish(root, out, pages(a="1")) == ()
-    assert texts(out) == {"a/index.html": "a 1"}
-    assert not (out / "b").exists()
+    assert listed == ["a.html", "b.html", "c.html"]
 
 
 def test_where_nothing_differs_the_site_stays(root: Path, pages: Pages) -> None:
@@ -68,11 +36,11 @@ def test_where_nothing_differs_the_site_stays(root: Path, pages: Pages) -> None:
     assert out.stat().st_ino == before
     assert publish(root, out, [*pages(a="1"), OutputFile("x.css", b"y")]) == ("x.css",)
     assert out.stat().st_ino != before
-    assert pages.made == ["a"]
+    assert pages.made == ["a.html"]
 
 
 def edit(file: Path) -> None:
-    file.write_text("a 2")  # as long as it was
+    file.write_text("a.html 2")  # as long as it was
 
 
 def lengthen(file: Path) -> None:
@@ -86,12 +54,12 @@ def remove(file: Path) -> None:
 
 def replace(file: Path) -> None:
     file.unlink()
-    file.write_text("a 1")
+    file.write_text("a.html 1")
 
 
 def link(file: Path) -> None:
-    file.rename(file.parents[2] / "elsewhere")
-    file.symlink_to(file.parents[2] / "elsewhere")
+    file.rename(file.parents[1] / "elsewhere")
+    file.symlink_to(file.parents[1] / "elsewhere")
 
 
 def folder(file: Path) -> None:
@@ -105,13 +73,13 @@ def test_a_published_file_that_is_not_as_it_was_is_made_again(
 ) -> None:
     out = root / "public"
     publish(root, out, pages(a="1", b="1"))
-    file = out / "a/index.html"
+    file = out / "a.html"
     before = file.stat()
     change(file)
     if file.exists() and change is not link:
         os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns + 1))
-    assert publish(root, out, pages(a="1", b="1")) == ("a/index.html",)
-    assert texts(out) == {"a/index.html": "a 1", "b/index.html": "b 1"}
+    assert publish(root, out, pages(a="1", b="1")) == ("a.html",)
+    assert texts(out) == {"a.html": "a.html 1", "b.html": "b.html 1"}
     assert not file.is_symlink()
 
 
@@ -120,11 +88,10 @@ def test_a_file_somebody_put_there_by_our_marker_goes(root: Path, pages: Pages) 
     publish(root, out, pages(a="1"))
     (out / "Thumbs.db").write_text("junk of a file manager")
     assert publish(root, out, pages(a="1")) == ()
-    (out / MARKER).write_text((out / MARKER).read_text() + "b/index.html\n")
-    (out / "b").mkdir()
-    (out / "b/index.html").write_text("listed, so ours")
+    (out / MARKER).write_text((out / MARKER).read_text() + "b.html\n")
+    (out / "b.html").write_text("listed, so ours")
     assert publish(root, out, pages(a="1")) == ()
-    assert texts(out) == {"a/index.html": "a 1"}
+    assert texts(out) == {"a.html": "a.html 1"}
 
 
 def test_a_damaged_record_is_not_believed(root: Path, pages: Pages) -> None:
@@ -137,7 +104,7 @@ def test_a_damaged_record_is_not_believed(root: Path, pages: Pages) -> None:
         for damaged in (data, data[: where % len(data)], b"\xff" * 99):
             record.write_bytes(damaged)
             written = publish(root, out, pages(a="1", b="1"))
-            assert written == ("a/index.html", "b/index.html"), where
+            assert written == ("a.html", "b.html"), where
 
 
 def test_a_project_that_moves_with_its_site_keeps_it(tmp_path: Path, pages: Pages) -> None:
@@ -145,7 +112,7 @@ def test_a_project_that_moves_with_its_site_keeps_it(tmp_path: Path, pages: Page
     publish(tmp_path / "one", tmp_path / "one/public", pages(a="1"))
     (tmp_path / "one").rename(tmp_path / "two")
     assert publish(tmp_path / "two", tmp_path / "two/public", pages(a="1")) == ()
-    assert pages.made == ["a"]
+    assert pages.made == ["a.html"]
 
 
 def test_a_site_that_was_copied_is_made_again(tmp_path: Path, pages: Pages) -> None:
@@ -153,27 +120,14 @@ def test_a_site_that_was_copied_is_made_again(tmp_path: Path, pages: Pages) -> N
     (tmp_path / "one").mkdir()
     publish(tmp_path / "one", tmp_path / "one/public", pages(a="1"))
     shutil.copytree(tmp_path / "one", tmp_path / "two")
-    assert publish(tmp_path / "two", tmp_path / "two/public", pages(a="1")) == ("a/index.html",)
+    assert publish(tmp_path / "two", tmp_path / "two/public", pages(a="1")) == ("a.html",)
 
 
 def test_two_places_have_a_record_each(root: Path, tmp_path: Path, pages: Pages) -> None:
     for out in (root / "public", root / "other", tmp_path / "outside"):
-        assert publish(root, out, pages(a="1")) == ("a/index.html",)
+        assert publish(root, out, pages(a="1")) == ("a.html",)
     for out in (root / "public", root / "other", tmp_path / "outside"):
         assert publish(root, out, pages(a="1")) == ()
-
-
-def test_a_file_system_without_links(
-    root: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    publish(root, root / "public", pages(a="1", b="1"))
-
-    def refuse(*_: object, **__: object) -> None:
-        raise PermissionError
-
-    monkeypatch.setattr(os, "link", refuse)
-    assert publish(root, root / "public", pages(a="1", b="2")) == ("a/index.html", "b/index.html")
-    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 2"}
 
 
 def test_a_file_changed_while_it_is_linked_is_made_again(
@@ -187,56 +141,12 @@ def test_a_file_changed_while_it_is_linked_is_made_again(
         Path(source).write_text("changed")
 
     monkeypatch.setattr(os, "link", late)
-    assert publish(root, root / "public", pages(a="1", b="2")) == ("a/index.html", "b/index.html")
-    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 2"}
-
-
-def other_file(path: Path) -> None:
-    path.with_name("other").write_text(path.read_text())
-    path.with_name("other").replace(path)
-
-
-def symbolic_link(path: Path) -> None:
-    path.rename(path.with_name("moved"))
-    path.symlink_to("moved")
-
-
-def new_folder(path: Path) -> None:
-    path.unlink()
-    path.mkdir()
-
-
-@pytest.mark.parametrize("change", [other_file, symbolic_link, new_folder, Path.unlink])
-def test_a_file_that_gives_way_to_another_before_it_is_linked_is_made_again(
-    root: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch, change: Callable[[Path], None]
-) -> None:
-    publish(root, root / "public", pages(a="1", b="1"))
-    really = os.link
-
-    def early(source: str, target: str, *, follow_symlinks: bool = True) -> None:
-        change(Path(source))
-        really(source, target, follow_symlinks=follow_symlinks)
-
-    monkeypatch.setattr(os, "link", early)
-    assert publish(root, root / "public", pages(a="1", b="2")) == ("a/index.html", "b/index.html")
-    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 2"}
-    assert not (root / "public/a/index.html").is_symlink()
-
-
-def test_a_failure_while_a_page_is_made_leaves_the_old_site(root: Path, pages: Pages) -> None:
-    publish(root, root / "public", pages(a="1", b="1"))
-
-    def broken() -> bytes:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        publish(root, root / "public", [*pages(a="1"), CachedFile("b/index.html", "2", broken)])
-    assert texts(root / "public") == {"a/index.html": "a 1", "b/index.html": "b 1"}
-    assert publish(root, root / "public", pages(a="1", b="1")) == ()
+    assert publish(root, root / "public", pages(a="1", b="2")) == ("a.html", "b.html")
+    assert texts(root / "public") == {"a.html": "a.html 1", "b.html": "b.html 2"}
 
 
 def test_a_record_that_cannot_be_written_costs_only_time(root: Path, pages: Pages) -> None:
     (root / ".coursebuild").write_text("in the way")
     for _ in range(2):
-        assert publish(root, root / "public", pages(a="1")) == ("a/index.html",)
-    assert texts(root / "public") == {"a/index.html": "a 1"}
+        assert publish(root, root / "public", pages(a="1")) == ("a.html",)
+    assert texts(root / "public") == {"a.html": "a.html 1"}

@@ -13,7 +13,6 @@ import pytest
 from coursebuild.core.engine import publish as publishing
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.core.files import locks
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
@@ -73,14 +72,6 @@ def test_two_places_have_one_spare(spared: Path, pages: Pages) -> None:
             publish(spared, spared / out, pages(**MANY | {"a": key}))
             assert texts(spared / out) == TEXTS | {"a.html": f"a.html {key}"}
     assert beside(spared) == ["other", "public"]
-
-
-def test_a_file_system_without_locks(
-    spared: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(locks, "try_lock", lambda fd: None)
-    assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html",)
-    assert texts(spared / "public") == TEXTS | {"a.html": "a.html 2"}
 
 
 def test_a_place_on_another_file_system_than_the_course(

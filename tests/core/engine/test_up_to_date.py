@@ -59,13 +59,6 @@ def test_what_was_said_is_said_again(root: Path, text: str) -> None:
     assert said(root) == text
 
 
-def test_each_command_has_its_own(root: Path) -> None:
-    assert keep(root)
-    assert unchanged(str(root), ("build", "elsewhere")) is None
-    assert unchanged(str(root), ("build",)) is None
-    assert unchanged(str(root), ("buildpublic",)) is None
-
-
 def rewrite(path: str) -> Callable[[Path], None]:
     def change(root: Path) -> None:
         before = (root / path).read_bytes()
@@ -153,12 +146,6 @@ def test_what_decides_which_code_runs_is_seen(
     assert said(root) is None
 
 
-def test_another_python_is_seen(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert keep(root)
-    monkeypatch.setattr(sys, "version", "3.99.0")
-    assert said(root) is None
-
-
 def test_what_is_no_part_of_the_course_is_not_looked_at(root: Path) -> None:
     assert keep(root)
     for name in (".1.1-a.md.swp", "1.1-a.md~"):
@@ -237,10 +224,6 @@ def test_a_note_that_cannot_be_written_costs_only_time(root: Path) -> None:
     (root / ".coursebuild").write_text("in the way")
     assert not keep(root)
     assert said(root) is None
-
-
-def test_a_name_that_would_not_fit_a_line_is_not_kept(root: Path) -> None:
-    assert not Watcher(str(root), COMMAND).keep("all is well\n", ["data/a\nb"], [])
 
 
 def test_looking_imports_next_to_nothing() -> None:

@@ -57,12 +57,6 @@ def test_a_task_goes_to_the_worker_that_it_names_and_finds_what_that_remembers()
     assert seen == []
 
 
-def test_large_answers_and_tasks() -> None:
-    with Workers(lambda text: text * 3, 2) as workers:
-        answers = workers.map([(None, "x" * n * 100_000) for n in range(1, 20)])
-        assert [len(answer) for answer, _ in answers] == [n * 300_000 for n in range(1, 20)]
-
-
 def test_what_a_worker_did_not_answer_is_answered_here() -> None:
     def dies(number: int) -> tuple[int, int]:
         if number % 5 == 3 and os.getpid() != HERE:
@@ -98,14 +92,6 @@ def test_what_cannot_be_sent_is_told_as_a_text() -> None:
         list(workers.map([(None, 1)]))
 
 
-def test_no_worker_stays() -> None:
-    with Workers(where, 3) as workers:
-        answers = [answer for answer, _ in workers.map([(None, n) for n in range(9)])]
-    processes = {process for _, process in answers}
-    assert HERE not in processes
-    assert not any(alive(process) for process in processes)
-
-
 def test_where_standard_input_is_closed() -> None:
     """A pipe of the worker may then have its number."""
     code = (
@@ -117,29 +103,6 @@ def test_where_standard_input_is_closed() -> None:
     shell = ["sh", "-c", 'exec "$0" -c "$1" <&-', sys.executable, code]
     done = subprocess.run(shell, capture_output=True, text=True, check=True)
     assert done.stdout == "True\n", done.stderr
-
-
-def test_without_workers_all_is_answered_here() -> None:
-    with Workers(where, 0) as workers:
-        assert list(workers.map([(None, 1), (0, 2)])) == [((1, HERE), None), ((2, HERE), None)]
-        assert list(workers.map([])) == []
-
-
-def test_tasks_are_made_while_workers_answer(tmp_path: Path) -> None:
-    made = tmp_path / "made"
-
-    def waits(number: int) -> int:
-        while not made.exists():  # for ever, if the others were only made when this is answered
-            time.sleep(0.001)
-        return number
-
-    def tasks() -> Iterator[tuple[int | None, int]]:
-        yield from ((None, number) for number in range(10))
-        made.touch()
-        yield None, 10
-
-    with Workers(waits, 2) as workers:
-        assert [answer for answer, _ in workers.map(tasks())] == list(range(11))
 
 
 def test_workers_that_die_while_tasks_come() -> None:

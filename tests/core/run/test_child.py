@@ -59,12 +59,6 @@ def test_questions_and_answers(tmp_path: Path, temporary: Path) -> None:
     assert not alive(pids.pop())
 
 
-def test_a_child_that_was_never_asked(tmp_path: Path, temporary: Path) -> None:
-    with make(tmp_path):
-        pass
-    assert list(temporary.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("act", "told"),
     [
@@ -120,19 +114,6 @@ def test_one_that_does_not_start(tmp_path: Path, temporary: Path) -> None:
         pytest.raises(EffectError, match="the import crashed"),
     ):
         one.ask(1)
-    assert list(temporary.iterdir()) == []
-
-
-def test_one_that_says_something_else_first(tmp_path: Path) -> None:
-    with make(tmp_path, "print('hello', flush=True)\ninput()\n") as one, pytest.raises(EffectError):
-        one.ask(1)
-
-
-def test_an_exception_leaves_nothing(tmp_path: Path, temporary: Path) -> None:
-    with pytest.raises(ZeroDivisionError), make(tmp_path) as one:
-        pid = one.ask(1)["pid"]
-        raise ZeroDivisionError
-    assert not alive(pid)
     assert list(temporary.iterdir()) == []
 
 

@@ -21,7 +21,6 @@ from coursebuild.core.run.dependencies import (
     described,
     folded,
     forgotten,
-    group_key,
     input_changes,
     needs,
     sought,
@@ -31,15 +30,6 @@ from coursebuild.core.run.dependencies import (
 
 AROUND = (("Python", "CPython 3.11.7"), ("platform", "linux x86_64"))
 INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), AROUND)
-OTHERS = {
-    "path": "examples/b.py",
-    "text": "1" * 64,
-    "args": ("--slow",),
-    "timeout": 20.0,
-    "requires": (),
-    "around": (*AROUND, ("environment variable MUJOCO_GL", "egl")),
-    "version": "0",
-}
 PLACES = (("course", "/home/me/course"), ("library", "/opt/tool"), ("home", "/home/me"))
 NOTHING = Trace((), (), (), (), "")
 
@@ -52,18 +42,6 @@ def run(
 
 
 # --- keys
-
-
-def test_every_input_is_in_the_key() -> None:
-    keys = {group_key(replace(INPUTS, **{name: value})) for name, value in OTHERS.items()}
-    assert len(keys | {group_key(INPUTS)}) == len(OTHERS) + 1
-
-
-def test_lists_of_arguments_are_told_apart() -> None:
-    lists = ((), ("",), ("", ""), ("a", "b"), ("ab",), ("a,b",), ('"',), ("\\",), ("b", "a"))
-    keys = {group_key(replace(INPUTS, args=args)) for args in lists}
-    keys |= {group_key(replace(INPUTS, args=(), requires=args)) for args in lists[1:]}
-    assert len(keys) == 2 * len(lists) - 1
 
 
 # --- needs
