@@ -33,7 +33,7 @@ from coursebuild.numerics.reports.bench import (
 from coursebuild.numerics.rows import Basis, MeasuredRow, measured
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import own_setting, settings, stable
-from coursebuild.numerics.timing import Clock, costs, subnormal
+from coursebuild.numerics.timing import Clock, costs
 from mjcourse.spatial import angular_distance
 
 _STRAIGHT = 0.75
@@ -81,7 +81,7 @@ def measure_scenario(
     rows = front(rows)
     judged = verdict(rows, [_noticeable(basis, one) for one in found])
     if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
-        rows = tuple(replace(row, cost=None, cost_uncertainty=None) for row in rows)
+        rows = tuple(replace(row, cost=None) for row in rows)
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -114,7 +114,8 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
     if known.horizon < first.scene.scenario.duration * (1 - 1e-9):
         notes.append(f"errors count until {known.horizon:.6g} s: the motion is not known beyond")
-    if subnormal(model, first):
+    states = np.abs(np.hstack([known.states.qpos, known.states.qvel, known.states.act]))
+    if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
         notes.append("the state holds subnormal numbers, with which processors are slow")
     soft = refsafe_from(model) if first.constrained else math.inf
     if any((one.searched[1] if one.largest is None else one.largest) > soft for one in largest):
@@ -138,17 +139,12 @@ def _timed(
         return tuple(rows)
     own = next((n for n, index in enumerate(usable) if rows[index].own), 0)
     settings = [rows[index].setting for index in usable]
-    spent = costs(basis.model, basis.first, settings, own, clock, quick=quick)
+    scene = basis.first.scene
+    spent = costs(basis.model, scene, settings, own, clock, quick=quick)
     found = list(rows)
-    for index, cost in zip(usable, spent, strict=True):
-        seconds = cost.least * 1e-9 * rows[index].steps
-        found[index] = replace(
-            rows[index],
-            cost=cost.ratio,
-            cost_uncertainty=cost.uncertainty,
-            realtime=basis.first.scene.scenario.duration / seconds if seconds else None,
-            spread=cost.spread,
-        )
+    for index, timing in zip(usable, spent, strict=True):
+        seconds = timing.nanoseconds.scaled(1e-9 / scene.scenario.duration)
+        found[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
     return tuple(found)
 
 

@@ -3,7 +3,7 @@
 Entry points: `front(rows)`, rows with their places; `verdict(rows, noticeable)`.
 
 A setting is dominated where another costs no more and errs no more, and is clearly better in one of
-the two. What differs by less than 3 % in cost or 5 % in error is no difference.
+the two. Costs whose intervals meet do not differ, nor do those within 3 % or errors within 5 %.
 """
 
 from __future__ import annotations
@@ -11,54 +11,63 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeAlias
 
+from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import (
+    Interval,
+    MeasuredSetting,
+    RowVerdict,
+    WorkPrecisionRow,
+)
 from coursebuild.numerics.reports.points import seconds_text
 
 COST_SLACK, ERROR_SLACK = 0.03, 0.05
 """Relative: costs repeat to a few per cent only."""
 Rows: TypeAlias = Sequence[WorkPrecisionRow]
-Point: TypeAlias = tuple[float, float]
-"""Cost and error."""
 
 
-def _point(row: WorkPrecisionRow) -> Point | None:
+class Place(Struct, frozen=True):
+    """Where a setting is in the plot."""
+
+    cost: Interval
+    error: float
+
+    def beats(self, other: Place) -> bool:
+        """Whether one is clearly better in one respect, and no worse in the other."""
+        exacter = self.error * (1 + ERROR_SLACK) < other.error
+        no_worse = self.error <= other.error * (1 + ERROR_SLACK)
+        return (self.cheaper(other) and no_worse) or (exacter and not other.cheaper(self))
+
+    def cheaper(self, other: Place) -> bool:
+        """Whether it costs less, beyond what can be told."""
+        apart = self.cost.high < other.cost.low
+        return apart and self.cost.value * (1 + COST_SLACK) < other.cost.value
+
+
+def _place(row: WorkPrecisionRow) -> Place | None:
     """What a setting costs, and its error; `None` where it was lost, or not timed."""
     if row.cost is None or row.seen is None:
         return None
-    return row.cost, row.seen if row.figure is None else row.figure[0]
+    return Place(row.cost, row.seen if row.figure is None else row.figure[0])
 
 
 def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
     """Rows with what is known of their places: which no other dominates, and which one does."""
-    points = [_point(row) for row in rows]
-    better = [
-        [] if mine is None else [j for j, one in enumerate(points) if one and _beats(one, mine)]
-        for mine in points
-    ]
-    on_it = [mine is not None and not found for mine, found in zip(points, better, strict=True)]
+    places = {n: place for n, row in enumerate(rows) if (place := _place(row)) is not None}
+    better = {
+        n: [m for m, other in places.items() if other.beats(mine)] for n, mine in places.items()
+    }
 
-    def worth(index: int) -> tuple[float, int]:
-        cost, error = points[index] or (0.0, 0.0)
-        return cost * error, index
+    def worth(n: int) -> tuple[float, int]:
+        return places[n].cost.value * places[n].error, n
 
-    return tuple(
-        replace(
-            row,
-            front=there,
-            dominated_by=min([j for j in found if on_it[j]] or found, key=worth, default=None),
-        )
-        for row, there, found in zip(rows, on_it, better, strict=True)
-    )
-
-
-def _beats(one: Point, other: Point) -> bool:
-    """Whether one is clearly better in one respect, and no worse in the other."""
-    cost, error = 1 + COST_SLACK, 1 + ERROR_SLACK
-    cheaper, exacter = one[0] * cost < other[0], one[1] * error < other[1]
-    no_dearer, no_worse = one[0] <= other[0] * cost, one[1] <= other[1] * error
-    return (cheaper and no_worse) or (exacter and no_dearer)
+    found = []
+    for n, row in enumerate(rows):
+        others = better.get(n, [])
+        best = min([m for m in others if not better[m]] or others, key=worth, default=None)
+        found.append(replace(row, front=n in better and not others, dominated_by=best))
+    return tuple(found)
 
 
 # --------------------------------------------------------------------------------------- verdict
@@ -74,23 +83,23 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
     if row.reasons:
         return _lost(rows, row)
     error = None if seen is None else row.seen
-    mine, told = _point(row), _noticed(error)
+    mine, told = _place(row), _noticed(error)
     if mine is None:
         text = "nothing was timed, so that no setting can be called better"
         return RowVerdict(False, None, None, None, seen, text + told)
     if error is not None and error >= 1:
         told += _enough(
             rows,
-            mine[0],
+            mine.cost.value,
             hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
         )
     if row.dominated_by is None:
         text = "no other setting is cheaper without being less accurate"
         return RowVerdict(True, None, None, None, seen, text + told)
     better = rows[row.dominated_by]
-    other = _point(better)
+    other = _place(better)
     assert other is not None
-    ratios = other[0] / mine[0], other[1] / mine[1] if mine[1] > 0 else 1.0
+    ratios = other.cost.value / mine.cost.value, other.error / mine.error if mine.error else 1.0
     text = f"{words(better.setting)} is {_compared(*ratios)}"
     return RowVerdict(False, row.dominated_by, *ratios, seen, text + told)
 
@@ -100,18 +109,16 @@ def _enough(rows: Rows, own: float, *, hopeless: bool) -> str:
     unseen = [row for row in rows if row.seen is not None and row.seen < 1 and row.cost is not None]
     if not unseen:
         return ", and that of every other setting too" if hopeless else ""
-    least = min(unseen, key=lambda row: row.cost or 0.0)
-    cost = f"{(least.cost or 0.0) / own:.2g} times its cost"
-    return f"; the cheapest without one that is seen is {words(least.setting)}, at {cost}"
+    cost, least = min((row.cost.value, n) for n, row in enumerate(unseen) if row.cost)
+    name, times = words(unseen[least].setting), f"{cost / own:.2g} times its cost"
+    return f"; the cheapest without one that is seen is {name}, at {times}"
 
 
 def _lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
     """Of an own setting under which the scene does not run; the best one that does is named."""
     text = f"the scene does not run under its own setting, {words(row.setting)}: "
     text += "; ".join(row.reasons)
-    found = [
-        (point[1], point[0], n) for n, r in enumerate(rows) if r.front and (point := _point(r))
-    ]
+    found = [(p.error, p.cost.value, n) for n, r in enumerate(rows) if r.front and (p := _place(r))]
     better = min(found)[2] if found else None
     if better is not None:
         text += f"; {words(rows[better].setting)} is the most accurate that does"

@@ -1,19 +1,15 @@
-"""What steps cost, relative to each other, on a machine that does other things too.
+"""What scenarios cost, relative to each other, on a machine that does other things too.
 
-Entry points: `timed(jobs, own, clock)`; `step_times(batches, own, clock)`, of steps; `costs(model,
-first, settings, …)`, of settings of a scene.
+Entry points: `timed(jobs, own, clock)`; `costs(model, scene, settings, …)`, of settings of a scene;
+`scenario_job(model, scenes)`, a model's whole scenarios as a job.
 
-1. A scene is run once, and its full state is kept at a few times: steps are timed from there, since
-   what a step costs depends on what is going on (contacts, above all). A job is a batch of steps
-   from each of these states, repeated where steps are cheap. What it takes to begin anew is
-   measured by itself, and taken off.
-2. Candidates are timed in turns, each beside the scene's own and in alternating order, so that what
-   slows the machine for a while slows all.
-3. Of the times of each, the lowest tenth counts: it forgets those that were disturbed, and does not
-   hang on a single lucky one. Rounds go on until all ratios are known well enough, or a cap is
-   reached.
-4. The least time of all rounds is what an undisturbed machine takes; the median over it says how
-   much it was disturbed.
+1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
+   states; what takes little time is repeated.
+2. A round makes every job once, forwards and backwards in turn: what slows the machine for a while
+   slows all.
+3. Of the times of each job the lowest tenth counts: it forgets those that were disturbed, and does
+   not hang on a single lucky one. Intervals come from rounds drawn again at random (bootstrap).
+4. Rounds go on until all ratios are known well enough, or the time for them is over.
 
 The clock is an argument: processor time of the thread serves best, since it stands still while
 others run.
@@ -22,29 +18,17 @@ others run.
 from __future__ import annotations
 
 import gc
-import math
-import statistics
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
-from numpy.typing import ArrayLike
 
-from coursebuild.numerics.engine import (
-    STATE,
-    advance,
-    full_state,
-    initial_data,
-    integrator_of,
-    silent,
-    varied,
-)
-from coursebuild.numerics.pilot import Pilot
+from coursebuild.numerics.engine import STATE, full_state, initial_data, silent
 from coursebuild.numerics.problem import Array, Scenario
-from coursebuild.numerics.reports.bench import MeasuredSetting
+from coursebuild.numerics.reports.bench import Interval, MeasuredSetting
+from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import apply, with_setting
 
 Clock: TypeAlias = Callable[[], int]
@@ -52,171 +36,98 @@ Clock: TypeAlias = Callable[[], int]
 Job: TypeAlias = Callable[[], None]
 """Does what is timed, always the same amount."""
 
-FEWEST, MOST = 24, 60
+FEWEST, MOST = 8, 60
 """Rounds."""
-_QUICK_MOST = 24
-_ENOUGH = 0.005
-"""Relative uncertainty of a ratio at which rounds end."""
-_PARTS = 4
-"""Into so many parts the rounds are cut, to see how much ratios vary."""
-_MOMENTS = 6
-"""Times of a scenario from which steps are timed."""
-_FEWEST_STEPS, _MOST_STEPS, _COORDINATES = 8, 64, 1000
-"""Steps from each of them: fewer where there are many degrees of freedom."""
-_JOB = 1_000_000
+_BUDGET, _QUICK_BUDGET = 20e9, 2e9
+"""ns after which no round begins that is not among the fewest."""
+_ENOUGH = 0.01
+"""Relative half width of the widest interval at which rounds end."""
+_SHORTEST = 1_000_000
 """ns that a job takes at least."""
-_EMPTY = 20
-"""Times that beginning is repeated, to see what it takes."""
+_DRAWS = 200
+"""Times that rounds are drawn again, for an interval."""
 
 
 class Timing(Struct, frozen=True):
-    """What a candidate took."""
+    """What a job took."""
 
-    ratio: float
-    """Its time over the own setting's, the lowest tenths of both."""
-    uncertainty: float
-    """Of the ratio, relative: its standard error, from parts of the rounds."""
-    least: float
-    """Least time of one job, or of one step, ns."""
-    spread: float
-    """Median over least time."""
-    rounds: int
+    nanoseconds: Interval
+    ratio: Interval
+    """Its time over that of the own one."""
 
     @property
     def certain(self) -> bool:
         """Whether the ratio is another than 1 beyond what the measurement can tell."""
-        return abs(self.ratio - 1.0) > max(0.03, 2 * self.uncertainty)
+        off = not self.ratio.low <= 1.0 <= self.ratio.high
+        return off and abs(self.ratio.value - 1.0) > 0.03
 
 
 def timed(
-    jobs: Sequence[Job],
-    own: int,
-    clock: Clock,
-    *,
-    idle: Sequence[float] | None = None,
-    most: int = MOST,
-    enough: float = _ENOUGH,
+    jobs: Sequence[Job], own: int, clock: Clock, *, quick: bool = False
 ) -> tuple[Timing, ...]:
-    """Time jobs, of which number `own` is what others are compared with.
-
-    `idle`: for each job the ns that it takes for what is not to be timed.
-
-    Returns:
-        A timing for each job; the ratio of `own` is 1.
-    """
-    times: list[list[float]] = [[] for _ in jobs]
-    others = [index for index in range(len(jobs)) if index != own]
+    """Time jobs, of which number `own` is what others are compared with."""
+    times = np.zeros((MOST, len(jobs)))
+    budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
     collecting = gc.isenabled()
     gc.disable()
     try:
-        for job in jobs:  # caches are warm, and memory is there
-            job()
-        for turn in range(most):
-            for place, index in enumerate(others or [own]):
-                for one in (own, index) if (turn + place) % 2 else (index, own):
-                    spent = _once(jobs[one], clock) - (idle[one] if idle else 0.0)
-                    times[one].append(max(0.0, spent))
-            known = (_uncertainty(times[index], times[own]) <= enough for index in others)
-            if turn + 1 >= FEWEST and all(known):
+        repeats = [_repeats(job, clock) for job in jobs]
+        for turn in range(MOST):
+            order = range(len(jobs))
+            for index in order if turn % 2 else reversed(order):
+                times[turn, index] = _spent(jobs[index], repeats[index], clock)
+            if turn + 1 < FEWEST:
+                continue
+            found = _timings(times[: turn + 1] / repeats, own)
+            widest = max((one.ratio.half_width for one in found), default=0.0)
+            if widest <= _ENOUGH or clock() - began > budget:
                 break
     finally:
         if collecting:
             gc.enable()
-    return tuple(
-        Timing(
-            ratio=1.0 if index == own else _ratio(mine, times[own]),
-            uncertainty=0.0 if index == own else _uncertainty(mine, times[own]),
-            least=min(mine),
-            spread=statistics.median(mine) / min(mine) if min(mine) > 0 else math.inf,
-            rounds=len(mine),
-        )
-        for index, mine in enumerate(times)
-    )
+    return found
 
 
-def _once(job: Job, clock: Clock) -> int:
+def _repeats(job: Job, clock: Clock) -> int:
+    """How often a job is repeated, to take as long as it should; caches are warm then."""
+    times = 1
+    while _spent(job, times, clock) < _SHORTEST and times < 1 << 12:
+        times *= 2
+    return times
+
+
+def _spent(job: Job, times: int, clock: Clock) -> int:
     before = clock()
-    job()
+    for _ in range(times):
+        job()
     return clock() - before
 
 
-def _ratio(times: ArrayLike, own: ArrayLike) -> float:
-    """Of the lowest tenths."""
-    mine, ours = (float(np.quantile(np.asarray(one), 0.1)) for one in (times, own))
-    return mine / ours if ours > 0 else math.nan
-
-
-def _uncertainty(times: Sequence[float], own: Sequence[float]) -> float:
-    """Relative standard error of a ratio, from the ratios of parts of the rounds."""
-    if len(times) < _PARTS:
-        return math.inf
-    cuts = zip(np.array_split(times, _PARTS), np.array_split(own, _PARTS), strict=True)
-    parts = [_ratio(mine, ours) for mine, ours in cuts]
-    middle = statistics.fmean(parts)
-    if not middle > 0:
-        return math.inf
-    return statistics.stdev(parts) / (math.sqrt(_PARTS) * middle)
-
-
-# ------------------------------------------------------------------------------------------ steps
-
-
-class Batch(Struct, frozen=True, eq=False):
-    """Steps whose time is measured: so many from each of some states of a model."""
-
-    model: Any
-    data: Any
-    states: Sequence[Array]
-    steps: int
-    setting: MeasuredSetting | None = None
-    """What the model is given before; it is shared with other batches then."""
-
-    def job(self, times: int, *, begin_only: bool = False) -> Job:
-        """All of that so many times, or only what it takes to begin at the states."""
-        model, data, steps = self.model, self.data, 0 if begin_only else self.steps
-
-        def job() -> None:
-            if self.setting is not None:
-                apply(model, self.setting)
-            for _ in range(times):
-                for state in self.states:
-                    mujoco.mj_setState(model, data, state, STATE)
-                    mujoco.mj_step(model, data, steps)
-
-        return job
-
-    def repeats(self, clock: Clock) -> int:
-        """How often it is repeated, to take about as long as a job should."""
-        times = 1
-        while _once(self.job(times), clock) < _JOB and times < 1 << 12:
-            times *= 2
-        return times
-
-
-def step_times(
-    batches: Sequence[Batch], own: int, clock: Clock, *, quick: bool = False
-) -> tuple[Timing, ...]:
-    """Time for a step, and its ratio to that of number `own`."""
-    with silent():
-        repeats = [one.repeats(clock) for one in batches]
-        jobs = [one.job(times) for one, times in zip(batches, repeats, strict=True)]
-        idle = []
-        for one, times in zip(batches, repeats, strict=True):
-            begin = one.job(_EMPTY, begin_only=True)
-            idle.append(times * min(_once(begin, clock) for _ in range(7)) / _EMPTY)
-        found = timed(jobs, own, clock, idle=idle, most=_QUICK_MOST if quick else MOST)
-    counts = [
-        times * one.steps * len(one.states) for one, times in zip(batches, repeats, strict=True)
-    ]
+def _timings(times: Array, own: int) -> tuple[Timing, ...]:
+    """What rounds (n, jobs) say."""
+    count = len(times)
+    again = np.random.default_rng(0).integers(count, size=(_DRAWS, count))
+    lowest = np.quantile(times, 0.1, axis=0)
+    drawn = np.quantile(times[again], 0.1, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios, drawn_ratios = lowest / lowest[own], drawn / drawn[:, own : own + 1]
     return tuple(
-        replace(timing, ratio=timing.ratio * counts[own] / count, least=timing.least / count)
-        for timing, count in zip(found, counts, strict=True)
+        Timing(_interval(lowest[n], drawn[:, n]), _interval(ratios[n], drawn_ratios[:, n]))
+        for n in range(times.shape[1])
     )
+
+
+def _interval(value: float, drawn: Array) -> Interval:
+    low, high = np.quantile(drawn, (0.025, 0.975)).tolist()
+    return Interval(float(value), min(low, float(value)), max(high, float(value)))
+
+
+# --------------------------------------------------------------------------------------- scenarios
 
 
 def costs(
     model: Any,
-    first: Pilot,
+    scene: Scene,
     chosen: Sequence[MeasuredSetting],
     own: int,
     clock: Clock,
@@ -224,44 +135,54 @@ def costs(
     quick: bool = False,
 ) -> tuple[Timing, ...]:
     """What the scenario costs under some settings, relative to number `own` of them."""
-    one, scenario = with_setting(model, chosen[own]), first.scene.scenario
-    data = initial_data(scenario, one)
-    states = moments(one, data, scenario)
-    # Over the same time with every timestep, as far as that is little.
-    span = min(step_count(model) * first.scene.own, scenario.duration / _MOMENTS)
-    batches = []
-    for setting in chosen:
-        count = max(1, min(round(span / setting.timestep), step_count(model)))
-        batches.append(Batch(one, data, states, count, setting))
-    found = step_times(batches, own, clock, quick=quick)
-    return tuple(
-        replace(timing, ratio=timing.ratio * chosen[own].timestep / setting.timestep)
-        for timing, setting in zip(found, chosen, strict=True)
-    )
+    one = with_setting(model, chosen[own])
+    state = full_state(one, initial_data(scene.scenario, one))
+
+    def job(setting: MeasuredSetting) -> Job:
+        run = scenario_job(one, [(scene.scenario, state)], setting.timestep)
+
+        def work() -> None:
+            apply(one, setting)
+            run()
+
+        return work
+
+    with silent():
+        return timed([job(setting) for setting in chosen], own, clock, quick=quick)
 
 
-def step_count(model: Any) -> int:
-    """Steps from each state, at most: fewer where they take long."""
-    return min(_MOST_STEPS, max(_FEWEST_STEPS, _COORDINATES // max(1, int(model.nv))))
+def scenario_job(
+    model: Any,
+    begins: Sequence[tuple[Scenario, Array]],
+    timestep: float,
+    actuators: Sequence[int] | None = None,
+) -> Job:
+    """Runs scenarios from the full states in which they begin; `actuators`: those commanded."""
+    data, chosen = mujoco.MjData(model), slice(None) if actuators is None else list(actuators)
+    runs = [
+        (state, [(np.array(command)[chosen], steps) for command, steps in _parts(one, timestep)])
+        for one, state in begins
+    ]
+
+    def job() -> None:
+        for state, parts in runs:
+            mujoco.mj_setState(model, data, state, STATE)
+            for command, steps in parts:
+                if command.size:
+                    data.ctrl[:] = command
+                mujoco.mj_step(model, data, steps)
+
+    return job
 
 
-def subnormal(model: Any, first: Pilot) -> bool:
-    """Whether the state holds numbers so small that processors compute with them slowly."""
-    scenario = first.scene.scenario
-    one = varied(model, integrator_of(model), first.scene.own)
-    small = np.abs(np.concatenate(moments(one, initial_data(scenario, one), scenario)))
-    return bool(np.any((small > 0) & (small < np.finfo(np.float64).tiny)))
-
-
-def moments(model: Any, data: Any, scenario: Scenario) -> tuple[Array, ...]:
-    """Full states of the engine at a few times of a scenario, from the beginning on."""
-    every, looks = scenario.steps(float(model.opt.timestep)), len(scenario.times)
-    wanted = {round(part * looks / _MOMENTS) for part in range(_MOMENTS)}
-    found = []
-    for index in range(looks):
-        if scenario.controls:
-            data.ctrl[:] = scenario.command(index)
-        if index in wanted:
-            found.append(full_state(model, data))
-        advance(model, data, every)
-    return tuple(found)
+def _parts(scenario: Scenario, timestep: float) -> list[tuple[tuple[float, ...], int]]:
+    """Commands, and for how many steps each holds; as few parts as there can be."""
+    every = scenario.steps(timestep)
+    found: list[tuple[tuple[float, ...], int]] = []
+    for look in range(len(scenario.times)):
+        command = scenario.command(look)
+        if found and found[-1][0] == command:
+            found[-1] = command, found[-1][1] + every
+        else:
+            found.append((command, every))
+    return found

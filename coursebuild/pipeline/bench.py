@@ -148,7 +148,7 @@ class SceneRun(MeasuringRun):
         self.cards = cards
         """Whether it is also told what the models are made of."""
         self._measuring = measuring
-        self.here = machine()
+        self.here = machine(pinned=True)
         self.code = code_digest(*_CODE)
 
     def measure(self, scene: CourseScene) -> SceneReport | None:

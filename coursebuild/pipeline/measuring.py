@@ -20,6 +20,7 @@ import mujoco
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.run.machine import one_processor
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
@@ -65,7 +66,7 @@ def measured(
         CannotError: it cannot be.
     """
     clock = time.thread_time_ns if timed else None
-    with _told(loaded.scene):
+    with _told(loaded.scene), one_processor():
         chosen = loaded.scenarios[number]
         return measure_scenario(loaded.model, chosen, quick=quick, clock=clock, tell=tell)
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
@@ -120,7 +120,7 @@ def digest_of(parts: Iterable[str]) -> str:
 
 def machine_parts(here: Machine) -> tuple[str, ...]:
     """All that figures depend on of where they were measured."""
-    return here.engine, here.python, here.numpy, here.system, here.cpu
+    return tuple(map(str, astuple(here)))
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:

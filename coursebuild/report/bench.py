@@ -66,9 +66,8 @@ def _scene(scene: SceneReport, style: Style) -> str:
 
 
 def _machine(machine: Machine) -> str:
-    cpu = f", {machine.cpu}" if machine.cpu else ""
-    text = f"MuJoCo {machine.engine}, Python {machine.python}, NumPy {machine.numpy}"
-    return f"{text}, {machine.system}{cpu}"
+    versions = f"MuJoCo {machine.engine}, Python {machine.python}, NumPy {machine.numpy}"
+    return f"{versions}, {machine.hardware}"
 
 
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:

@@ -74,10 +74,11 @@ def _figures(report: ScenarioReport) -> Iterator[Column]:
     yield _column(report, "slip", 5, lambda row: _number(row.slip))
     large = any(_large_model_error(row, report.floor) for row in report.rows)
     yield _column(report, "model error", 1 if large else 5, lambda row: _number(row.model_error))
-    yield _column(report, "cost", 0, lambda row: _number(row.cost, 3))
+    yield _column(report, "cost", 0, lambda row: _number(row.cost.value if row.cost else None, 3))
+    yield _column(report, "±", 4, _width)
     costs = any(row.cost is not None for row in report.rows)
     yield _column(report, "× real time", 4 if costs else 0, lambda row: _speed(row.realtime))
-    yield _column(report, "spread", 8, lambda row: _number(row.spread, 3))
+    yield _column(report, "time per s", 6, _time)
 
 
 def _large_model_error(row: WorkPrecisionRow, floor: float) -> bool:
@@ -92,8 +93,7 @@ def _judged(report: ScenarioReport) -> Iterator[Column]:
     yield _column(report, "growth", 7, lambda row: _number(row.growth, 7))
     yield _column(report, "status", 0, lambda row: status_text(row.status), left=True)
     yield _column(report, "refsafe", 5, lambda row: "yes" if row.refsafe else "")
-    yield _column(report, "", 1, lambda row: _better(report, row, long=False))
-    yield _column(report, "dominated by", 2, lambda row: _better(report, row, long=True), left=True)
+    yield _column(report, "", 1, _better)
 
 
 def _column(
@@ -114,15 +114,8 @@ def _with(row: WorkPrecisionRow, usual: MeasuredSetting | None) -> str:
     )
 
 
-def _better(report: ScenarioReport, row: WorkPrecisionRow, *, long: bool) -> str:
-    at = row.dominated_by
-    if at is None or not 0 <= at < len(report.rows):
-        return ""
-    if not long:
-        return f"{BETTER}{at + 1}"
-    better = report.rows[at]
-    named = f"{better.setting.integrator} at {seconds_text(better.setting.timestep, 4)}"
-    return ", ".join(part for part in (named, _with(better, row.setting)) if part)
+def _better(row: WorkPrecisionRow) -> str:
+    return "" if row.dominated_by is None else f"{BETTER}{row.dominated_by + 1}"
 
 
 def _error(value: float, least: float) -> str:
@@ -136,6 +129,15 @@ def _number(value: float | None, digits: int = 2) -> str:
         return ""
     plain = 10**digits <= abs(value) < 1e5
     return f"{value:.0f}" if plain else f"{value:.{digits}g}"
+
+
+def _width(row: WorkPrecisionRow) -> str:
+    """Half the interval of the cost."""
+    return "" if row.cost is None or row.own else f"{100 * row.cost.half_width:.2g} %"
+
+
+def _time(row: WorkPrecisionRow) -> str:
+    return "" if row.seconds is None else seconds_text(row.seconds.value, 3)
 
 
 def _drift(value: float | None) -> str:

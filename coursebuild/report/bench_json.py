@@ -12,17 +12,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import (
+    Interval,
+    ScenarioReport,
+    SceneReport,
+    WorkPrecisionRow,
+)
 from coursebuild.numerics.reports.points import quantities
 from coursebuild.report.values import plain
 
 _QUANTITIES = ("position", "attitude", "velocity")
 _OF_ROW = (
     *("status", "reasons", "energy_drift", "mean_energy", "momentum_drift", "penetration", "slip"),
-    *("model_error", "refsafe", "steps", "cost", "cost_uncertainty", "growth"),
+    *("model_error", "refsafe", "steps", "growth"),
     *("own", "front", "dominated_by"),
 )
-_RENAMED = {"visible_error": "seen", "real_time_factor": "realtime", "timing_spread": "spread"}
+_RENAMED = {"visible_error": "seen", "real_time_factor": "realtime"}
 
 
 def bench_values(scenes: Sequence[SceneReport]) -> dict[str, object]:
@@ -53,7 +58,7 @@ def _context(scene: SceneReport, scenario: ScenarioReport, number: int) -> dict[
         "python_version": machine.python,
         "numpy_version": machine.numpy,
         "system": machine.system,
-        "cpu": machine.cpu,
+        **{name: getattr(machine, name) for name in ("cpu", "governor", "processors", "pinned")},
         "quick": scene.quick,
         "control_hold": scenario.hold,
         "duration": scenario.duration,
@@ -72,6 +77,11 @@ def _row(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, object]:
         pair: tuple[float, float] = getattr(row, name) or (math.nan, math.nan)
         told = [max(one, least.get(name, 0.0)) for one in pair]  # what is no number stays so
         value[f"{name}_error"], value[f"{name}_error_end"] = told
+    for name in ("cost", "seconds"):
+        interval: Interval | None = getattr(row, name)
+        for part in ("", "low", "high"):
+            key = f"{name}_{part}" if part else name
+            value[key] = None if interval is None else getattr(interval, part or "value")
     integrator = row.setting.integrator
     order = next((one for one in scenario.orders if one.integrator == integrator), None)
     stable = next((one for one in scenario.stable if one.integrator == integrator), None)

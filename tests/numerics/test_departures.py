@@ -13,7 +13,7 @@ from coursebuild.core.model.scenarios import Bands
 from coursebuild.numerics.reports.bench import OrderRow, ScenarioReport, StableRow, WorkPrecisionRow
 from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
 from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
-from support.bench_reports import CASE, MACHINE, lost, row, scenario, scene, swing
+from support.bench_reports import CASE, MACHINE, interval, lost, row, scenario, scene, swing
 
 BANDS = Bands()
 
@@ -33,13 +33,13 @@ def test_nothing_departs_from_itself() -> None:
 
 def test_times_and_what_follows_from_them_do_not_matter() -> None:
     slow = [
-        replace(r, cost=9.0, realtime=1.0, spread=3.0, front=not r.front, dominated_by=0)
+        replace(r, cost=interval(9.0), seconds=None, front=not r.front, dominated_by=0)
         for r in swing().rows
     ]
     other = replace(swing(), rows=tuple(slow), verdict=scenario([]).verdict, source="elsewhere")
     new = scene(other, machine=replace(MACHINE, cpu="another"), digest="1" * 64)
     assert scene_departures(scene(), new, BANDS) == ()
-    untimed = [replace(r, cost=None, realtime=None, spread=None) for r in swing().rows]
+    untimed = [replace(r, cost=None, seconds=None) for r in swing().rows]
     assert between(swing(), replace(swing(), rows=tuple(untimed))) == []
 
 

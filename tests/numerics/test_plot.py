@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.drawing.marks import text_width
-from coursebuild.numerics.reports.bench import ScenarioReport, StableRow
+from coursebuild.numerics.reports.bench import Interval, ScenarioReport
 from coursebuild.numerics.reports.plot import STYLE, plot_svg
 from coursebuild.numerics.reports.points import chart, quantities, telling
 from support.bench_reports import lost, row, scenario, swing
@@ -61,17 +61,17 @@ def test_every_row_is_a_mark_that_says_what_it_is(narrow: bool) -> None:
     root = drawn(report, narrow=narrow)
     found = titles(root)
     assert len(found) == len(report.rows)
-    assert "RK4 at 20 ms · error 0.00307 · cost 0.39 · 50 steps · on the Pareto front" in found
     assert (
-        "Euler at 2 ms · error 0.0048 · cost 1 · 500 steps · the scene’s own setting · "
+        "RK4 at 20 ms · error 0.00307 · cost 0.39 ± 1 % · 50 steps · on the Pareto front" in found
+    )
+    assert (
+        "Euler at 2 ms · error 0.0048 · cost 1 ± 1 % · 500 steps · the scene’s own setting · "
         "RK4 at 20 ms is better" in found
     )
     (gone,) = [title for title in found if "diverged" in title]
     assert gone == "Euler at 50 ms · diverged; the state is not finite · not timed · 20 steps"
     shown = texts(root)
-    assert "own: Euler at 2 ms" in shown
-    assert "Euler is stable up to 40 ms" in shown
-    assert "RK4 is stable up to 90 ms" in shown
+    assert "the scene’s own: Euler at 2 ms" in shown
     assert "cost, relative to the scene’s own setting" in shown
     assert "error: position (m or rad)" in shown
     for name in ("Euler", "implicit", "RK4"):
@@ -102,11 +102,10 @@ def test_from_where_on_an_error_is_visible() -> None:
 def test_the_key_says_what_there_is_and_nothing_else() -> None:
     shown = texts(drawn(swing()))
     assert shown[-5:] == [
-        *("on the Pareto front", "another is better", "the scene’s own setting"),
-        *("run lost", "unstable"),
+        *("RK4", "on the Pareto front", "another is better"),
+        *("the scene’s own: Euler at 2 ms", "run lost"),
     ]
-    far = (StableRow("Euler", 1e-9, True, (1e-10, 1.0)),)
-    assert texts(drawn(scenario([row(front=True)], stable=far)))[-1] == "on the Pareto front"
+    assert texts(drawn(scenario([row(front=True)])))[-1] == "on the Pareto front"
 
 
 def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
@@ -114,7 +113,15 @@ def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
         root = drawn(report)
         first, *_ = root.iter("circle")
         assert first.attrib["r"] == "8.5"
-        assert [text for text in texts(root) if text.startswith("own: Euler at ")]
+        assert [text for text in texts(root) if text.startswith("the scene’s own: Euler at ")]
+
+
+def test_a_cost_has_a_bar_as_wide_as_its_interval() -> None:
+    wide = Interval(1.0, 0.5, 2.0)
+    root = drawn(scenario([replace(row(), cost=wide), row("RK4", 0.01), row("RK4", 1e-4)]))
+    bars = [p.attrib["d"] for p in root.iter("path") if re.search(r"v6M\S+ \S+v6$", p.attrib["d"])]
+    widths = [float(d.split("H")[1].split("M")[0]) - float(d.split()[0][1:]) for d in bars]
+    assert len(bars) == 3 and widths[0] > 20 * max(widths[1:])
 
 
 def test_described_for_who_cannot_see_it() -> None:
@@ -129,7 +136,7 @@ def test_described_for_who_cannot_see_it() -> None:
         "Euler: errors 0.048 to 0.0024 at costs of 0.1 to 2. "
         "implicit: errors 0.12 to 0.0024 at costs of 0.048 to 2.4. "
         "RK4: errors 0.12 to 1.9e-08 at costs of 0.156 to 7.8. "
-        "Euler is stable up to 40 ms. "
+        "Runs were lost under Euler. "
         "The scene’s own setting is Euler at 2 ms. "
         "RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate. "
         "No error below 1.0e-11 is given."
@@ -166,15 +173,8 @@ def test_without_times_the_steps_stand_in() -> None:
 def test_a_row_without_a_time_goes_where_its_steps_say() -> None:
     rows = [row("Euler", 0.002, cost=1.0), row("Euler", 0.001, cost=None), row("RK4", 0.01, cost=3)]
     found = chart(scenario(rows), quantities(scenario(rows))[0])
-    places = {p.row: (p.cost, p.timed) for line in found.lines for p in line.points}
-    assert places == {0: (1.0, True), 1: (2.0, False), 2: (3, True)}
-
-
-def test_the_boundary_is_at_the_cost_of_its_timestep() -> None:
-    rows = [row("Euler", 0.002, cost=1.0), row("Euler", 0.001, cost=2.2)]
-    report = scenario(rows, stable=(StableRow("Euler", 0.004, True, (1e-3, 1.0)),))
-    (line,) = chart(report, quantities(report)[0]).lines
-    assert line.boundary == 0.5
+    places = {p.row: p.cost.value for line in found.lines for p in line.points}
+    assert places == {0: 1.0, 1: 2.0, 2: 3}
 
 
 def test_which_error_is_shown() -> None:
@@ -191,12 +191,9 @@ def test_where_there_is_nothing_to_draw() -> None:
     assert plot_svg(scenario([lost(), lost("RK4")]), name="p") == ""
 
 
-def test_an_integrator_that_is_never_stable_and_one_that_is_unknown() -> None:
+def test_an_integrator_that_is_unknown() -> None:
     rows = [lost("Euler", 0.01), row("RK4", 0.01), row("a<b>&\ud800", 0.002), row("Ω" * 60, 0.001)]
-    report = scenario(rows, stable=(StableRow("Euler", 0.0, True, (1e-3, 1.0)),))
-    shown = texts(drawn(report))
-    assert "Euler is never stable" in shown
-    assert "a<b>&" in shown
+    assert "a<b>&" in texts(drawn(scenario(rows)))
 
 
 ERRORS = st.one_of(st.just(0.0), st.floats(1e-300, 1e300))
@@ -222,6 +219,5 @@ def test_any_report_is_drawn(rows: Any, floor: float, narrow: bool) -> None:
         row(name, h, position=(e, e), velocity=None, cost=cost, status=status, own=n == 0)
         for n, (name, h, e, cost, status) in enumerate(rows)
     ]
-    stable = tuple(StableRow(name, 0.05, True, (1e-4, 1.0)) for name in ("Euler", "RK4"))
-    svg = plot_svg(scenario(made, floor=floor, stable=stable), name="p", narrow=narrow)
+    svg = plot_svg(scenario(made, floor=floor), name="p", narrow=narrow)
     assert svg == "" or len(titles(ElementTree.fromstring(svg))) == len(made)

@@ -17,7 +17,7 @@ def line(at: int) -> int:
     return GOOD.count(b"\n", 0, at) + 1
 
 
-COST = line(GOOD.index(b'"cost": 0.1,'))
+COST = line(GOOD.index(b'"value": 0.1}'))
 
 
 def test_what_is_written_is_read() -> None:
@@ -77,9 +77,12 @@ def test_where_a_report_is() -> None:
             "is damaged: object missing required field `scene`",
         ),
         (GOOD[:900], "is damaged: input data was truncated"),
-        (GOOD.replace(b'"cost": 0.1,', b'"cost": NaN,', 1), f"is damaged: no JSON at line {COST}"),
         (
-            GOOD.replace(b'"cost": 0.1,', b'"cost": 1e999,', 1),
+            GOOD.replace(b'"value": 0.1}', b'"value": NaN}', 1),
+            f"is damaged: no JSON at line {COST}",
+        ),
+        (
+            GOOD.replace(b'"value": 0.1}', b'"value": 1e999}', 1),
             "is damaged: number out of range",
         ),
         (

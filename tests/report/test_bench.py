@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports.bench import RowVerdict, SceneReport, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import Interval, RowVerdict, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report import Style
@@ -56,9 +56,11 @@ def test_where_the_duration_ended_the_search_for_stable_timesteps() -> None:
 
 def test_orders_and_limits_and_the_verdict() -> None:
     text = bench_text([scene()], Style(width=80))
-    assert "    >    5  Euler           2 ms  4.80e-03  9.60e-03      1  ok        →14\n" in text
-    assert "     *  14  RK4            20 ms  3.07e-03  6.14e-03   0.39  ok\n" in text
-    assert "         1  Euler          50 ms                             diverged\n" in text
+    assert (
+        "    >    5  Euler           2 ms  4.80e-03  9.60e-03      1       ok        →14\n" in text
+    )
+    assert "     *  14  RK4            20 ms  3.07e-03  6.14e-03   0.39  1 %  ok\n" in text
+    assert "         1  Euler          50 ms                                  diverged\n" in text
     assert (
         "    RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate.\n\n"
         "    order of  position  velocity\n"
@@ -144,10 +146,10 @@ def test_wide_characters_take_two_cells() -> None:
 NUMBER = (int, float, type(None))
 KINDS: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("scene", "scenario", "engine_version", "python_version"), (str,)),
-    **dict.fromkeys(("numpy_version", "system", "cpu", "integrator", "solver"), (str,)),
+    **dict.fromkeys(("numpy_version", "system", "cpu", "governor", "integrator", "solver"), (str,)),
     **dict.fromkeys(("cone", "reference_kind", "figure", "status"), (str,)),
-    **dict.fromkeys(("quick", "refsafe", "front", "own"), (bool,)),
-    **dict.fromkeys(("row", "iterations", "steps"), (int,)),
+    **dict.fromkeys(("quick", "refsafe", "front", "own", "pinned"), (bool,)),
+    **dict.fromkeys(("row", "iterations", "steps", "processors"), (int,)),
     "monotone": (bool, type(None)),
     "dominated_by": (int, type(None)),
     "reasons": (list,),
@@ -234,7 +236,9 @@ def test_json_says_what_is_wrong() -> None:
 
 @given(value=st.floats())
 def test_json_has_no_number_that_is_none(value: float) -> None:
-    odd: WorkPrecisionRow = replace(row(), position=(value, value), cost=value, growth=value)
+    odd: WorkPrecisionRow = replace(
+        row(), position=(value, value), cost=Interval(value, value, value), growth=value
+    )
     rows_of(bench_json([scene(scenario([odd], horizon=value, floor=value))]))
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports.bench import (
+    Interval,
     MeasuredSetting,
     OrderRow,
     RowVerdict,
@@ -63,20 +64,27 @@ def row(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> Wor
         "refsafe": False,
         "steps": round(1 / timestep),
         "cost": 0.002 / timestep,
-        "realtime": 5e4 * timestep,
-        "spread": 1.02,
+        "seconds": 2e-5 / timestep,
         "growth": None,
         "own": False,
         "front": False,
         "dominated_by": None,
     }
     fields["setting"] = setting(integrator, timestep, **named)
-    return WorkPrecisionRow(**{**fields, **other})
+    fields |= other
+    for name in ("cost", "seconds"):
+        fields[name] = fields[name] if fields[name] is None else interval(fields[name])
+    return WorkPrecisionRow(**fields)
+
+
+def interval(value: float) -> Interval:
+    """A figure that is known to a per cent."""
+    return Interval(value, 0.99 * value, 1.01 * value)
 
 
 def lost(integrator: str = "Euler", timestep: float = 0.1, **other: Any) -> WorkPrecisionRow:
     """A row that diverged, and so was not timed."""
-    nothing = dict.fromkeys(("position", "velocity", "cost", "realtime", "spread"))
+    nothing = dict.fromkeys(("position", "velocity", "cost", "seconds"))
     fields = {"status": "diverged", "reasons": ("the state is not finite",), **nothing, **other}
     return row(integrator, timestep, **fields)
 
@@ -151,7 +159,7 @@ def awkward() -> ScenarioReport:
             energy_drift=-0.0604,
             attitude=(1e-11, 1e-11),
             cost=1,
-            realtime=1234.5,
+            seconds=1 / 1234.5,
             dominated_by=2,
             penetration=1e-3,
             seen=3.21,

@@ -339,3 +339,19 @@ class Machine(Struct, frozen=True, forbid_unknown_fields=True):
     """Operating system and kind of processor, such as `Linux x86_64`."""
     cpu: str
     """What the processor calls itself; empty where it does not say."""
+    governor: str = ""
+    """By which rule the system sets the processor's clock; empty where it does not say."""
+    processors: int = 0
+    """How many of them could be used; 0 where that was not recorded."""
+    pinned: bool = False
+    """Whether times were taken on one of them alone."""
+
+    @property
+    def hardware(self) -> str:
+        """System and processor, in words."""
+        parts = [self.system, self.cpu]
+        if self.processors:
+            many = f"{self.processors} processor{'s' if self.processors > 1 else ''}"
+            parts.append(f"pinned to one of {many}" if self.pinned else many)
+            parts.append(f"clock governor {self.governor or 'unknown'}")
+        return ", ".join(filter(None, parts))

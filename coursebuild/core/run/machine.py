@@ -1,24 +1,29 @@
 """The machine that something is measured on, as reports name it.
 
-Entry point: `machine()`.
+Entry points: `machine()`; `one_processor()`, while something is timed.
 """
 
 from __future__ import annotations
 
+import os
 import platform
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.run.versions import engine_version, package_version, python_version
 
 _INFO = Path("/proc/cpuinfo")
+_GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
 _NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")
 """How kernels for different processors call the name, the best one first."""
+_CAN_PIN = hasattr(os, "sched_setaffinity")
 
 
-def machine() -> Machine:
-    """Versions, system and processor.
+def machine(*, pinned: bool = False) -> Machine:
+    """Versions, system and processor; `pinned`: times are taken on one of them alone.
 
     Raises:
         EffectError: MuJoCo is not installed.
@@ -29,18 +34,31 @@ def machine() -> Machine:
         numpy=package_version("numpy"),
         system=f"{platform.system()} {platform.machine()}".strip(),
         cpu=cpu_name(),
+        governor=_read(_GOVERNOR).strip(),
+        processors=len(os.sched_getaffinity(0)) if _CAN_PIN else os.cpu_count() or 0,
+        pinned=pinned and _CAN_PIN,
     )
+
+
+@contextmanager
+def one_processor() -> Iterator[None]:
+    """Keep this thread on one of the processors that it may use, where the system can do that."""
+    if not _CAN_PIN:
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 def cpu_name() -> str:
     """What the processor calls itself; empty where it does not say."""
     if platform.system() == "Darwin":
         return _printed("sysctl", "-n", "machdep.cpu.brand_string")
-    try:
-        text = _INFO.read_text("utf-8", "replace")
-    except OSError:
-        return _tidy(platform.processor())
-    return named(text)
+    return named(_read(_INFO)) or _tidy(platform.processor())
 
 
 def named(text: str) -> str:
@@ -51,6 +69,13 @@ def named(text: str) -> str:
             if key.strip() == name and value.strip():
                 return _tidy(value)
     return ""
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text("utf-8", "replace")
+    except OSError:
+        return ""
 
 
 def _tidy(text: str) -> str:

@@ -152,13 +152,12 @@ def size(count: int) -> str:
 
 def where(words: Strings, machine: Machine) -> str:
     """On what machine, and with which versions."""
-    cpu = f", {machine.cpu}" if machine.cpu else ""
     return words(
         "measured.where",
         engine=machine.engine,
         python=machine.python,
         numpy=machine.numpy,
-        machine=f"{machine.system}{cpu}",
+        machine=machine.hardware,
     )
 
 

@@ -33,6 +33,7 @@ from coursebuild.numerics.reports.cases import ErrorLine
 from coursebuild.numerics.reports.points import (
     FEWEST_STEPS,
     Quantity,
+    interval_text,
     is_cut_short,
     quantities,
     seconds_text,
@@ -114,8 +115,9 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
     remarks = words("measured.remark")
     columns: list[tuple[str, list[str]]] = [
         (words("measured.setting"), [setting_text(row.setting, usual) for row in rows]),
-        (words("measured.cost"), ["" if r.cost is None else f"{r.cost:.3g}" for r in rows]),
+        (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (words("measured.realtime"), [factor(row.realtime) for row in rows]),
+        (words("measured.seconds"), [_time(row) for row in rows]),
         *(error(quantity) for quantity in quantities(report) if _is_known(quantity, report)),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
@@ -127,6 +129,10 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
     marked = tuple(n for n, row in enumerate(rows) if row.own)
     label = words("measured.settings", title=report.title or report.name)
     return grid(label, columns, words=(remarks,), marked=marked)
+
+
+def _time(row: WorkPrecisionRow) -> str:
+    return "" if row.seconds is None else seconds_text(row.seconds.value, 3)
 
 
 def _is_known(quantity: Quantity, report: ScenarioReport) -> bool:

@@ -163,7 +163,7 @@ class _Surveyor:
         try:
             trial = self.trials.changed(items)
             timing = self.trials.timing(trial)
-            if timing is None or not (timing.certain and timing.ratio >= LEAST):
+            if timing is None or not (timing.certain and timing.ratio.value >= LEAST):
                 self._note(candidate, items, None, "it saves no time")
                 return [items]
             trial = self.trials.compared(trial)

@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 from msgspec import Struct
 
-from coursebuild.numerics.engine import STATE, full_state, initial_data
+from coursebuild.numerics.engine import full_state, initial_data, silent
 from coursebuild.numerics.pruning.compare import MotionComparison, Seen, compare
 from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove, set_options
 from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
@@ -25,14 +25,7 @@ from coursebuild.numerics.pruning.model_text import ModelText, saved
 from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.reports.diet import Saving
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.timing import (
-    Batch,
-    Clock,
-    Timing,
-    moments,
-    step_count,
-    step_times,
-)
+from coursebuild.numerics.timing import Clock, Timing, scenario_job, timed
 
 
 class Item(Struct, frozen=True, eq=False):
@@ -194,31 +187,25 @@ class PruningTrials:
 
     def timing(self, trial: PruningTrial) -> Timing | None:
         """Time of the original over that of a changed model; `None` where it cannot be told."""
-        if self.clock is None or not self._states:
+        if self.clock is None or not self.scenes:
             return None
-        whole, model = self.text.model, trial.model
-        data, other = mujoco.MjData(whole), mujoco.MjData(model)
-        states = []
+        whole, model, index = self.text.model, trial.model, trial.index
+        begins, others = [], []
         try:
-            for state in self._states:
-                mujoco.mj_setState(whole, data, state, STATE)
-                transfer(whole, data, trial.index, model, other)
-                states.append(full_state(model, other))
-            steps = step_count(whole)
-            batches = Batch(whole, data, self._states, steps), Batch(model, other, states, steps)
-            found, own = step_times(batches, 1, self.clock, quick=self.quick)
+            for scene in self.scenes:
+                data, other = initial_data(scene.scenario, whole), mujoco.MjData(model)
+                transfer(whole, data, index, model, other)
+                begins.append((scene.scenario, full_state(whole, data)))
+                others.append((scene.scenario, full_state(model, other)))
+            jobs = (
+                scenario_job(whole, begins, self.scenes[0].own),
+                scenario_job(model, others, self.scenes[0].own, index.ctrl.tolist()),
+            )
+            with silent():
+                found, own = timed(jobs, 1, self.clock, quick=self.quick)
         except (ValueError, mujoco.FatalError):
             return None
-        return found if found.least > 0 and own.least > 0 else None
-
-    @cached_property
-    def _states(self) -> list[Any]:
-        """States of the original, from which steps are timed."""
-        model = self.text.model
-        found: list[Any] = []
-        for scene in self.scenes:
-            found += moments(model, initial_data(scene.scenario, model), scene.scenario)
-        return found
+        return found if min(found.nanoseconds.low, own.nanoseconds.low) > 0 else None
 
     def saving(self, trial: PruningTrial, timing: Timing | None) -> Saving:
         """What a change saves, in time and bytes."""
@@ -228,7 +215,8 @@ class PruningTrials:
         memory = len(saved(self.text.model)) - len(saved(trial.model))
         if timing is None:
             return Saving(None, None, False, memory, text)
-        return Saving(timing.ratio, timing.uncertainty, timing.certain, memory, text)
+        ratio = timing.ratio
+        return Saving(ratio.value, ratio.half_width / 2, timing.certain, memory, text)
 
 
 def changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Gone]:

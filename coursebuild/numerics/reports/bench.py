@@ -5,8 +5,27 @@ Entry point: `SceneReport`.
 
 from __future__ import annotations
 
+import math
+
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Record
+
+
+class Interval(Record, frozen=True):
+    """A figure that comes out otherwise each time, and between what it lies in 95 % of cases."""
+
+    value: float
+    low: float
+    high: float
+
+    def scaled(self, factor: float) -> Interval:
+        """In another unit."""
+        return Interval(factor * self.value, factor * self.low, factor * self.high)
+
+    @property
+    def half_width(self) -> float:
+        """Relative to the value; infinite where that is 0."""
+        return (self.high - self.low) / (2 * self.value) if self.value else math.inf
 
 
 class MeasuredSetting(Record, frozen=True):
@@ -54,12 +73,10 @@ class WorkPrecisionRow(Record, frozen=True):
     refsafe: bool
     """Whether constraints were softened because the timestep is long: it is another model."""
     steps: int
-    cost: float | None
+    cost: Interval | None
     """Time for the scenario, relative to the scene's own setting; `None` where it was not timed."""
-    realtime: float | None
-    """Simulated time over the time it takes, on this machine."""
-    spread: float | None
-    """Median over minimum of the repeated times: 1 where nothing disturbed them."""
+    seconds: Interval | None
+    """Processor time for a simulated second on this machine, s; `None` where it was not timed."""
     growth: float | None
     """By what velocities were multiplied in a step, where they grew."""
     own: bool
@@ -75,8 +92,11 @@ class WorkPrecisionRow(Record, frozen=True):
     mean_energy: float | None = None
     """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
     less 1; `None` where nothing is beyond the horizon."""
-    cost_uncertainty: float | None = None
-    """Relative standard error of the cost."""
+
+    @property
+    def realtime(self) -> float | None:
+        """Simulated time over processor time."""
+        return 1 / self.seconds.value if self.seconds and self.seconds.value else None
 
 
 class OrderRow(Record, frozen=True):

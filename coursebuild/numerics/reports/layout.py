@@ -1,6 +1,7 @@
-"""Where the parts of a work–precision plot go: its frame, the lanes above it, the key below.
+"""Where the parts of a plot with logarithmic axes go, and the element that holds it.
 
-Entry points: `PlotLayout`; `Frame`, from values to places; `grid(frame, …)`, ticks and titles.
+Entry points: `Frame`, from values to places; `grid(frame, …)`, ticks and titles; `key(entries, …)`;
+`svg(body, …)`.
 """
 
 from __future__ import annotations
@@ -13,156 +14,17 @@ from msgspec import Struct
 
 from coursebuild.core.drawing.marks import markup_text, shortened, text_width
 from coursebuild.core.drawing.scales import log_ticks
-from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.numerics.reports.points import Chart, PlotLine, Point, lane_text
-from coursebuild.numerics.reports.strokes import FINE, label
+from coursebuild.numerics.reports.strokes import FINE, key_mark, label
 
 SIZE = 12.0
 """Of letters, in the units of the drawing."""
 TICK_SIZE = 11.0
 WIDE, NARROW = 620.0, 350.0
-_HEIGHT = {WIDE: 320.0, NARROW: 260.0}
-"""Of the plot itself, in the units of the drawing."""
-LANE, TALL_LANE = 18.0, 32.0
 ROW = 18.0
 """From one line of a key to the next."""
+_FONT = "var(--sans, system-ui, sans-serif)"
 _LARGEST = 290.0
 """Powers of ten beyond this are drawn there."""
-
-
-class Lane(Struct, frozen=True):
-    """A line's place above the plot."""
-
-    line: PlotLine
-    text: str
-    top: float
-    tall: bool
-    """Whether its text stands above what it shows."""
-
-    @property
-    def middle(self) -> float:
-        """The height of what it shows."""
-        return self.top + (TALL_LANE if self.tall else LANE) - LANE / 2
-
-
-class PlotLayout:
-    """The places in one plot, in units of the drawing; fixed once made."""
-
-    def __init__(self, report: ScenarioReport, found: Chart, width: float) -> None:
-        self.report = report
-        self.chart = found
-        self.width = width
-        self.wide = width == WIDE
-        cost = "cost, relative to the scene’s own setting" if found.timed else "steps"
-        label = shortened(f"error: {found.quantity.label}", _HEIGHT[width], SIZE)
-        self.titles = (cost, label)
-        low_x, high_x, low_y, high_y = self._ranges()
-        texts = [text for _, text in ticks_y(low_y, high_y, _HEIGHT[width])]
-        left = 32 + max((text_width(text, TICK_SIZE) for text in texts), default=0.0)
-        right = width - (self._names_width() if self.wide else 10.0)
-        names = [(line.integrator, self.short(line.integrator)) for line in found.lines]
-        self.names = [] if self.wide else wrapped(names, width - 12)
-        head = 8 + ROW * len(self.names) + (4 if self.names else 0)
-        flat = Frame(left, right, 0, 1, low_x, high_x, low_y, high_y)
-        self.lanes = self._lanes(flat, head)
-        high = sum(TALL_LANE if lane.tall else LANE for lane in self.lanes)
-        top = head + high + (6 if self.lanes else 0)
-        self.frame = Frame(left, right, top, top + _HEIGHT[width], low_x, high_x, low_y, high_y)
-        self.key = wrapped(self._key(), width - (left if self.wide else 6.0))
-        self.key_top = self.frame.bottom + 50
-        self.height = self.key_top + ROW * len(self.key)
-
-    @property
-    def points(self) -> list[Point]:
-        """Every point of the plot."""
-        return [p for line in self.chart.lines for p in (*line.points, *line.others)]
-
-    @property
-    def band(self) -> bool:
-        """Whether what the reference does not resolve is in the picture."""
-        floor = self.chart.quantity.least
-        return floor > 0 and log(floor) > self.frame.low_y
-
-    @property
-    def visible(self) -> bool:
-        """Whether the error that is just visible is in the picture."""
-        return self.chart.quantity.name == "seen" and self.frame.low_y < 0 < self.frame.high_y
-
-    def short(self, name: str) -> str:
-        """The name of a line, in the room that there is for it."""
-        return shortened(name, 0.22 * self.width, SIZE)
-
-    def inside(self, cost: float | None) -> bool:
-        """Whether a cost is within the plot."""
-        return cost is not None and self.frame.low_x <= log(cost) <= self.frame.high_x
-
-    def _ranges(self) -> tuple[float, float, float, float]:
-        points = self.points
-        costs = [log(p.cost) for p in points]
-        costs += [log(p.cost) for line in self.chart.lines for p in line.lost]
-        low, high = min(costs), max(costs)
-        for line in self.chart.lines:  # a boundary that is far away is not worth the room
-            at = None if line.boundary is None else log(line.boundary)
-            if at is not None and low - 0.5 <= at <= high + 0.5:
-                low, high = min(low, at), max(high, at)
-        pad = max(0.06 * (high - low), 0.12)
-        errors = [log(p.error) for p in points if p.error]
-        if (
-            self.chart.quantity.name == "seen"
-            and errors
-            and min(errors) - 1 <= 0 <= max(errors) + 1
-        ):
-            errors.append(0.0)  # from where on it is visible
-        least = self.chart.quantity.least
-        floor = log(least) if least > 0 else -_LARGEST
-        bottom, top = min(errors, default=floor), max(errors, default=floor + 1)
-        if floor > bottom - 1.5:  # the band, with room for what it says
-            bottom = min(bottom, floor) - 0.07 * max(top - bottom, 1.0)
-        span = max(top - bottom, 0.6)
-        top = max(top, bottom + 0.6)
-        return low - pad, high + pad, bottom - 0.05 * span, top + 0.08 * span
-
-    def _names_width(self) -> float:
-        names = [self.short(line.integrator) for line in self.chart.lines]
-        return max(text_width(name, SIZE) for name in names) + 48
-
-    def _lanes(self, frame: Frame, head: float) -> list[Lane]:
-        found: list[Lane] = []
-        at = head
-        for line in self.chart.lines:
-            boundary = line.boundary
-            inside = boundary is not None and frame.low_x <= log(boundary) <= frame.high_x
-            if not (line.lost or inside or line.stable == 0):
-                continue
-            text = shortened(lane_text(line), frame.right - frame.left, TICK_SIZE)
-            ends = [frame.x(p.cost) for p in line.lost]
-            ends += [frame.x(boundary)] if boundary is not None and inside else []
-            ends += [frame.right] if line.stable == 0 else []
-            room = frame.right - max(ends, default=frame.left) - 14
-            tall = text_width(text, TICK_SIZE) > room
-            found.append(Lane(line, text, at, tall))
-            at += TALL_LANE if tall else LANE
-        return found
-
-    def _key(self) -> list[tuple[str, str]]:
-        """What the marks mean: only those that there are."""
-        rows = self.report.rows
-        lost = [p for line in self.chart.lines for p in line.lost]
-        points = self.points
-        others = any(line.others for line in self.chart.lines)
-        own = any(rows[p.row].own for p in (*points, *lost))
-        unstable = any(
-            lane.line.stable == 0 or self.inside(lane.line.boundary) for lane in self.lanes
-        )
-        shown = [
-            ("front", "on the Pareto front", any(rows[p.row].front for p in points)),
-            ("beaten", "another is better", any(not rows[p.row].front for p in points)),
-            ("other", "other solver, iterations or cone", others),
-            ("own", "the scene’s own setting", own),
-            ("lost", "run lost", bool(lost)),
-            ("unstable", "unstable", unstable),
-        ]
-        return [(kind, text) for kind, text, there in shown if there]
 
 
 def log(value: float) -> float:
@@ -172,23 +34,40 @@ def log(value: float) -> float:
     return min(max(math.log10(value), -_LARGEST), _LARGEST)
 
 
-def wrapped(entries: Sequence[tuple[str, str]], room: float) -> list[list[tuple[str, str]]]:
-    """Entries of a key in rows that are no wider than there is room."""
-    rows: list[list[tuple[str, str]]] = []
-    used = math.inf
-    for entry in entries:
-        wide = entry_width(entry[1])
-        if used + wide > room:
-            rows.append([])
-            used = 0.0
-        rows[-1].append(entry)
-        used += wide
-    return rows
+def key(
+    entries: Sequence[tuple[str, int | None, str]], left: float, top: float, width: float
+) -> tuple[str, float]:
+    """Marks and what they mean, in rows; and where the rows end.
+
+    An entry is the kind of its mark, the number of its line if it has one, and a text.
+    """
+    found: list[str] = []
+    x, y = left, top
+    for kind, number, text in entries:
+        text = shortened(text, width - left - 40, TICK_SIZE)
+        wide = 30 + text_width(text, TICK_SIZE) + 10
+        if x > left and x + wide > width:
+            x, y = left, y + ROW
+        found += key_mark(kind, number, x + 14, y - 4)
+        found.append(label(x + 30, y, text, FINE))
+        x += wide
+    return "".join(found), y + 6
 
 
-def entry_width(text: str) -> float:
-    """What an entry of a key takes, with its mark and the gap behind it."""
-    return 30 + text_width(text, TICK_SIZE) + 10
+def svg(body: str, size: tuple[float, float], name: str, said: tuple[str, str], style: str) -> str:
+    """A drawing as an element; `said` is its title and its text for who cannot see it.
+
+    With a `style` it is for a file of its own.
+    """
+    key, (title, text) = markup_text(name), map(markup_text, said)
+    head = ' xmlns="http://www.w3.org/2000/svg"' if style else ""
+    return (
+        f'<svg{head} class="work-precision" viewBox="0 0 {size[0]:g} {size[1]:g}" '
+        f'role="img" aria-labelledby="{key}-title {key}-text" fill="currentColor" '
+        f'font-size="{SIZE:g}" font-family="{_FONT}"><title id="{key}-title">{title}'
+        f'</title><desc id="{key}-text">{text}</desc>'
+        + (f"<style>{style}</style>{body}</svg>\n" if style else f"{body}</svg>")
+    )
 
 
 # -------------------------------------------------------------------------- two logarithmic axes

@@ -12,12 +12,18 @@ and other words; `described`, the plot for who cannot see it.
 from __future__ import annotations
 
 import math
+import statistics
 from collections import Counter
 from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.numerics.reports.bench import MeasuredSetting, ScenarioReport, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import (
+    Interval,
+    MeasuredSetting,
+    ScenarioReport,
+    WorkPrecisionRow,
+)
 
 KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are told, and keep their colour and mark."""
@@ -53,10 +59,8 @@ class Point(Struct, frozen=True):
     """A row that is drawn."""
 
     row: int
-    cost: float
+    cost: Interval
     """Relative to the scene's own setting, or steps where nothing was timed."""
-    timed: bool
-    """Whether the cost was measured, and not taken from the number of steps."""
     error: float | None
     """`None` for a run that was lost."""
 
@@ -73,10 +77,6 @@ class PlotLine(Struct, frozen=True):
     """With another solver, iterations or cone."""
     lost: tuple[Point, ...]
     """Runs without an error to show: diverged, reset, or grown."""
-    boundary: float | None
-    """The cost at the largest stable timestep; `None` where there is none, or it is not known."""
-    stable: float | None
-    """The largest stable timestep, s; `None` as above, 0 where none tried is stable."""
 
 
 class Chart(Struct, frozen=True):
@@ -116,21 +116,21 @@ def telling(report: ScenarioReport) -> Quantity | None:
 def chart(report: ScenarioReport, quantity: Quantity) -> Chart:
     """What to draw of an error."""
     rows = report.rows
-    timed = any(_positive(row.cost) for row in rows)
+    timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
     usual = usual_setting(rows)
     kind = None if usual is None else _kind(usual)
     names = sorted({row.setting.integrator for row in rows}, key=integrator_rank)
-    stable = {one.integrator: one.largest for one in report.stable}
     others = [name for name in names if name not in KNOWN]
     lines = []
     for name in names:
-        own = [n for n, row in enumerate(rows) if row.setting.integrator == name]
-        places = {n: _place(rows, n, own, timed=timed) for n in own}
-        shown = [Point(n, *places[n], _error(quantity, rows[n])) for n in own]
+        shown = [
+            Point(n, _cost(row, timed), quantity.of(row) if row.status == "ok" else None)
+            for n, row in enumerate(rows)
+            if row.setting.integrator == name
+        ]
         kept = [one for one in shown if one.error is not None]
         line = [one for one in kept if _kind(rows[one.row].setting) == kind]
         number = KNOWN.index(name) if name in KNOWN else len(KNOWN) + others.index(name)
-        largest = stable.get(name)
         lines.append(
             PlotLine(
                 name,
@@ -138,11 +138,19 @@ def chart(report: ScenarioReport, quantity: Quantity) -> Chart:
                 tuple(sorted(line, key=lambda one: -rows[one.row].setting.timestep)),
                 tuple(one for one in kept if one not in line),
                 tuple(one for one in shown if one.error is None),
-                _boundary(rows, [(n, places[n][0]) for n in own], largest),
-                largest,
             )
         )
-    return Chart(quantity, tuple(lines), timed)
+    return Chart(quantity, tuple(lines), bool(timed))
+
+
+def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
+    """What a row costs; of one that was not timed, what its number of steps says."""
+    if row in timed and row.cost is not None:
+        return row.cost
+    like = [one for one in timed if one.setting.integrator == row.setting.integrator] or timed
+    rates = [one.cost.value / max(one.steps, 1) for one in like if one.cost is not None]
+    value = max(row.steps, 1) * (statistics.median(rates) if rates else 1.0)
+    return Interval(value, value, value)
 
 
 def is_cut_short(report: ScenarioReport) -> bool:
@@ -154,10 +162,6 @@ def is_cut_short(report: ScenarioReport) -> bool:
 def integrator_rank(name: str) -> tuple[int, str]:
     """By which integrators are told: those of MuJoCo in their order, then others by name."""
     return (KNOWN.index(name) if name in KNOWN else len(KNOWN), name)
-
-
-def _positive(value: float | None) -> bool:
-    return value is not None and 0 < value < math.inf
 
 
 def _kind(setting: MeasuredSetting) -> tuple[str, int, str]:
@@ -178,51 +182,18 @@ def usual_setting(rows: Sequence[WorkPrecisionRow]) -> MeasuredSetting | None:
     return next((row.setting for row in rows if _kind(row.setting) == most), None)
 
 
-def _error(quantity: Quantity, row: WorkPrecisionRow) -> float | None:
-    """Of a run that ended well; any other's says nothing."""
-    return quantity.of(row) if row.status == "ok" else None
-
-
-def _place(
-    rows: Sequence[WorkPrecisionRow], n: int, own: Sequence[int], *, timed: bool
-) -> tuple[float, bool]:
-    """What a row costs, and whether that was measured."""
-    row = rows[n]
-    if row.cost is not None and _positive(row.cost):
-        return row.cost, True
-    steps = max(row.steps, 1)
-    if not timed:
-        return float(steps), False
-
-    def like(other: int) -> tuple[bool, bool, float]:
-        """The row to go by: of the same integrator and solver, and about as many steps."""
-        away = abs(math.log(max(rows[other].steps, 1) / steps))
-        return other not in own, _kind(rows[other].setting) != _kind(row.setting), away
-
-    nearest = min((m for m in range(len(rows)) if _positive(rows[m].cost)), key=like)
-    cost = rows[nearest].cost
-    assert cost is not None
-    return cost * steps / max(rows[nearest].steps, 1), False
-
-
-def _boundary(
-    rows: Sequence[WorkPrecisionRow], places: Sequence[tuple[int, float]], largest: float | None
-) -> float | None:
-    """The cost at a timestep, by that of the nearest row."""
-    if largest is None or not 0 < largest < math.inf or not places:
-        return None
-    n, cost = min(
-        places, key=lambda place: abs(math.log(rows[place[0]].setting.timestep / largest))
-    )
-    return cost * rows[n].setting.timestep / largest
-
-
 def seconds_text(value: float, digits: int = 6) -> str:
     """A short time with its unit."""
     for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
         if value >= size * 0.9999995:
             return f"{value / size:.{digits}g} {unit}"
     return f"{value:.{digits}g} s"
+
+
+def interval_text(value: Interval) -> str:
+    """A figure in three digits with half the width of its interval, in per cent."""
+    share = 100 * value.half_width
+    return f"{value.value:.3g}" + (f" ± {share:.2g} %" if 0.05 <= share < math.inf else "")
 
 
 def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:
@@ -269,7 +240,8 @@ def described(report: ScenarioReport, found: Chart) -> tuple[str, str]:
     against = "cost" if found.timed else "steps"
     title = f"{report.title or report.name}: error of {label} against {against}"
     parts = [_range(line) for line in found.lines if line.points or line.others]
-    parts += [f"{lane_text(line)}." for line in found.lines if line.lost or line.stable == 0]
+    lost = [line.integrator for line in found.lines if line.lost]
+    parts += [f"Runs were lost under {', '.join(lost)}."] if lost else []
     own = next((n for n, row in enumerate(report.rows) if row.own), None)
     if own is not None:
         parts.append(f"The scene’s own setting is {setting_text(report.rows[own].setting)}.")
@@ -283,7 +255,7 @@ def described(report: ScenarioReport, found: Chart) -> tuple[str, str]:
 def _range(line: PlotLine) -> str:
     points = [*line.points, *line.others]
     errors = [p.error for p in points if p.error is not None]
-    costs = [p.cost for p in points]
+    costs = [p.cost.value for p in points]
     spread = f"{min(errors):.2g}"
     if max(errors) > min(errors):
         spread = f"{max(errors):.2g} to {spread}"
@@ -301,8 +273,8 @@ def point_title(report: ScenarioReport, found: Chart, point: Point) -> str:
         parts.append("; ".join((status_text(row.status), *row.reasons)))
     else:
         parts.append(f"error {point.error:.3g}")
-    if point.timed:
-        parts.append(f"cost {point.cost:.3g}")
+    if row.cost is not None:
+        parts.append(f"cost {interval_text(row.cost)}")
     elif found.timed:
         parts.append("not timed")
     parts.append(f"{row.steps} steps")
@@ -314,13 +286,3 @@ def point_title(report: ScenarioReport, found: Chart, point: Point) -> str:
         better = setting_text(report.rows[row.dominated_by].setting, row.setting)
         parts.append(f"{better} is better")
     return " · ".join(parts)
-
-
-def lane_text(line: PlotLine) -> str:
-    """What was lost of an integrator, and where it is stable."""
-    if line.stable == 0:
-        return f"{line.integrator} is never stable"
-    if line.stable is not None:
-        return f"{line.integrator} is stable up to {seconds_text(line.stable, 3)}"
-    many = len(line.lost)
-    return f"{line.integrator} lost {'a run' if many == 1 else f'{many} runs'}"

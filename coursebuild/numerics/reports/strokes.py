@@ -1,6 +1,6 @@
 """The strokes of a work–precision plot: marks, dashes, rings, lines, letters.
 
-Entry points: `dash`, `colour`, `symbol`, `key_mark`; `path`, `area`, `label`, `ring`, `leader`.
+Entry points: `dash`, `colour`, `symbol`, `bar`, `key_mark`; `path`, `area`, `label`, `ring`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from coursebuild.core.drawing.marks import Box, markup_text
+from coursebuild.core.drawing.marks import markup_text
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4")
 _LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#2b6f9e", "#1e1e1c")
@@ -87,21 +87,16 @@ def symbol(number: int, x: float, y: float, size: float, *, full: bool, title: s
     )
 
 
+def bar(low: float, high: float, y: float, number: int) -> str:
+    """The interval of a value, with an end at each side."""
+    d = f"M{low:.1f} {y:.1f}H{high:.1f}M{low:.1f} {y - 3:.1f}v6M{high:.1f} {y - 3:.1f}v6"
+    return path(d, f'stroke="{colour(number)}"')
+
+
 def ring(x: float, y: float, radius: float) -> str:
     """What is around the scene's own setting."""
     look = f'fill="none" stroke="{OWN}" stroke-width="1.8"'
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" {look}/>'
-
-
-def leader(at: tuple[float, float], box: Box) -> Iterator[str]:
-    """A line from the ring to its label, where that is not beside it."""
-    x, y = at
-    near = min(max(x, box.left), box.right), min(max(y, box.top), box.bottom)
-    far = math.dist(at, near)
-    if far > RING + 10:
-        part = RING / far
-        start = f"M{x + part * (near[0] - x):.1f} {y + part * (near[1] - y):.1f}"
-        yield path(f"{start}L{near[0]:.1f} {near[1]:.1f}", f'stroke="{OWN}"')
 
 
 def key_mark(kind: str, number: int | None, x: float, y: float) -> Iterator[str]:
@@ -113,9 +108,6 @@ def key_mark(kind: str, number: int | None, x: float, y: float) -> Iterator[str]
         yield ring(x, y, 6)
     elif kind == "lost":
         yield path(cross(x, y), f'stroke="{INK}" stroke-width="1.8"')
-    elif kind == "unstable":
-        yield area(f"M{x - 11:.1f} {y - 5:.1f}h20v10h-20Z", 'fill-opacity="0.2"')
-        yield path(f"M{x + 9:.1f} {y - 7:.1f}v14", f'stroke="{INK}" stroke-width="2"')
     else:
         full = INK if kind == "front" else PAPER
         look = f'fill="{full}" stroke="{INK}" stroke-width="1.5"'
