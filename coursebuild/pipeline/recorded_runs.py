@@ -115,7 +115,6 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         if before is not None and replace(before.record, made=0) == replace(record, made=0):
             continue
         file = options.root / path
-        file.parent.mkdir(parents=True, exist_ok=True)
         data = msgspec.json.format(msgspec.json.encode(kept), indent=2) + b"\n"
         expected = file.read_bytes() if file.exists() else None
         write_atomic(options.root, path, data, expected=expected)

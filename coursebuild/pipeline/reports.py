@@ -170,7 +170,6 @@ def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
         before = target.read_bytes() if target.exists() else None
         if before == data:
             return f"{path} is as it was"
-        target.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(root, path, data, expected=before)
     except EffectError as error:
         return ReportFailure(error.message, error.help)

@@ -4,20 +4,22 @@ Entry points: `page_news(session, path)`, as JSON; `accept(session, path, id)`.
 
 1. Every mistake of the course, those of the page's own document first; each says whether the page
    shows it in its place.
-2. For each script of the page how it did, for each recorded output that differs the two side by
-   side, and for each bound number what would be right.
-3. What is offered has an id made from the text of the lesson and the edit. It is written only as
-   long as it would still be the same edit of the same text: nothing is ever written that was not
-   seen.
+2. For each script of the page how it did, for each recorded output or figure that differs the two
+   side by side, and for each bound number what would be right.
+3. What is offered has an id made from what the file holds and would hold. It is written only as
+   long as both are still the same: nothing is ever written that was not seen.
 """
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
+
+from msgspec import Struct
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.write import write_atomic
@@ -29,29 +31,46 @@ from coursebuild.core.model import (
     Script,
     document_blocks,
 )
+from coursebuild.core.model.figures import RecordedFigure, recorded_figures
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.diff import DiffRow, diff_rows
 from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.scripts.figures import difference, drawn_file
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity
+from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.judge import judge
 from coursebuild.preview.session import Session
 from coursebuild.report import Report
 
 _MOST = 60
 """Mistakes that a page is told of."""
-_IN_PLACE = ("output-drift", "binding-mismatch")
+_IN_PLACE = ("output-drift", "binding-mismatch", "figure-drift")
 """Rules whose mistakes a page shows where they are."""
+_IMAGES = {"svg": "image/svg+xml", "png": "image/png"}
 
 
-def offer_id(edit: Edit) -> str:
-    """By which an edit is accepted; another text or another edit has another."""
-    span = edit.span
-    parts = (span.path, str(span.start), str(span.end), edit.text, span.source.text)
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(f"{len(part)}:{part}".encode("utf-8", "surrogatepass"))
-    return digest.hexdigest()[:24]
+class Offer(Struct, frozen=True):
+    """What a file of the course would hold instead."""
+
+    path: str
+    old: bytes | None
+    new: bytes
+
+    @classmethod
+    def of(cls, edit: Edit) -> Offer:
+        """A lesson with an edit."""
+        source = edit.span.source
+        new = apply_edits(source.text, [edit])
+        return cls(source.path, source.text.encode(), new.encode())
+
+    @property
+    def id(self) -> str:
+        """By which it is accepted."""
+        digest = hashlib.sha256(self.path.encode())
+        for data in (self.old or b"", self.new):
+            digest.update(b"%d:" % len(data) + data)
+        return digest.hexdigest()[:24]
 
 
 def report_now(session: Session) -> Report:
@@ -72,11 +91,13 @@ def page_news(session: Session, path: str) -> str:
             "trouble": session.trouble,
             "scripts": [],
             "outputs": [],
+            "figures": [],
             "numbers": [],
         }
         if document is not None and session.course is not None:
             news["scripts"] = list(_scripts(session, document))
             news["outputs"] = list(_outputs(session, session.course, document))
+            news["figures"] = list(_figures(session, document))
             news["numbers"] = list(_numbers(document, report.diagnostics))
         return json.dumps(news, ensure_ascii=False, separators=(",", ":"))
 
@@ -159,7 +180,7 @@ def _drift(session: Session, course: Course, verdict: Verdict, run: ScriptRun) -
     offered = _update(session, course, verdict, run)
     told: dict[str, Any] = {"rows": [_row(row) for row in rows], "offer": None, "refused": ""}
     if isinstance(offered, Edit):
-        told["offer"] = offer_id(offered)
+        told["offer"] = Offer.of(offered).id
     elif offered is not None:
         told["refused"] = offered.message
     return told
@@ -178,6 +199,43 @@ def _update(
         return None
     filters = course.filters
     return updated_body(verdict.recording, verdict.comparison, filters, run.stdout, again)
+
+
+# --- figures
+
+
+def _figures(session: Session, document: Document) -> Iterator[dict[str, Any]]:
+    """The figures of which scripts draw another now; of data there is no image."""
+    for figure, offer in _drawn(session, document):
+        kind = _IMAGES.get(figure.name.rpartition(".")[2])
+        image = f"data:{kind};base64,{base64.b64encode(offer.new).decode()}"
+        yield {
+            "name": figure.name,
+            "differs": _differs(figure, offer),
+            "drawn": image if kind else "",
+            "offer": offer.id,
+        }
+
+
+def _drawn(session: Session, document: Document) -> Iterator[tuple[RecordedFigure, Offer]]:
+    """The figures of which scripts draw another now, and what that is."""
+    assert session.library is not None
+    wrong = {d.span for d in session.diagnostics() if d.rule == "figure-drift"}
+    for figure in recorded_figures(document):
+        run = session.library.runs.get(figure.script)
+        data = dict(run.figures).get(figure.name) if run is not None else None
+        drawn = drawn_file(figure.name, data) if data is not None else ""
+        if figure.span in wrong and isinstance(drawn, bytes):
+            offer = Offer(figure.path, read_recorded(session.root, figure.path), drawn)
+            if _differs(figure, offer):
+                yield figure, offer
+
+
+def _differs(figure: RecordedFigure, offer: Offer) -> str:
+    """How a drawing differs from the recorded one, in words; empty where it does not."""
+    if offer.old is None:
+        return "nothing is recorded yet"
+    return difference(figure.name, offer.old, offer.new)
 
 
 # --- bound numbers
@@ -207,7 +265,7 @@ def _number(binding: NumberBinding, nth: int, told: Diagnostic) -> dict[str, Any
         "message": told.message,
         "label": told.label,
         "better": "" if edit is None else edit.text,
-        "offer": None if edit is None else offer_id(edit),
+        "offer": None if edit is None else Offer.of(edit).id,
     }
 
 
@@ -220,19 +278,17 @@ def accept(session: Session, path: str, id: str) -> str:
     The lock is held, so that two browsers cannot accept the same at once.
     """
     with session.changed:
-        edit = next((e for e in _offers(session, path) if offer_id(e) == id), None)
-        if edit is None:
+        offer = next((offer for offer in _offers(session, path) if offer.id == id), None)
+        if offer is None:
             return "this is no longer what the page offers; look at it again"
-        source = edit.span.source
         try:
-            new = apply_edits(source.text, [edit]).encode()
-            write_atomic(session.root, source.path, new, expected=source.text.encode())
+            write_atomic(session.root, offer.path, offer.new, expected=offer.old)
         except EffectError as error:
             return error.message
         return ""
 
 
-def _offers(session: Session, path: str) -> Iterator[Edit]:
+def _offers(session: Session, path: str) -> Iterator[Offer]:
     """What may be accepted on a page."""
     document, course, library = session.files.document(path), session.course, session.library
     if document is None or course is None or library is None:
@@ -242,7 +298,9 @@ def _offers(session: Session, path: str) -> Iterator[Edit]:
         if verdict is not None and verdict.status == "drift" and run is not None:
             edit = _update(session, course, verdict, run)
             if isinstance(edit, Edit):
-                yield edit
+                yield Offer.of(edit)
+    for _, offer in _drawn(session, document):
+        yield offer
     for diagnostic in session.diagnostics():
         if diagnostic.rule == "binding-mismatch" and diagnostic.span.path == document.source.path:
-            yield from diagnostic.edits
+            yield from map(Offer.of, diagnostic.edits)

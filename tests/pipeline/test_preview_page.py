@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.lab_page import comes
 from support.preview_process import Preview, serving
-from support.scratch_course import GOOD, ROOT, Folder
+from support.scratch_course import GOOD, ROOT, Folder, block
 
 Make = Callable[..., Folder]
 pytestmark = pytest.mark.browser
@@ -238,6 +238,49 @@ def test_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) 
             opened.unbroken()
         text = GOOD.replace("3.14159", "2.71828") + "About `2.72`{out}.\n"
         assert folder.text(folder.lesson()) == text
+
+
+def test_figures_are_shown_side_by_side_and_accepted(make: Make, browser: Browser) -> None:
+    """An SVG with its data, and a PNG."""
+    code = """from PIL import Image
+
+with open("a.svg", "w") as file:
+    file.write('<svg xmlns="http://www.w3.org/2000/svg" width="90" height="90">')
+    file.write('<path d="M0 0H50"/></svg>')
+with open("a.csv", "w") as file:
+    file.write("end\\n50\\n")
+with open("b.png", "wb") as file:
+    Image.new("L", (50, 20), 50).save(file, "PNG")
+"""
+    drawn = block("a.py", code, info="figure=a.svg,a.csv,b.png")
+    folder = make(f"## A\n\n{drawn}Figure: ![A line](a.svg)\n\nFigure: ![A box](b.png)\n")
+    assert folder.run("update").status == 0
+    with serving(folder) as preview:
+        preview.heard("checked: ")
+        with Open(browser, preview, LESSON) as opened:
+            page = opened.page
+            folder.write(folder.lesson(), folder.text(folder.lesson()).replace("50", "40"))
+            for name in ("A line", "A box"):
+                shown = page.locator("figure.figure", has=page.get_by_alt_text(name, exact=True))
+                box = shown.get_by_role("group", name="Recorded figure, and this run").first
+                see(box)
+                see(box.get_by_alt_text(f"{name} (recorded)"))
+                see(box.get_by_alt_text(f"{name} (this run)"))
+                expect(shown.locator("> img").first).to_be_hidden()
+            expect(page.get_by_role("region", name="Problems")).to_have_count(0)
+            sizes = "images => images.map((one) => one.naturalWidth)"
+            assert box.locator("img").evaluate_all(sizes) == [50, 40]
+            for count in (2, 1, 0):
+                accept = page.get_by_role("button", name=re.compile("^Accept th"))
+                expect(accept).to_have_count(count + 1)
+                accept.first.click()
+            expect(page.locator(".preview-drift")).to_have_count(0)
+            see(page.get_by_alt_text("A box", exact=True))
+            assert page.get_by_alt_text("A box", exact=True).evaluate_all(sizes) == [40]
+            expect(page.locator(".preview-button")).to_be_hidden()
+            opened.unbroken()
+        assert "H40" in folder.text("content/lessons/a.svg")
+        assert folder.text("content/lessons/a.csv") == "end\n40\n"
 
 
 def test_script_that_runs_and_fails_is_marked(make: Make, browser: Browser) -> None:

@@ -201,7 +201,6 @@ class _Update:
             return None
 
     def _write(self, path: str) -> None:
-        (self.root / path).parent.mkdir(parents=True, exist_ok=True)
         try:
             write_atomic(
                 self.root, path, self.wanted[path], expected=self.current[path], durable=False

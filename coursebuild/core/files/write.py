@@ -36,7 +36,8 @@ def write_atomic(
         root: the course folder.
         path: POSIX path relative to it.
         data: the new content.
-        expected: what the file held when it was read; `None` when there was none.
+        expected: what the file held when it was read; `None` when there was none, and perhaps no
+            folder either.
         durable: whether it is an author's file: its bytes must survive a power cut from now on, and
             it stays as it is where it is read-only (a derived file can be made again).
 
@@ -50,6 +51,8 @@ def write_atomic(
     try:
         if target.exists() and not target.is_file():
             raise EffectError(f"{path} is not a regular file")
+        if expected is None:
+            target.parent.mkdir(parents=True, exist_ok=True)
         fd, temporary = _open_temporary(target.parent)
         try:
             _fill(fd, data, target)

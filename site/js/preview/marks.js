@@ -1,6 +1,6 @@
 /**
- * How scripts did, in its place: beside each recorded output that is still checked, or that is another now, and at each bound number
- * that does not hold.
+ * How scripts did, in its place: beside each recorded output that is still checked, or that is another now, at each figure that is
+ * another now, and at each bound number that does not hold.
  *
  *   const marks = new Marks(accept)      accept(id) → Promise<text>, why not, or nothing
  *   marks.show(news)                     after each piece of news, and after each change of the page
@@ -25,11 +25,15 @@ export class Marks {
     this.shown = new Map() // element → { text, parts }
   }
 
-  show({ outputs, numbers }) {
+  show({ outputs, figures, numbers }) {
     const wanted = new Map()
     for (const told of outputs) {
       const element = outputOf(told)
       if (element && (told.state === 'drift' || told.state in STATES)) wanted.set(element, told)
+    }
+    for (const told of figures) {
+      const element = figureOf(told)
+      if (element) wanted.set(element, told)
     }
     for (const told of numbers) {
       const element = numberOf(told)
@@ -48,8 +52,13 @@ export class Marks {
     const old = this.shown.get(element)
     if (old?.text === text) return
     if (old) clear(element, old.parts)
-    const parts = 'rows' in told ? this.drift(element, told) : 'state' in told ? this.state(element, told) : this.number(element, told)
-    this.shown.set(element, { text, parts })
+    this.shown.set(element, { text, parts: this.parts(element, told) })
+  }
+
+  parts(element, told) {
+    if ('rows' in told) return this.drift(element, told)
+    if ('drawn' in told) return told.drawn ? this.figure(element, told) : this.data(element, told)
+    return 'state' in told ? this.state(element, told) : this.number(element, told)
   }
 
   state(element, { state }) {
@@ -67,6 +76,30 @@ export class Marks {
       this.foot(told, 'Accept this output', 'It is run once more, to see whether it prints the same again.'),
     )
     element.classList.add('preview-known', 'preview-drifted')
+    element.append(box)
+    return [box]
+  }
+
+  figure(element, told) {
+    const image = element.querySelector('img')
+    const drawings = [
+      ['recorded', reloaded(image.src)],
+      ['this run', told.drawn],
+    ].map(([label, src]) => h('div', { class: 'preview-drawing' }, h('img', { src, alt: `${image.alt} (${label})` }), h('p', {}, label)))
+    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded figure, and this run' })
+    box.append(
+      h('p', { class: 'preview-legend' }, `The script draws something else now: ${told.differs}.`),
+      h('div', { class: 'preview-drawings' }, ...drawings),
+      this.foot(told, 'Accept this figure', ''),
+    )
+    element.classList.add('preview-drifted')
+    element.prepend(box)
+    return [box]
+  }
+
+  data(element, told) {
+    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded data, and this run' })
+    box.append(h('p', { class: 'preview-legend' }, `The script writes other data now: ${told.differs}.`), this.foot(told, 'Accept these data', ''))
     element.append(box)
     return [box]
   }
@@ -92,7 +125,7 @@ export class Marks {
     const button = h('button', { type: 'button', class: 'preview-accept' }, label)
     button.addEventListener('click', async () => {
       button.disabled = true
-      answer.textContent = 'Written into the lesson.'
+      answer.textContent = 'Written.'
       const why = await this.accept(offer)
       if (!why) return
       answer.textContent = `Nothing was written: ${why}.`
@@ -120,6 +153,7 @@ function diff(rows) {
 
 function clear(element, parts) {
   for (const part of parts) part.remove()
+  for (const image of element.querySelectorAll(':scope > img')) image.src = reloaded(image.src)
   element.classList.remove('preview-known', 'preview-drifted', 'preview-wrong')
 }
 
@@ -128,6 +162,21 @@ function outputOf({ script, nth }) {
   const own = (figure) => figure.dataset.script === script
   const figures = [...document.querySelectorAll('figure[data-script]')].filter(own)
   return figures.flatMap((figure) => [...figure.querySelectorAll('.output')])[nth] ?? null
+}
+
+/** The figure that shows a drawing with this name, or the caption of the one whose data have it. */
+function figureOf({ name, drawn }) {
+  const known = drawn ? name : name.replace(/csv$/, '')
+  const figures = [...document.querySelectorAll('figure[data-figure]')]
+  const figure = figures.find(({ dataset }) => (drawn ? dataset.figure === known : dataset.figure.startsWith(known)))
+  return (drawn ? figure : figure?.querySelector('figcaption')) ?? null
+}
+
+/** An address by which a browser asks for an image that it has already. */
+function reloaded(src) {
+  const url = new URL(src)
+  url.searchParams.set('at', Date.now())
+  return url.href
 }
 
 /** The bound number with this place among those of the same text. The page shows minus signs where the lesson has hyphens. */
