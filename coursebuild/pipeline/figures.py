@@ -60,7 +60,6 @@ def write_figures(
             continue
         try:
             if not dry_run:
-                (options.root / figure.path).parent.mkdir(parents=True, exist_ok=True)
                 write_atomic(options.root, figure.path, drawn, expected=recorded)
         except (EffectError, OSError) as error:
             failed.append(diagnose("output-not-updatable", figure.span, str(error)))

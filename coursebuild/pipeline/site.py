@@ -29,11 +29,13 @@ from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
+from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Results, SiteFile
 from coursebuild.core.pages import meta, urls, zips
 from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.compressed import compressed_files
+from coursebuild.core.pages.dark import dark_colours, dark_drawing
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
@@ -204,14 +206,26 @@ class SiteMaker:
         for model in self.course.models:
             path = urls.model_file_path(model.name)
             yield OutputFile(path, model.source.text.encode())
-        digests = Digests(self.store)
+        digests, dark = Digests(self.store), self._drawings()
         for path in self.course.files:
             digest = digests.file(f"{self.root}/{path}")
             read = functools.partial(read_bytes, self.root, path)
             if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
                 digest = hashlib.sha256(read()).hexdigest()
             yield CachedFile(urls.file_path(path), digest, read)
+            if path in dark:
+                made = functools.partial(self._dark, read)
+                yield CachedFile(urls.dark_path(path), step_key("dark drawing", digest), made)
         digests.save()
+
+    def _drawings(self) -> frozenset[str]:
+        """The drawings of scripts that have a dark sibling."""
+        drawn = (figure for d in self.course.documents for figure in recorded_figures(d))
+        return frozenset(figure.path for figure in drawn if figure.has_dark)
+
+    def _dark(self, read: Callable[[], bytes]) -> bytes:
+        known = dark_colours(self.assets.file("css/site.css").decode())
+        return dark_drawing(read().decode(), known).encode()
 
     def _around(self) -> zips.Surroundings:
         """What scripts need around them."""

@@ -43,7 +43,7 @@ def test_figure_is_recorded_compared_and_shown(make: Make) -> None:
     page = (folder.root / "public/lessons/1.1-one.html").read_text()
     assert 'alt="A line"' in page
     assert "It <em>rises</em>." in page
-    assert '<a class="drawn-by" href="#line.py">Drawn by examples/line.py</a>' in page
+    assert '<a href="#line.py">Drawn by examples/line.py</a>' in page
     folder.write(folder.lesson(), lesson(5))
     drifted = folder.run("check")
     assert "figure-drift]: the recorded figure differs from this run: 1 of its parts moved" in (
@@ -53,6 +53,23 @@ def test_figure_is_recorded_compared_and_shown(make: Make) -> None:
     assert folder.run("check").status == 1
     assert folder.run("update").status == 0
     assert folder.run("check").status == 0
+
+
+def test_data_are_recorded_and_linked(make: Make) -> None:
+    code = LINE.format(end=9) + 'with open("line.csv", "w") as file:\n    file.write("x\\n9\\n")\n'
+    drawn = block("line.py", code, "drawn True", info="figure=line.csv,line.svg")
+    text = f"## A line\n\n{drawn}Figure: A line that rises.\n"
+    folder = make(text)
+    updated = folder.run("update")
+    assert updated.status == 0, updated.out
+    assert folder.text("content/lessons/line.csv") == "x\n9\n"
+    assert folder.run("build").status == 0
+    page = (folder.root / "public/lessons/1.1-one.html").read_text()
+    assert '<a href="../files/lessons/line.csv" download>Data</a>' in page
+    folder.write(folder.lesson(), text.replace("9\\n", "7\\n"))
+    assert "figure-drift]: the recorded data differ from this run: 1 of its cells" in (
+        folder.run("check").out
+    )
 
 
 def test_figure_of_a_remembered_run_is_compared(make: Make) -> None:

@@ -209,6 +209,16 @@ def test_marks_and_lines(theme: str) -> None:
     assert found == []
 
 
+def test_figures_of_the_course() -> None:
+    """They have colours of pages, which are looked at above, but for their grid."""
+    style = (CSS.parents[1] / "matplotlibrc").read_text(encoding="utf-8")
+    lines = [line for line in style.splitlines() if not line.startswith(("#", "grid"))]
+    used = {f"#{digits}" for line in lines for digits in re.findall(r"\b[0-9a-f]{6}\b", line)}
+    pairs = [pair for name in (*MEANT, "var(--ink)") for pair in PROPERTIES[name[4:-1]]]
+    assert len(used) > 6
+    assert used - {pair.partition("(")[2].partition(",")[0] for pair in pairs} == set()
+
+
 def _strokes(rule: Rule) -> Iterator[str]:
     """Colours of outlines, and of what is drawn, but for quiet rules, which tell nothing."""
     for name in ("outline", "outline-color", "stroke", "fill", "accent-color"):

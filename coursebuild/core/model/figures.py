@@ -1,4 +1,4 @@
-"""Figures that scripts draw, and the files of the course that they are recorded in.
+"""Figures that scripts draw and their data, and the files of the course that they are recorded in.
 
 Entry point: `recorded_figures`.
 """
@@ -18,7 +18,7 @@ from coursebuild.core.text.source import Span
 
 
 class RecordedFigure(Struct, frozen=True):
-    """What a script draws, as a lesson shows it."""
+    """A figure that a script draws, as a lesson shows it, or its data."""
 
     script: str
     name: str
@@ -26,16 +26,21 @@ class RecordedFigure(Struct, frozen=True):
     path: str
     """The file of the course that is shown."""
     span: Span
-    """Where the lesson names that."""
+    """Where the lesson names the figure."""
+
+    @property
+    def has_dark(self) -> bool:
+        """Whether there is a drawing for dark pages, too."""
+        return self.name.endswith(".svg")
 
 
 def recorded_figures(document: Document) -> tuple[RecordedFigure, ...]:
-    """The figures of a document's scripts that paragraphs below them show."""
+    """The figures of a document's scripts that paragraphs show, each with its data after it."""
     return tuple(_recorded(document))
 
 
 def unshown_figures(document: Document) -> tuple[FigureName, ...]:
-    """The figures of a document's scripts that no paragraph below shows."""
+    """The figures of a document's scripts that no paragraph below shows, and data of none."""
     shown = {(figure.script, figure.name) for figure in recorded_figures(document)}
     return tuple(
         figure
@@ -54,8 +59,9 @@ def _recorded(document: Document) -> Iterator[RecordedFigure]:
         elif isinstance(block, Paragraph) and block.figure:
             for inline in walk_inlines(block_inlines(block)):
                 if isinstance(inline, Image):
-                    name = posixpath.basename(inline.url)
-                    if name in drawn:
-                        path = local_file(inline.url, document.source.path)
-                        yield RecordedFigure(drawn[name], name, path, inline.url_span)
+                    path = local_file(inline.url, document.source.path)
+                    for file in (path, f"{posixpath.splitext(path)[0]}.csv"):
+                        name = posixpath.basename(file)
+                        if name in drawn:
+                            yield RecordedFigure(drawn[name], name, file, inline.url_span)
                     break

@@ -17,6 +17,7 @@ from msgspec import Struct
 from coursebuild.core.model import (
     Callout,
     Comparison,
+    Image,
     Mjcf,
     Mode,
     NumberBinding,
@@ -27,7 +28,9 @@ from coursebuild.core.model import (
     listing_anchor,
     output_anchor,
 )
+from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import Outcome
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.folding import Part, fold
 from coursebuild.core.pages.listings import numbered
@@ -89,6 +92,22 @@ def plain_code(page: PageContext, block: PlainCode) -> Markup:
     if block.source is None:
         return shown
     return page.template("blocks/source_part.html", path=block.source.path, code=shown)
+
+
+def figure(page: PageContext, image: Image, caption: Markup) -> Markup:
+    """An image with its caption; of one that a script draws the script and the data are linked."""
+    files = [file for file in recorded_figures(page.document) if file.span == image.url_span]
+    drawn, data = (*files, None, None)[:2]
+    return page.template(
+        "blocks/figure.html",
+        image=image,
+        caption=caption,
+        href=page.url(image.url),
+        drawn=drawn,
+        dark=drawn and drawn.has_dark and page.place.href(urls.dark_path(drawn.path)),
+        anchor=drawn and listing_anchor(drawn.script),
+        data=data and page.place.href(urls.file_path(data.path)),
+    )
 
 
 def callout(page: PageContext, block: Callout) -> Markup:

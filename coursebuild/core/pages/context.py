@@ -32,9 +32,7 @@ from coursebuild.core.model import (
     UrlTarget,
     child_blocks,
     document_blocks,
-    listing_anchor,
 )
-from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.pages import blocks, formulas, markup, urls
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import document_inputs, file_address
@@ -88,14 +86,9 @@ class PageContext(Struct, frozen=True):
         """An address as written, but a file of the course becomes its place in the site."""
         return file_address(self.place, self.document.source.path, url)
 
-    def drawn_by(self, image: Image) -> Markup:
-        """A link to the script that draws an image."""
-        scripts = {figure.span: figure.script for figure in recorded_figures(self.document)}
-        path = scripts.get(image.url_span)
-        if path is None:
-            return Markup()
-        link = Markup('<a class="drawn-by" href="#{}">{}</a>')
-        return link.format(quote(listing_anchor(path)), self.tools.words("figure.drawn", path=path))
+    def figure(self, image: Image, caption: Markup) -> Markup:
+        """An image with its caption, its script and its data."""
+        return blocks.figure(self, image, caption) + Markup("\n")
 
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""

@@ -42,8 +42,8 @@ class Context(Protocol):
         """The address of an image that is written as `url`."""
         ...
 
-    def drawn_by(self, image: Image) -> Markup:
-        """What says which script has drawn an image; empty where none has."""
+    def figure(self, image: Image, caption: Markup) -> Markup:
+        """An image with a caption, with its line end."""
         ...
 
     def math(self, tex: str) -> Markup:

@@ -206,12 +206,7 @@ class _Writer:
         """An image with the rest of its paragraph as its caption."""
         image = next(one for one in paragraph.children if isinstance(one, Image))
         words = self.inlines(one for one in paragraph.children if one is not image)
-        caption = words.removeprefix("Figure:").strip()
-        drawn = self.context.drawn_by(image)
-        lines = "\n".join(part for part in (caption, str(drawn)) if part)
-        said = f"<figcaption>{lines}</figcaption>\n" if lines else ""
-        kind = " figure-lines" if image.url.endswith(".svg") and drawn else ""
-        return f'<figure class="figure{kind}">\n{self._image(image)}\n{said}</figure>\n'
+        return self.context.figure(image, Markup(words.removeprefix("Figure:").strip()))
 
     def _heading(self, heading: Heading) -> str:
         inner, name = self.inlines(heading.children), f"h{heading.level}"

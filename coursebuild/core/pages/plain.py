@@ -81,9 +81,9 @@ class PlainContext:
         """The address as written."""
         return url
 
-    def drawn_by(self, image: Image) -> Markup:
-        """Nothing."""
-        return Markup()
+    def figure(self, image: Image, caption: Markup) -> Markup:
+        """A paragraph."""
+        return Markup(f"<p>{render_inlines((image,), self, PLAIN)}\n{caption}</p>\n")
 
     def math(self, tex: str) -> Markup:
         """The TeX between its delimiters."""

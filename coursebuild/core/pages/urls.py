@@ -89,6 +89,11 @@ def file_path(path: str) -> str:
     return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
 
 
+def dark_path(path: str) -> str:
+    """`files/lessons/flip.dark.svg`: a drawing of the course for dark pages."""
+    return f"{file_path(path).removesuffix('.svg')}.dark.svg"
+
+
 def absolute(course: Course, path: str) -> str:
     """The full address of a site path, or the empty text where the course has no base address."""
     if not course.base_url:

@@ -7,11 +7,15 @@ Entry points: `figure_findings`; `drawn_file`, what is recorded of a drawing; `d
 2. Two drawings in SVG are the same where elements, attributes and texts are, and numbers differ by
    less than a thousandth of the drawing's size. Two in PNG are the same where the root mean square
    of what pixels differ by is below one of 255 steps.
+3. Of its data, in CSV, texts are the same, and numbers differ by less than a thousandth of the
+   largest in their column.
 """
 
 from __future__ import annotations
 
+import csv
 import io
+import itertools
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -24,7 +28,7 @@ from coursebuild.core.scripts.extract import owners
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 TOLERANCE = 1e-3
-"""Of the longer side of a drawing in SVG."""
+"""Of the longer side of a drawing in SVG; of the largest number in a column of data."""
 PIXEL_TOLERANCE = 1.0
 """Root mean square over all channels of all pixels, of 255."""
 
@@ -47,6 +51,9 @@ def figure_findings(
         for figure in unshown_figures(document):
             message = f"no paragraph below shows `{figure.name}`"
             help = f"write `Figure: ![what it shows]({figure.name}) A caption.` below the script"
+            if figure.name.endswith(".csv"):
+                message = f"no figure that is shown below has the data `{figure.name}`"
+                help = "the figure has the same name, but for `.svg` or `.png` at its end"
             yield diagnose("figure-unshown", figure.span, message, help=help)
         for recorded in recorded_figures(document):
             run = by_path.get(recorded.script)
@@ -74,7 +81,8 @@ def _compared(
         return
     differs = difference(figure.name, recorded, drawn)
     if differs:
-        message = f"the recorded figure differs from this run: {differs}"
+        kind = "data differ" if figure.name.endswith(".csv") else "figure differs"
+        message = f"the recorded {kind} from this run: {differs}"
         help = f"if the change is intended, run {update}"
         yield diagnose("figure-drift", figure.span, message, help=help)
 
@@ -82,8 +90,9 @@ def _compared(
 def drawn_file(name: str, data: bytes) -> bytes | str:
     """What is recorded of a drawing; in words, why it cannot be shown."""
     if name.endswith(".png"):
-        size = _png_size(data)
-        return data if size is not None else "is no PNG"
+        return data if _png_size(data) is not None else "is no PNG"
+    if name.endswith(".csv"):
+        return b"\n".join(data.splitlines()) + b"\n"
     tree = _svg(data)
     return tree if isinstance(tree, str) else ET.tostring(tree, encoding="utf-8") + b"\n"
 
@@ -92,7 +101,8 @@ def difference(name: str, recorded: bytes, drawn: bytes) -> str:
     """How a drawing differs from what is recorded, in words; empty where it does not."""
     if recorded == drawn:
         return ""
-    return (_png_difference if name.endswith(".png") else _svg_difference)(recorded, drawn)
+    kinds = {"png": _png_difference, "csv": _csv_difference, "svg": _svg_difference}
+    return kinds[name.rpartition(".")[2]](recorded, drawn)
 
 
 # --- SVG
@@ -216,3 +226,32 @@ def _png_difference(recorded: bytes, drawn: bytes) -> str:
         return ""
     left, top, right, bottom = change.getbbox(alpha_only=False) or (0, 0, 0, 0)
     return f"pixels differ in columns {left} to {right}, rows {top} to {bottom}"
+
+
+# --- CSV
+
+
+def _csv_difference(recorded: bytes, drawn: bytes) -> str:
+    old, new = (
+        list(csv.reader(io.StringIO(data.decode("utf-8", "replace")))) for data in (recorded, drawn)
+    )
+    if [len(row) for row in old] != [len(row) for row in new]:
+        return "the table has other rows or columns"
+    columns = zip(itertools.zip_longest(*old), itertools.zip_longest(*new), strict=True)
+    different = sum(_unequal(*column) for column in columns)
+    return f"{different} of its cells differ" if different else ""
+
+
+def _unequal(old: Sequence[str | None], new: Sequence[str | None]) -> int:
+    """How many cells of a column differ."""
+    numbers = [(_number(one), _number(two)) for one, two in zip(old, new, strict=True)]
+    largest = max((abs(one) for one, _ in numbers if math.isfinite(one)), default=0.0)
+    return sum(
+        one != two and not abs(a - b) <= TOLERANCE * largest
+        for one, two, (a, b) in zip(old, new, numbers, strict=True)
+    )
+
+
+def _number(cell: str | None) -> float:
+    """The number in a cell; not a number where there is none."""
+    return float(cell) if cell and _NUMBER.fullmatch(cell.strip()) else math.nan

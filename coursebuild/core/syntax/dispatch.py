@@ -69,7 +69,8 @@ def _python(fence: Fence, session: ParsingState) -> Block:
     session.diagnostics += parsed.diagnostics
     if isinstance(parsed.value, Script):
         session.script, session.script_wrong = parsed.value.path, False
-        session.figures += [figure.name for figure in parsed.value.figures]
+        names = (figure.name for figure in parsed.value.figures)
+        session.figures += [name for name in names if not name.endswith(".csv")]
     elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed.diagnostics):
         session.script, session.script_wrong = None, True
     return parsed.value

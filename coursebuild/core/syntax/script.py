@@ -37,7 +37,7 @@ _SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"
 }
 _PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
 _OURS = ("content", "models", "examples", "features", "public")
-_FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png)", re.ASCII)
+_FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCII)
 _ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
@@ -153,7 +153,8 @@ def _figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[Figur
             yield FigureName(name, span)
         else:
             message = f"`{name}` is no name of a figure"
-            help = "it is a file name that ends in `.svg` or `.png`, as in `figure=flip.svg`"
+            help = "it is a file name that ends in `.svg` or `.png`, as in `figure=flip.svg`, or "
+            help += "in `.csv` for the data of the figure with this name"
             diagnostics.append(diagnose("fence-key-value", span, message, help=help))
 
 

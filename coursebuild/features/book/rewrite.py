@@ -18,9 +18,9 @@ from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement
 _DROPPED = frozenset(
     "button form template script style dialog iframe object embed audio video source track".split()
 )
-_NOT_PRINTED = frozenset(("anchor", "bar-tools", "plot-wide", "qr"))
+_NOT_PRINTED = frozenset(("anchor", "bar-tools", "plot-wide", "figure-dark", "qr"))
 """Classes of what is left out: links of headings to themselves, downloads, QR codes; of two
-drawings of a plot the one that small screens cannot show."""
+drawings of a plot the one that small screens cannot show, or that is for dark pages."""
 _FOR_SCRIPTS = frozenset(
     "style download loading srcset sizes tabindex xmlns usemap autofocus".split()
 )

@@ -69,6 +69,21 @@ def test_png_differs_by_pixels() -> None:
     assert difference("x.png", b"no", base) == "the recorded file is no PNG"
 
 
+DIFFERENT_TABLES = {
+    b"time,x\n0,1.0004\n1,nan\n": "",
+    b"time,x\n0,1.002\n1,nan\n": "1 of its cells differ",
+    b"time,y\n0,1\n1,2\n": "2 of its cells differ",
+    b"time,x\n0,1\n": "the table has other rows or columns",
+}
+
+
+def test_data_differ_by_cells() -> None:
+    base = drawn_file("x.csv", b"time,x\r\n0,1.0\r\n1,nan\r\n")
+    assert base == b"time,x\n0,1.0\n1,nan\n"
+    told = {table: difference("x.csv", base, table) for table in DIFFERENT_TABLES}
+    assert told == DIFFERENT_TABLES
+
+
 def test_what_cannot_be_shown_is_told() -> None:
     bomb = b'<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg xmlns="http://www.w3.org/2000/svg">&a;</svg>'
     told = [
