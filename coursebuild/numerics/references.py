@@ -6,8 +6,8 @@ where something touches; `conserved(…)`, `energy_beyond(…)`.
 1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; Gauss's collocation does it
    again. Their difference is what the reference may be wrong by. Both take the same accelerations,
    so the engine in ever smaller steps must tend to the same motion.
-2. A closed form that the scenario names comes first, and that integration second. Where the two
-   are far apart the formula is not this scene's.
+2. A closed form that the scenario names, or that the course has, comes first, and that integration
+   second. Where the two are far apart the formula is not this scene's.
 3. Where something jumps, or the engine tends elsewhere, only the engine itself is left, in small
    steps, and again in steps twice as long under another integrator; it is called `self`. So it is
    where the scene is too stiff for an integration in reasonable time.
@@ -29,6 +29,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import DeclaredScenario
+from coursebuild.core.text.source import Span
 from coursebuild.numerics.cases import closed_motion
 from coursebuild.numerics.detector import RunJudgement, RunStatus
 from coursebuild.numerics.engine import (
@@ -60,7 +61,7 @@ from coursebuild.numerics.measure import (
 from coursebuild.numerics.observe import Sticks, sticking, visible_error
 from coursebuild.numerics.pilot import Pilot, apart
 from coursebuild.numerics.problem import Array, Integrator, Motion, Setup
-from coursebuild.numerics.scene import SceneError
+from coursebuild.numerics.scene import ExactMotion, SceneError
 from coursebuild.numerics.settings import CONES
 
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
@@ -124,7 +125,28 @@ def know(model: Any, first: Pilot, *, quick: bool = False) -> Known:
         raise _no_integration(f"there is {' and '.join(first.jumps)}", wanted)
     if found is None:
         found = replace(itself(model, first, quick=quick), note=note)
-    return _closed(model, first, wanted, found) if wanted and wanted.closed else found
+    if wanted and wanted.closed:
+        reference, motion = closed_motion(model, first.scene, wanted, found.states.times)
+        what, place = f"the closed form of `{wanted.closed}`", wanted.place("reference")
+        return _closed(model, found, motion, reference.source, reference.floor, what, place)
+    exact = None if wanted and wanted.reference else first.scene.exact
+    if exact is None:
+        return found
+    motion = _exact_motion(model, first, exact, found)
+    return _closed(
+        model, found, motion, exact.span.path, _ROUNDING, f"`{exact.span.path}`", exact.span
+    )
+
+
+def _exact_motion(model: Any, first: Pilot, exact: ExactMotion, second: Known) -> Motion:
+    """What the course says of the motion; velocities of the second reference where it says none."""
+    data, states = initial_data(first.scene.scenario, model), second.states
+    qpos, qvel = exact.states(states.times, data.qpos.copy(), data.qvel.copy())
+    found = replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
+    if (found.qpos.shape, found.qvel.shape) != (states.qpos.shape, states.qvel.shape):
+        message = f"`{exact.span.path}` gives other numbers of coordinates than the model has"
+        raise SceneError(message, exact.span, "they are those of `qpos`, and perhaps of `qvel`")
+    return motion_of(model, found)
 
 
 def _no_integration(why: str, declared: DeclaredScenario) -> SceneError:
@@ -210,25 +232,26 @@ def _compared(
     return Known(kind, source, states, other, motion, floor, second, gap.largest, horizon)
 
 
-def _closed(model: Any, first: Pilot, declared: DeclaredScenario, second: Known) -> Known:
-    """The closed form that the scenario names, with what was integrated as the second reference."""
-    reference, motion = closed_motion(model, first.scene, declared, second.states.times)
+def _closed(
+    model: Any, second: Known, motion: Motion, source: str, floor: float, what: str, place: Span
+) -> Known:
+    """A closed form, with what was integrated as the second reference."""
     gap = errors(motion, second.motion).largest
     states = states_of(model, motion, second.states)
     pairs = zip(states.qpos, second.states.qpos, strict=True)
     away = max((apart(model, a, b) for a, b in pairs), default=0.0)
-    known = Sizes(reference.floor, reference.floor, reference.floor)
+    known = Sizes(floor, floor, floor)
     if second.kind == "ode":
-        if away > FOREIGN:
-            message = f"the closed form of `{declared.closed}` is not this scene's motion"
+        if not away <= FOREIGN:
+            message = f"{what} is not this scene's motion"
             help = f"the two are {away:.2g} apart (rad, or relative to the extent)"
-            raise SceneError(message, declared.place("reference"), help)
+            raise SceneError(message, place, help)
         parts = (gap.position, gap.attitude, gap.velocity)
-        known = Sizes(*(max(reference.floor, part) for part in parts))
+        known = Sizes(*(max(floor, part) for part in parts))
     return replace(
         second,
         kind="closed",
-        source=reference.source,
+        source=source,
         states=states,
         other=second.states,
         motion=motion,

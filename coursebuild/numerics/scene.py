@@ -11,7 +11,7 @@ Entry points: `scenes(model, declared, quick)`, `Scene`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
@@ -26,6 +26,7 @@ from coursebuild.core.model.scenarios import (
 )
 from coursebuild.core.text.source import Span
 from coursebuild.numerics.problem import Array, Scenario
+from mjcourse import exact
 
 DURATION = 2.0
 """Seconds of a scenario that does not say how long it takes."""
@@ -39,6 +40,8 @@ LADDER, QUICK_LADDER = (-3, -2, -1, 0, 1, 2, 3), (-2, -1, 0, 1)
 """Powers of 2 by which timesteps differ from the model's own."""
 
 
+EXACT_SCRIPT = exact.__file__
+"""Says what a course's file knows of a motion."""
 LONGEST = 10_000_000
 """Steps of a scenario at its shortest timestep, at most: more would take hours."""
 
@@ -51,6 +54,16 @@ class SceneError(Exception):
         self.message = message
         self.span = span
         self.help = help
+
+
+class ExactMotion(Struct, frozen=True, eq=False):
+    """A motion that the course knows."""
+
+    span: Span
+    """Its file."""
+    states: Callable[[Array, Array, Array], tuple[Array, Array | None]]
+    """Times (n,) in s, and `qpos` and `qvel` of the beginning → those at the times, (n, nq) and
+    (n, nv); no velocities where it does not say them."""
 
 
 class Scene(Struct, frozen=True):
@@ -66,6 +79,8 @@ class Scene(Struct, frozen=True):
     visible: Visible
     declared: DeclaredScenario | None
     """`None` for a scenario that nobody wrote."""
+    exact: ExactMotion | None = None
+    """What the course knows of its motion."""
 
 
 def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) -> tuple[Scene, ...]:

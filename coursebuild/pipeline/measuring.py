@@ -10,28 +10,35 @@ what a model is made of and how fast the browser's engine runs it.
 
 from __future__ import annotations
 
+import json
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import mujoco
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.model.results import ScriptJob
 from coursebuild.core.run.machine import one_processor
+from coursebuild.core.run.runner import run_scripts
 from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
-from coursebuild.numerics.problem import Scenario
+from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.pruning.compare import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
+from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
-from coursebuild.numerics.scene import SceneError, scenes
 from coursebuild.pipeline.reports import CannotError
-from coursebuild.pipeline.scenes import CourseScene
+from coursebuild.pipeline.scenes import CourseScene, exact_path
 
 _SECONDS = 20.0
 """Processor time that a run may take."""
@@ -54,7 +61,9 @@ def scenarios_of(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScen
     """
     with _told(scene):
         model = _compiled(root, scene)
-        return CompiledScene(scene, model, scenes(model, scene.declared, quick=quick))
+        known = _exact(root, scene)
+        found = scenes(model, scene.declared, quick=quick)
+        return CompiledScene(scene, model, tuple(replace(one, exact=known) for one in found))
 
 
 def measured(
@@ -91,6 +100,31 @@ def _told(scene: CourseScene) -> Iterator[None]:
 def _compiled(root: Path, scene: CourseScene) -> Any:
     path = str(root / scene.model.source.path)
     return mujoco.MjModel.from_xml_path(path, assets={path: scene.model.source.text.encode()})
+
+
+def _exact(root: Path, scene: CourseScene) -> ExactMotion | None:
+    """What the course knows of the motion: its code runs as a script does, in a child."""
+    path = exact_path(scene.model)
+    if not (root / path).is_file():
+        return None
+    span = Source(path, "").span(0, 0)
+
+    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array | None]:
+        asked = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
+        script = os.path.relpath(EXACT_SCRIPT, root)
+        job = ScriptJob(script, (path, json.dumps(asked)), _SECONDS, (), norun=False)
+        (run,) = run_scripts(root, (job,), parallel=1)
+        try:
+            found = msgspec.json.decode(run.stdout, type=list[list[list[float]]])
+            parts = [np.array(part) for part in zip(*found, strict=True)]
+        except (msgspec.DecodeError, ValueError):
+            last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
+            message = f"`{path}` says no motion: {last[0]}"
+            help = "it defines `motion(time, qpos, qvel)`, which gives the positions at a time in s"
+            raise SceneError(message, span, help) from None
+        return parts[0], parts[1] if len(parts) > 1 else None
+
+    return ExactMotion(span, states)
 
 
 # ------------------------------------------------------------------------------------------- cards

@@ -1,13 +1,14 @@
 """The models of a course that can be measured, with what is declared for them.
 
-Entry points: `find_scenes(root, names)`, `scene_digest`.
+Entry points: `find_scenes(root, names)`, `scene_digest`, `exact_path`.
 
 1. A scene is a file of `models/` that others do not include. One that is named is a scene in any
    case.
 2. What does not compile, and what is declared wrongly, is a diagnostic; the other scenes are
    measured all the same.
-3. Figures depend on the model with all files that it pulls in, and on its scenarios: the digest is
-   theirs. It does not depend on the machine, nor on what else the file beside the model says.
+3. Figures depend on the model with all files that it pulls in, on its scenarios, and on the file
+   with its exact motion: the digest is theirs. It does not depend on the machine, nor on what else
+   the file beside the model says.
 """
 
 from __future__ import annotations
@@ -109,8 +110,16 @@ def scene_digest(root: Path, model: MjcfModel, declared: Declarations | None) ->
             # A file elsewhere has another path on another machine.
             shown = path if not path.startswith("/") else f"/{file.name}"
             add(shown.encode("utf-8", "surrogateescape"), _content(file))
+    exact = root / exact_path(model)
+    if exact.is_file():
+        add(exact.name.encode("utf-8", "surrogateescape"), _content(exact))
     add(_said(declared).encode("utf-8", "surrogatepass"))
     return digest.hexdigest()
+
+
+def exact_path(model: MjcfModel) -> str:
+    """Where a course says the exact motion of a model, if it knows it."""
+    return f"{model.source.path.removesuffix('.xml')}.exact.py"
 
 
 def _content(file: Path) -> bytes:

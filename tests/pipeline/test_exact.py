@@ -1,0 +1,82 @@
+"""A course's own exact motion, `models/NAME.exact.py`: what errors are taken from, or a mistake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.pipeline.measuring import measured, scenarios_of
+from coursebuild.pipeline.reports import CannotError
+from coursebuild.pipeline.scenes import find_scenes
+from support.measured_course import write
+
+pytestmark = pytest.mark.site
+
+BALL = """\
+<mujoco>
+  <worldbody>
+    <body><joint type="slide" axis="0 0 1"/><geom size="0.1"/></body>
+  </worldbody>
+</mujoco>
+"""
+TOML = '[[scenario]]\nname = "up"\nqpos = [1]\nqvel = [3]\nduration = 0.4\nsample = 0.1\n'
+EXACT = """\
+print("reading")
+
+
+def motion(time, qpos, qvel):
+    return qpos + qvel * time - 9.81 / 2 * time**2{velocity}
+"""
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    write(tmp_path / "content" / "course.toml", 'title = "A"\n')
+    write(tmp_path / "models" / "ball.xml", BALL)
+    write(tmp_path / "models" / "ball.toml", TOML)
+    return tmp_path
+
+
+def report(course: Path, exact: str, toml: str = TOML) -> ScenarioReport:
+    write(course / "models" / "ball.exact.py", exact)
+    write(course / "models" / "ball.toml", toml)
+    (scene,) = find_scenes(course, ("ball",)).scenes
+    loaded = scenarios_of(course, scene, quick=True)
+    return measured(loaded, 0, quick=True, timed=False, tell=lambda _: None)
+
+
+def test_errors_are_taken_from_what_the_course_knows(course: Path) -> None:
+    for velocity in (", qvel - 9.81 * time", ""):
+        found = report(course, EXACT.format(velocity=velocity))
+        assert (found.reference, found.source) == ("closed", "models/ball.exact.py")
+        assert found.second == "Bulirsch–Stoer over mj_forward" and found.floor < 1e-13
+        (own,) = (row for row in found.rows if row.own)
+        assert own.position is not None
+        assert own.position[0] == pytest.approx(9.81 * 0.4 * 0.002 / 2)
+    asked = TOML + 'reference = "ode"\n'
+    assert report(course, EXACT.format(velocity=""), asked).reference == "ode"
+
+
+def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
+    cases = {
+        EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not this scene's motion",
+        "def motion(time, qpos, qvel):\n    return [1, 2]\n": "gives other numbers of coordinates",
+        "x = 1\n": "says no motion: KeyError: 'motion'",
+        "import sys\n\nsys.exit()\n": "says no motion: ",
+    }
+    for text, message in cases.items():
+        with pytest.raises(CannotError) as caught:
+            report(course, text)
+        wrong = caught.value.diagnostic
+        assert message in wrong.message and wrong.span.path == "models/ball.exact.py", text
+
+
+def test_what_was_measured_depends_on_it(course: Path) -> None:
+    digests = set()
+    for exact in (None, EXACT, EXACT + "\n"):
+        if exact is not None:
+            write(course / "models" / "ball.exact.py", exact)
+        digests.add(find_scenes(course, ("ball",)).scenes[0].digest)
+    assert len(digests) == 3
