@@ -5,13 +5,15 @@ Entry point: `KIND`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Literal
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.features import FenceKind, MarkdownWriter
-from coursebuild.core.model import Cell, FeatureBlock, Lesson, Table, Text
+from coursebuild.core.model import Cell, FeatureBlock, Inline, Lesson, RawInline, Table, Text
+from coursebuild.core.pages import urls
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
@@ -21,7 +23,6 @@ from coursebuild.features.truth.claims import KINDS, Claims, claims_of, document
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.library import Library
-    from coursebuild.core.pages.urls import Place
 
 _COLUMNS = ("part", "share", "numbers", *KINDS, "open")
 _RIGHT: Literal["right"] = "right"
@@ -36,9 +37,10 @@ class TruthTable(FeatureBlock, frozen=True):
 
 
 class TruthRows(Struct, frozen=True):
-    """What the table shows: for each lesson and page its title and its numbers, the sum last."""
+    """What the table shows: for each lesson and page a link and its numbers, the sum last."""
 
     rows: tuple[tuple[str, ...], ...]
+    """The first of each is HTML."""
 
 
 def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
@@ -50,15 +52,16 @@ def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
     return Parsed(TruthTable(fence.span), tuple(wrong))
 
 
-def values(library: Library, place: Place, block: TruthTable) -> TruthRows:
+def values(library: Library, place: urls.Place, block: TruthTable) -> TruthRows:
     """The rows."""
     words, known = library.words, []
     rows: list[tuple[str, ...]] = []
     for owner, document in documents_of(library.course):
         known.append(claims_of(document))
         name = f"{owner.id} {owner.title}" if isinstance(owner, Lesson) else owner.title
-        rows.append((name, *_figures(known[-1])))
-    return TruthRows((*rows, (words("truth.all"), *_figures(total(known)))))
+        link = Markup('<a href="{}">{}</a>').format(place.href(urls.owner_path(owner)), name)
+        rows.append((str(link), *_figures(known[-1])))
+    return TruthRows((*rows, (str(escape(words("truth.all"))), *_figures(total(known)))))
 
 
 def _figures(claims: Claims) -> tuple[str, ...]:
@@ -71,11 +74,14 @@ def _table(page: PageContext, block: TruthTable) -> Table:
     shown = page.shown.blocks[block.span.start]
     assert isinstance(shown, TruthRows)
 
-    def cell(text: str) -> Cell:
-        return Cell(block.span, Excerpt.of_span(block.span), (Text(block.span, text),))
+    def cell(inline: Inline) -> Cell:
+        return Cell(block.span, Excerpt.of_span(block.span), (inline,))
 
-    header = tuple(cell(page.tools.words(f"truth.{name}")) for name in _COLUMNS)
-    rows = tuple(tuple(map(cell, row)) for row in shown.rows)
+    def cells(texts: Iterable[str]) -> Iterator[Cell]:
+        return (cell(Text(block.span, text)) for text in texts)
+
+    header = tuple(cells(page.tools.words(f"truth.{name}") for name in _COLUMNS))
+    rows = tuple((cell(RawInline(block.span, name)), *cells(row)) for name, *row in shown.rows)
     return Table(block.span, ("left", *(_RIGHT for _ in _COLUMNS[1:])), header, rows)
 
 
