@@ -83,7 +83,10 @@ def depends_on(course: Course, results: Results) -> tuple[str, ...] | None:
 
     `None` where nobody can know them all, as where a script starts other programs.
     """
-    files = {*(page.path for page in course.pages), *shown_files(course)}
+    packages = {package.path for package in course.packages}  # archives hold all of them
+    if "." in packages:
+        return None
+    files = {*(page.path for page in course.pages), *shown_files(course), *packages}
     for run in results.runs:
         if run.outcome in (Outcome.NORUN, Outcome.SKIPPED):
             continue  # what is installed is looked at in any case

@@ -40,7 +40,7 @@ from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
 from coursebuild.core.pages.shared import PageFacts, common_characters
-from coursebuild.core.run.packages import distributions, library_files
+from coursebuild.core.run.packages import distributions, module_files
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source, key_of, text_digest
 from coursebuild.core.values import decode, encode
@@ -231,17 +231,17 @@ class SiteMaker:
         """What scripts need around them."""
         if not self.library.scripts:
             return zips.Surroundings()
-        imports = self._imports()
-        used = {name for s, _ in self.library.scripts.values() for name in imports(s.code.text)}
-        library = library_files() if "mjcourse" in used else ()
-        modules = zips.imported_modules(self.course, library, imports)
-        packages = tuple(zips.Package(*p) for p in distributions(self.store, modules))
+        folders = [self.root / package.path for package in self.course.packages]
+        library = functools.cache(functools.partial(module_files, folders=folders))
         meshes = tuple(
             OutputFile(path, read_bytes(self.root, path))
             for path in self.course.files
             if path.startswith("models/")
         )
-        return zips.Surroundings(packages, library, meshes, imports)
+        around = zips.Surroundings((), library, meshes, self._imports())
+        modules = zips.imported_modules(self.course, around)
+        packages = tuple(zips.Package(*p) for p in distributions(self.store, modules))
+        return replace(around, packages=packages)
 
     def _imports(self) -> Callable[[str], frozenset[str]]:
         """What Python texts import: those of lessons are known."""

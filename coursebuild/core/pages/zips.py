@@ -1,7 +1,8 @@
 """Scripts as archives that run elsewhere, with models, `mjcourse` and exact requirements.
 
 Entry points: `archives`; `imported_modules` says which packages whoever calls should give the
-versions of.
+versions of. What scripts import of `mjcourse` and of the course's own packages lies beside them,
+where Python looks first.
 
 The bytes depend on the content alone: entries in order of their paths, one fixed date, one fixed
 way to compress.
@@ -12,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
@@ -51,8 +52,9 @@ class Surroundings(Struct, frozen=True):
     """What scripts need around them, besides the course itself."""
 
     packages: tuple[Package, ...] = ()
-    library: tuple[OutputFile, ...] = ()
-    """Files of the package `mjcourse`, by path relative to the folder that holds it."""
+    library: Callable[[str], tuple[OutputFile, ...]] = lambda _: ()
+    """The files of a module of `mjcourse` or of the course's own, by path relative to the folder
+    that holds it; none of any other module."""
     model_files: tuple[OutputFile, ...] = ()
     """Files in `models/` that are no MJCF (meshes, height fields), by path relative to the project
     root."""
@@ -106,12 +108,8 @@ def archives(library: Library, around: Surroundings) -> Iterator[Archive]:
             yield Archive(urls.lesson_zip_path(lesson), files)
 
 
-def imported_modules(
-    course: Course,
-    library: Iterable[OutputFile] = (),
-    imports: Callable[[str], frozenset[str]] = imports,
-) -> tuple[str, ...]:
-    """Top-level modules of others that the scripts, and the package they come with, import."""
+def imported_modules(course: Course, around: Surroundings) -> tuple[str, ...]:
+    """Top-level modules of others that the scripts, and the packages they come with, import."""
     documents = (owner.document for owner in owners(course))
     scripts = [
         script
@@ -119,11 +117,30 @@ def imported_modules(
         if document is not None
         for script in document_scripts(document)
     ]
-    own = {_module(script.path) for script in scripts} | {"mjcourse"}
-    found = {name for script in scripts for name in imports(script.code.text)}
-    texts = (file.data.decode() for file in library if file.path.endswith(".py"))
-    found |= {name for text in texts for name in imports(text)}
-    return tuple(sorted(found - own - sys.stdlib_module_names))
+    own = {_module(script.path) for script in scripts}
+    return tuple(sorted(_imported(scripts, around, own)[1]))
+
+
+def _imported(
+    scripts: Iterable[Script], around: Surroundings, own: Collection[str]
+) -> tuple[list[OutputFile], set[str]]:
+    """The library's files that scripts import, maybe through each other, and others' modules.
+
+    `own` are the modules that scripts are themselves.
+    """
+    files: list[OutputFile] = []
+    others: set[str] = set()
+    seen: set[str] = set()
+    waiting = [script.code.text for script in scripts]
+    for text in waiting:
+        for name in around.imports(text) - seen:
+            seen.add(name)
+            found = () if name in own else around.library(name)
+            files += found
+            waiting += [file.data.decode() for file in found if file.path.endswith(".py")]
+            if not found and name not in own:
+                others.add(name)
+    return files, others - _NEVER_REQUIRED
 
 
 def _module(path: str) -> str:
@@ -151,21 +168,12 @@ def _files(
     folder: str,
     own: Mapping[str, Script],
 ) -> dict[str, bytes | Excerpt]:
-    """What is in an archive of one folder.
-
-    `mjcourse` lies beside the scripts, where Python looks first.
-    """
+    """What is in an archive of one folder; `own` are the modules that scripts are themselves."""
     files: dict[str, bytes | Excerpt] = {script.path: script.code for script in scripts}
-    modules = [around.imports(script.code.text) for script in scripts]
-    if any("mjcourse" in names for names in modules):
-        files |= {f"examples/{file.path}": file.data for file in around.library}
-        modules += [
-            around.imports(file.data.decode())
-            for file in around.library
-            if file.path.endswith(".py")
-        ]
+    beside, others = _imported(scripts, around, own)
+    files |= {f"examples/{file.path}": file.data for file in beside}
     files |= _models(library, around, scripts)
-    files["requirements.txt"] = _requirements(library, around.packages, modules, own)
+    files["requirements.txt"] = _requirements(library, around.packages, others)
     first = scripts[0].path
     readme = library.words("zip.readme", title=library.course.title, script=first)
     files["README.md"] = f"{readme.strip()}\n".encode()
@@ -193,18 +201,11 @@ def _models(
     return found
 
 
-def _requirements(
-    library: Library,
-    packages: Iterable[Package],
-    modules: Iterable[frozenset[str]],
-    own: Mapping[str, Script],
-) -> bytes:
+def _requirements(library: Library, packages: Iterable[Package], modules: Iterable[str]) -> bytes:
     """One line for each package that is imported, with its exact version where it is known."""
     known = {package.module: f"{package.name}=={package.version}" for package in packages}
     known.setdefault("mujoco", f"mujoco=={library.results.engine}")
-    named = {name for names in modules for name in names} - _NEVER_REQUIRED
-    # To subtract the keys would look at every script of the course.
-    used = (known.get(name, name) for name in named if name not in own)
+    used = (known.get(name, name) for name in modules)
     return "".join(f"{line}\n" for line in sorted(used)).encode()
 
 

@@ -1,6 +1,6 @@
 """Which version of what is installed gives a module, without importing anything.
 
-Entry points: `Installed`; `distributions`, `library_files`, for archives of scripts.
+Entry points: `Installed`; `distributions`, `module_files`, for archives of scripts.
 
 Reading what each distribution provides takes a quarter of a second, so the whole map is kept until
 one of the folders with installed packages changes. A module that no distribution names, and one of
@@ -93,18 +93,23 @@ def distributions(store: Memo, modules: Iterable[str]) -> tuple[tuple[str, str, 
     return tuple(found)
 
 
-def library_files() -> tuple[OutputFile, ...]:
-    """The source files of `mjcourse`, by path relative to the folder that holds the package."""
-    spec = importlib.util.find_spec("mjcourse")
-    if spec is None or spec.origin is None:
-        return ()
-    folder = Path(spec.origin).parent
-    files = (p for p in folder.rglob("*") if p.suffix == ".py" or p.name == "py.typed")
-    return tuple(
-        OutputFile(path.relative_to(folder.parent).as_posix(), path.read_bytes())
-        for path in sorted(files)
-        if "__pycache__" not in path.parts
-    )
+def module_files(name: str, folders: Iterable[Path]) -> tuple[OutputFile, ...]:
+    """The files of the module in the first of these folders that has it; of `mjcourse` else ours.
+
+    By path relative to the folder.
+    """
+    spec = importlib.util.find_spec(name) if name == "mjcourse" else None
+    ours = [] if spec is None or spec.origin is None else [Path(spec.origin).parents[1]]
+    for folder in (*folders, *ours):
+        paths = sorted([folder / f"{name}.py", *(folder / name).rglob("*")])
+        files = tuple(
+            OutputFile(path.relative_to(folder).as_posix(), path.read_bytes())
+            for path in paths
+            if path.is_file() and "__pycache__" not in path.parts
+        )
+        if files:
+            return files
+    return ()
 
 
 def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:

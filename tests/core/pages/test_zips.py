@@ -35,12 +35,19 @@ VALUE = 1
 
 ```python file=examples/three.py
 import torch
+import swing
 ```
 """
 
+LIBRARY = {
+    "mjcourse": (OutputFile("mjcourse/__init__.py", b"import mujoco\n"),),
+    "swing": (OutputFile("swing/__init__.py", b"import period\n"), OutputFile("swing/a.csv", b"1")),
+    "period": (OutputFile("period.py", b"import scipy.special\nimport swing\n"),),
+    "helper": (OutputFile("helper.py", b"a script of the course has this name"),),
+}
 AROUND = Surroundings(
     packages=(Package("numpy", "numpy", "2.4.6"), Package("yaml", "PyYAML", "6.0.3")),
-    library=(OutputFile("mjcourse/__init__.py", b"import mujoco\n"),),
+    library=lambda name: LIBRARY.get(name, ()),
     model_files=(OutputFile("models/meshes/hand.obj", b"v 0 0 0\n"),),
 )
 
@@ -74,6 +81,9 @@ def test_the_course_archive_has_scripts_models_library_and_requirements(made: An
         "bodies-axes/examples/helper.py",
         "bodies-axes/examples/mjcourse/__init__.py",
         "bodies-axes/examples/one.py",
+        "bodies-axes/examples/period.py",
+        "bodies-axes/examples/swing/__init__.py",
+        "bodies-axes/examples/swing/a.csv",
         "bodies-axes/examples/three.py",
         "bodies-axes/models/arm.xml",
         "bodies-axes/models/meshes/hand.obj",
@@ -81,7 +91,7 @@ def test_the_course_archive_has_scripts_models_library_and_requirements(made: An
         "bodies-axes/requirements.txt",
     ]
     assert archive.read("bodies-axes/requirements.txt").decode() == (
-        "PyYAML==6.0.3\nmujoco==3.14.0\nnumpy==2.4.6\ntorch\n"
+        "PyYAML==6.0.3\nmujoco==3.14.0\nnumpy==2.4.6\nscipy\ntorch\n"
     )
     readme = archive.read("bodies-axes/README.md").decode()
     assert readme.startswith("# Bodies & <axes>: scripts\n")
@@ -92,10 +102,10 @@ def test_a_lesson_archive_has_what_its_scripts_import(made: Any) -> None:
     found = archives(made)
     names = found["lessons/0.1-falling.zip"].namelist()
     assert "0.1-falling/examples/helper.py" in names
-    assert "0.1-falling/examples/three.py" not in names
+    assert [name for name in names if "three" in name or "swing" in name] == []
     other = found["lessons/1.1-spinning.zip"]
     assert [name for name in other.namelist() if "models" in name or "mjcourse" in name] == []
-    assert other.read("1.1-spinning/requirements.txt") == b"PyYAML==6.0.3\ntorch\n"
+    assert other.read("1.1-spinning/requirements.txt") == b"PyYAML==6.0.3\nscipy\ntorch\n"
 
 
 def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
@@ -140,6 +150,12 @@ runpy.run_path("examples/a.py", run_name="__main__")
 
 
 def test_what_scripts_import_from_others(made: Any) -> None:
-    assert imported_modules(made.course, AROUND.library) == ("mujoco", "numpy", "torch", "yaml")
+    assert imported_modules(made.course, AROUND) == (
+        "mujoco",
+        "numpy",
+        "scipy",
+        "torch",
+        "yaml",
+    )
     assert imports("from . import x\nfrom a.b import c\nimport d.e as f\n") == {"a", "d"}
     assert imports("import (\n") == frozenset()
