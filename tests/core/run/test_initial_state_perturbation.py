@@ -117,11 +117,6 @@ def test_runs_of_a_pair_go_in_opposite_directions(told: Told) -> None:
     assert one[0] * one[1] * three[0] * three[1] < 0, "the second pair goes another way"
 
 
-def test_the_same_run_is_the_same_again(told: Told) -> None:
-    text = PULL + STEP * 50 + "tell('q', data.qpos)"
-    assert told(text, 3) == told(text, 3)
-
-
 def test_after_a_reset_the_state_is_moved_again_and_alike(told: Told) -> None:
     text = "for name in 'ab':\n"
     text += "    mujoco.mj_resetDataKeyframe(model, data, 0)\n    mujoco.mj_forward(model, data)\n"

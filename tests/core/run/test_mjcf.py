@@ -12,7 +12,6 @@ from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mjcf, mjcf_worker
 from coursebuild.core.run.mjcf import (
-    compile_all,
     compile_models,
     compile_texts,
     error_line,
@@ -177,21 +176,8 @@ class TestFacts:
         (result,) = compile_models(root, [read])
         assert result.error == ""
 
-    def test_without_a_models_folder(self, tmp_path: Path) -> None:
-        assert text(tmp_path, "<mujoco/>").error == ""
-
     def test_byte_order_mark(self, root: Path) -> None:
         assert text(root, "\ufeff<mujoco/>").error == ""
-
-    def test_none(self, root: Path) -> None:
-        assert compile_texts(root, []) == compile_models(root, []) == ()
-        assert compile_all(root, [], []) == ((), ())
-
-    def test_models_and_texts_together(self, root: Path) -> None:
-        models = [model(root, "arm", ARM), model(root, "bad", "<a/>")]
-        compiled, parts = compile_all(root, models, ["<b/>", "<mujoco/>"])
-        assert [not r.error for r in compiled] == [True, False]
-        assert [not r.error for r in parts] == [False, True]
 
 
 class TestMessages:
@@ -290,10 +276,6 @@ class TestMessages:
             root, [model(root, "m", '<mujoco><include file="m.xml"/></mujoco>')]
         )
         assert "already included" in result[0].error
-
-    def test_all_are_reported(self, root: Path) -> None:
-        results = compile_texts(root, ["<mujoco/>", "<a/>", "<mujoco/>", "", "<mujoco/>"])
-        assert [not r.error for r in results] == [True, False, True, False, True]
 
     @pytest.mark.parametrize(
         ("message", "line"),

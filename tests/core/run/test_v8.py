@@ -23,7 +23,6 @@ from coursebuild.core.run.v8 import (
     MathEngine,
     ScriptError,
     StoppedError,
-    readable,
 )
 from support.runners import computed, wait_until
 
@@ -187,15 +186,6 @@ class TestMarkup:
         with MathEngine() as other:
             assert other.typeset(formulas[::-1]) == first[::-1]
 
-    def test_many_at_a_time(self, engine: MathEngine) -> None:
-        results = engine.typeset([Formula(f"x_{{{i}}}", i % 2 == 0) for i in range(1001)])
-        assert [mathml(r).find(".//annotation").text for r in results] == [  # type: ignore[union-attr]
-            f"x_{{{i}}}" for i in range(1001)
-        ]
-
-    def test_none(self, engine: MathEngine) -> None:
-        assert engine.typeset([]) == []
-
 
 MISTAKES = [
     (r"a + \foo x", r"unknown command \foo", 4),
@@ -263,16 +253,6 @@ class TestMistakes:
             result = one(engine, tex)
             assert isinstance(result, MathError)
             assert result.position is None or 0 <= result.position <= len(tex)
-
-    def test_wording(self) -> None:
-        for raw, shown in (
-            ("ParseError: Unsupported function name: \\x", "unknown command \\x"),
-            (" Expected 'EOF', got '&'", "unexpected '&'"),
-            ("MathML is not text.", "MathML is not text"),
-            ("A thing.\nAnd\tmore", "a thing. And more"),
-            ("x" * 500, "x" * 159 + "…"),
-        ):
-            assert readable(raw) == shown
 
 
 NINE = r"\def\a#1{#1#1#1#1#1#1#1#1#1}"
@@ -411,26 +391,6 @@ class TestIsolate:
 
 
 class TestLife:
-    def test_it_can_be_closed_and_used_again(self) -> None:
-        with MathEngine() as engine:
-            one(engine, "a")
-            engine.close()
-            assert isinstance(one(engine, "c"), str)
-
-    def test_threads_take_turns(self, engine: MathEngine) -> None:
-        results: list[list[str | MathError]] = []
-        formulas = [Formula(tex, False) for tex in FORMULAS]
-        threads = [
-            threading.Thread(target=lambda: results.append(engine.typeset(formulas)))
-            for _ in range(4)
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert len(results) == 4
-        assert all(result == results[0] for result in results)
-
     def test_an_interrupt_is_heard_and_ends_cleanly(self) -> None:
         code = (
             "from coursebuild.core.run.v8 import Isolate\n"
