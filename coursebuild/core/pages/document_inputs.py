@@ -10,28 +10,7 @@ from urllib.parse import urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    Block,
-    Callout,
-    Document,
-    ExampleTarget,
-    FeatureBlock,
-    LessonTarget,
-    LevelTarget,
-    Link,
-    ModelTarget,
-    PageTarget,
-    Recording,
-    Script,
-    Target,
-    TermTarget,
-    UrlTarget,
-    block_inlines,
-    document_blocks,
-    local_file,
-    resolve,
-    walk_inlines,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
@@ -46,13 +25,13 @@ from coursebuild.core.pages.page_inputs import (
 from coursebuild.core.registry import kind_of_block
 
 
-def document_inputs(library: Library, place: urls.Place, document: Document) -> ShownDocument:
+def document_inputs(library: Library, place: urls.Place, document: model.Document) -> ShownDocument:
     """All that the document's page shows besides what stands in the document.
 
     The summary of a document does as well as the document.
     """
     page = _Page(library, place, document)
-    for block in document_blocks(document):
+    for block in model.document_blocks(document):
         page.note(block)
     return ShownDocument(
         engine=library.results.engine,
@@ -72,12 +51,12 @@ def document_inputs(library: Library, place: urls.Place, document: Document) -> 
 class _Page:
     """Collects what a document asks for."""
 
-    def __init__(self, library: Library, place: urls.Place, document: Document) -> None:
+    def __init__(self, library: Library, place: urls.Place, document: model.Document) -> None:
         self.library = library
         self.place = place
         self.path = document.source.path
-        self.hrefs: dict[Target, str] = {}
-        self.equations: dict[Target, str] = {}
+        self.hrefs: dict[model.Target, str] = {}
+        self.equations: dict[model.Target, str] = {}
         self.callouts: dict[str, ShownCallout] = {}
         self.verdicts: dict[int, ShownVerdict] = {}
         self.trials: dict[int, Struct] = {}
@@ -86,33 +65,33 @@ class _Page:
         self.scripts: dict[str, set[int]] = {}
         """Paths of scripts, and the numbers of the lines that are quoted."""
 
-    def note(self, block: Block) -> None:
+    def note(self, block: model.Block) -> None:
         """Note what a block asks for."""
         match block:
-            case Script():
+            case model.Script():
                 self.scripts.setdefault(block.path, set())
-            case Recording():
+            case model.Recording():
                 self._recording(block)
-            case FeatureBlock():
+            case model.FeatureBlock():
                 self._feature(block)
-            case Callout():
+            case model.Callout():
                 library, kind = self.library, block.kind
                 words = ShownCallout(library.callout_label(kind), library.callout_promise(kind))
                 self.callouts[kind] = words
             case _:
                 pass
-        for inline in walk_inlines(block_inlines(block)):
-            if isinstance(inline, Link):
+        for inline in model.walk_inlines(model.block_inlines(block)):
+            if isinstance(inline, model.Link):
                 self._link(inline.target)
 
-    def _recording(self, block: Recording) -> None:
+    def _recording(self, block: model.Recording) -> None:
         if block.script is not None:
             self.scripts.setdefault(block.script, set())
         verdict = self.library.verdict(block)
         if verdict is not None:
             self.verdicts[block.span.start] = ShownVerdict(verdict.status, verdict.comparison)
 
-    def _feature(self, block: FeatureBlock) -> None:
+    def _feature(self, block: model.FeatureBlock) -> None:
         values = kind_of_block(block).values
         if values is not None:
             self.blocks[block.span.start] = values(self.library, self.place, block)
@@ -122,12 +101,12 @@ class _Page:
         if tried is not None:
             self.trials[block.span.start] = tried
         for name in block.models():
-            self._link(ModelTarget(name))
+            self._link(model.ModelTarget(name))
             compiled = self.library.models.get(name)
             if compiled is not None and compiled.facts is not None:
                 self.keyframes[name] = compiled.facts.keyframes
 
-    def _link(self, target: Target) -> None:
+    def _link(self, target: model.Target) -> None:
         if target not in self.hrefs:
             self.hrefs[target] = address(self.library, self.place, self.path, target)
             name = equation_name(self.library, self.path, target)
@@ -155,39 +134,39 @@ def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
     return ShownRun(run.outcome, run.missing, tuple(asked), run.recorded)
 
 
-def address(library: Library, place: urls.Place, path: str, target: Target) -> str:
+def address(library: Library, place: urls.Place, path: str, target: model.Target) -> str:
     """The address of a link's target, from a place, in the document with a path."""
-    target = resolve(target, library.course, path)
+    target = model.resolve(target, library.course, path)
     match target:
-        case LessonTarget():
+        case model.LessonTarget():
             return place.href(urls.lesson_path(library.lessons[target.id]), target.anchor)
-        case LevelTarget():
+        case model.LevelTarget():
             return place.href(urls.level_path(library.levels[target.id]))
-        case ModelTarget():
+        case model.ModelTarget():
             return place.href(urls.model_page_path(target.name), target.anchor)
-        case PageTarget():
+        case model.PageTarget():
             return place.href(urls.page_path(library.pages[target.id]), target.anchor)
-        case ExampleTarget():
+        case model.ExampleTarget():
             return place.href(target.path)
-        case TermTarget():
+        case model.TermTarget():
             found = library.terms.get(target.id)
             # In a preview the text that defined it may have changed just now.
             path = place.path if found is None else urls.owner_path(found)
             return place.href(path, f"term:{target.id}")
-        case UrlTarget():
+        case model.UrlTarget():
             return file_address(place, path, target.url)
         case _:
             assert_never(target)
 
 
-def equation_name(library: Library, path: str, target: Target) -> str:
+def equation_name(library: Library, path: str, target: model.Target) -> str:
     """How another page calls a formula with a number; empty where a target is none."""
-    target = resolve(target, library.course, path)
-    if not isinstance(target, LessonTarget | PageTarget) or not target.anchor:
+    target = model.resolve(target, library.course, path)
+    if not isinstance(target, model.LessonTarget | model.PageTarget) or not target.anchor:
         return ""
     if not target.anchor.startswith("eq:"):
         return ""
-    lesson = isinstance(target, LessonTarget)
+    lesson = isinstance(target, model.LessonTarget)
     owner = library.lessons[target.id] if lesson else library.pages[target.id]
     if owner.document is None:
         return ""
@@ -207,5 +186,5 @@ def file_address(place: urls.Place, path: str, url: str) -> str:
     parts = urlsplit(url)
     if parts.scheme or parts.netloc or not parts.path:
         return url
-    site_path = urls.file_path(local_file(url, path))
+    site_path = urls.file_path(model.local_file(url, path))
     return place.href(site_path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]

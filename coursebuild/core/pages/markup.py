@@ -17,43 +17,7 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from coursebuild.core.model import (
-    Block,
-    BlockQuote,
-    Callout,
-    Cell,
-    CodeBlock,
-    CodeSpan,
-    Emphasis,
-    FeatureBlock,
-    Footnote,
-    FootnoteRef,
-    HardBreak,
-    Heading,
-    HtmlBlock,
-    HtmlFlow,
-    Image,
-    Inline,
-    Link,
-    ListBlock,
-    ListItem,
-    Math,
-    MathBlock,
-    Mjcf,
-    NumberBinding,
-    Paragraph,
-    PlainCode,
-    RawInline,
-    Recording,
-    Script,
-    SoftBreak,
-    Strikethrough,
-    Strong,
-    Table,
-    Term,
-    Text,
-    ThematicBreak,
-)
+from coursebuild.core import model
 from coursebuild.core.pages.look import Context, Look
 from coursebuild.core.pages.quantities import in_order, joined, quantities, unit_length
 
@@ -81,27 +45,29 @@ def _quoted(anchor: str) -> str:
     return anchor if _PLAIN_ANCHOR.fullmatch(anchor) else quote(anchor)
 
 
-def render_blocks(blocks: Iterable[Block], context: Context, look: Look = _LOOK) -> Markup:
+def render_blocks(blocks: Iterable[model.Block], context: Context, look: Look = _LOOK) -> Markup:
     """Blocks one after the other, each with its line end."""
     return Markup(_Writer(context, look).blocks(blocks))
 
 
-def render_inlines(inlines: Iterable[Inline], context: Context, look: Look = _LOOK) -> Markup:
+def render_inlines(inlines: Iterable[model.Inline], context: Context, look: Look = _LOOK) -> Markup:
     """Inlines one after the other."""
     return Markup(_Writer(context, look).inlines(inlines))
 
 
-def render_table(table: Table, context: Context, look: Look = _LOOK) -> Markup:
+def render_table(table: model.Table, context: Context, look: Look = _LOOK) -> Markup:
     """A table."""
     return Markup(_Writer(context, look).table(table))
 
 
-def render_footnotes(footnotes: Iterable[Footnote], context: Context, look: Look = _LOOK) -> Markup:
+def render_footnotes(
+    footnotes: Iterable[model.Footnote], context: Context, look: Look = _LOOK
+) -> Markup:
     """The footnotes of a document in a section at its end; empty where there are none."""
     return Markup(_Writer(context, look).footnotes(footnotes))
 
 
-def raw_html(node: HtmlBlock | RawInline, url: Callable[[str], str]) -> str:
+def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:
     """Raw HTML; `url` gives the addresses that files of the course have where it is shown."""
     parts, at = list[str](), 0
     for media in node.media:
@@ -116,9 +82,9 @@ def reference_id(number: int, occurrence: int) -> str:
     return f"fnref:{number}" if occurrence == 1 else f"fnref:{number}:{occurrence}"
 
 
-def is_tight(block: Block) -> bool:
+def is_tight(block: model.Block) -> bool:
     """Whether a block is a paragraph of a tight list."""
-    return isinstance(block, Paragraph) and block.tight
+    return isinstance(block, model.Paragraph) and block.tight
 
 
 class _Writer:
@@ -129,28 +95,28 @@ class _Writer:
         self.end = " />" if look.plain else ">"
         """Of a tag without content."""
 
-    def blocks(self, blocks: Iterable[Block]) -> str:
+    def blocks(self, blocks: Iterable[model.Block]) -> str:
         return "".join(map(self.block, blocks))
 
-    def inlines(self, inlines: Iterable[Inline]) -> str:
+    def inlines(self, inlines: Iterable[model.Inline]) -> str:
         if not self.look.quantities:
             return "".join(map(self.inline, inlines))
         return "".join(self._with_units(tuple(inlines)))
 
-    def _with_units(self, inlines: tuple[Inline, ...]) -> list[str]:
+    def _with_units(self, inlines: tuple[model.Inline, ...]) -> list[str]:
         """Inlines, of which formulas and bound numbers are held together with their units."""
         written: list[str] = []
         taken = 0
         for inline, after in zip_longest(inlines, inlines[1:]):
-            if isinstance(inline, Text):
+            if isinstance(inline, model.Text):
                 written.append(self._text(inline.text[taken:]))
                 taken = 0
                 continue
             html = self.inline(inline)
-            number = isinstance(inline, NumberBinding) or (
-                isinstance(inline, Math) and not inline.display
+            number = isinstance(inline, model.NumberBinding) or (
+                isinstance(inline, model.Math) and not inline.display
             )
-            if number and isinstance(after, Text) and (taken := unit_length(after.text)):
+            if number and isinstance(after, model.Text) and (taken := unit_length(after.text)):
                 html += _escaped(after.text[:taken].replace(" ", "\u00a0"))
                 if self.look.quantities == "rtl":
                     html = in_order(Markup(html))
@@ -169,46 +135,46 @@ class _Writer:
 
     # -- blocks
 
-    def block(self, block: Block) -> str:
+    def block(self, block: model.Block) -> str:
         """One block, with its line end unless it is a paragraph of a tight list."""
         match block:
-            case Paragraph() if block.figure:
+            case model.Paragraph() if block.figure:
                 return self._figure(block)
-            case Paragraph():
+            case model.Paragraph():
                 inner = self.inlines(block.children)
                 return inner if block.tight else f"<p>{inner}</p>\n"
-            case Heading():
+            case model.Heading():
                 return self._heading(block)
-            case ListBlock():
+            case model.ListBlock():
                 return self._list(block)
-            case BlockQuote():
+            case model.BlockQuote():
                 return f"<blockquote>\n{self.blocks(block.blocks)}</blockquote>\n"
-            case CodeBlock():
+            case model.CodeBlock():
                 return self.context.code(block.language, block.code.text)
-            case HtmlBlock():
+            case model.HtmlBlock():
                 return raw_html(block, self.context.url)
-            case HtmlFlow():
+            case model.HtmlFlow():
                 return f"{self.inlines(block.children)}\n"
-            case ThematicBreak():
+            case model.ThematicBreak():
                 return f"<hr{self.end}\n"
-            case MathBlock():
+            case model.MathBlock():
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
-            case Table():
+            case model.Table():
                 return self.table(block)
-            case Callout() | Mjcf() | PlainCode():
+            case model.Callout() | model.Mjcf() | model.PlainCode():
                 return self.context.block(block)
-            case Recording() | Script() | FeatureBlock():
+            case model.Recording() | model.Script() | model.FeatureBlock():
                 return self.context.block(block)
             case _:
                 assert_never(block)
 
-    def _figure(self, paragraph: Paragraph) -> str:
+    def _figure(self, paragraph: model.Paragraph) -> str:
         """An image with the rest of its paragraph as its caption."""
-        image = next(one for one in paragraph.children if isinstance(one, Image))
+        image = next(one for one in paragraph.children if isinstance(one, model.Image))
         words = self.inlines(one for one in paragraph.children if one is not image)
         return self.context.figure(image, Markup(words.removeprefix("Figure:").strip()))
 
-    def _heading(self, heading: Heading) -> str:
+    def _heading(self, heading: model.Heading) -> str:
         inner, name = self.inlines(heading.children), f"h{heading.level}"
         if self.look.plain:
             return f"<{name}>{inner}</{name}>\n"
@@ -218,14 +184,14 @@ class _Writer:
         link = f'<a class="anchor" href="#{_quoted(heading.anchor)}" aria-label="{label}">#</a>'
         return f'<{name} id="{anchor}"{kinds}>{inner} {link}</{name}>\n'
 
-    def _list(self, block: ListBlock) -> str:
+    def _list(self, block: model.ListBlock) -> str:
         start = "" if block.start is None or block.start == 1 else f' start="{block.start}"'
         name = "ul" if block.start is None else "ol"
         tasks = any(item.checked is not None for item in block.items)
         mark = ' class="task-list"' if tasks else ""
         return f"<{name}{start}{mark}>\n{''.join(map(self._item, block.items))}</{name}>\n"
 
-    def _item(self, item: ListItem) -> str:
+    def _item(self, item: model.ListItem) -> str:
         """An item; a tight paragraph stands on the line of what is before it."""
         parts = ["<li>"]
         if item.checked is not None:
@@ -244,7 +210,7 @@ class _Writer:
         state = " checked" if checked else ""
         return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.end} '
 
-    def table(self, table: Table) -> str:
+    def table(self, table: model.Table) -> str:
         """A table; its columns are aligned by class."""
         head = self._row(table.header, table, 'th scope="col"')
         rows = "".join(self._row(row, table, "td") for row in table.rows)
@@ -255,7 +221,7 @@ class _Writer:
         label = _escaped(self.look.words.table)
         return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
 
-    def _row(self, cells: tuple[Cell, ...], table: Table, tag: str) -> str:
+    def _row(self, cells: tuple[model.Cell, ...], table: model.Table, tag: str) -> str:
         parts = ["<tr>\n"]
         for cell, align in zip(cells, table.align, strict=True):
             mark = f' class="align-{align}"' if align else ""
@@ -265,44 +231,44 @@ class _Writer:
 
     # -- inlines
 
-    def inline(self, inline: Inline) -> str:
+    def inline(self, inline: model.Inline) -> str:
         """One inline."""
         match inline:
-            case Text():
+            case model.Text():
                 return _escaped(inline.text)
-            case SoftBreak():
+            case model.SoftBreak():
                 return "\n"
-            case CodeSpan():
+            case model.CodeSpan():
                 return f"<code>{_escaped(inline.text)}</code>"
-            case Math():
+            case model.Math():
                 if inline.display:
                     return self.context.display(inline.tex.text, inline.span.start)
                 return self.context.math(inline.tex.text)
-            case Term():
+            case model.Term():
                 name = "" if self.look.plain else f' id="{_escaped(inline.anchor)}"'
                 return f"<dfn{name}>{self.inlines(inline.children)}</dfn>"
-            case Emphasis():
+            case model.Emphasis():
                 return f"<em>{self.inlines(inline.children)}</em>"
-            case Strong():
+            case model.Strong():
                 return f"<strong>{self.inlines(inline.children)}</strong>"
-            case Strikethrough():
+            case model.Strikethrough():
                 return f"<del>{self.inlines(inline.children)}</del>"
-            case Link():
+            case model.Link():
                 return self._link(inline)
-            case Image():
+            case model.Image():
                 return self._image(inline)
-            case RawInline():
+            case model.RawInline():
                 return raw_html(inline, self.context.url)
-            case HardBreak():
+            case model.HardBreak():
                 return f"<br{self.end}\n"
-            case NumberBinding():
+            case model.NumberBinding():
                 return self.context.binding(inline)
-            case FootnoteRef():
+            case model.FootnoteRef():
                 return self._reference(inline)
             case _:
                 assert_never(inline)
 
-    def _link(self, link: Link) -> str:
+    def _link(self, link: model.Link) -> str:
         title = f' title="{_escaped(link.title)}"' if link.title else ""
         href = _escaped(self.context.href(link.target))
         inner = self.inlines(link.children) or _escaped(self.context.reference(link.target))
@@ -310,14 +276,14 @@ class _Writer:
         own = ' class="url"' if bare else ""
         return f'<a href="{href}"{title}{own}>{inner}</a>'
 
-    def _image(self, image: Image) -> str:
+    def _image(self, image: model.Image) -> str:
         title = f' title="{_escaped(image.title)}"' if image.title else ""
         url = _escaped(self.context.url(image.url))
         return f'<img src="{url}" alt="{_escaped(image.alt)}"{title}{self.end}'
 
     # -- footnotes
 
-    def _reference(self, reference: FootnoteRef) -> str:
+    def _reference(self, reference: model.FootnoteRef) -> str:
         number = reference.number
         label = _escaped(self.look.words.footnote.format(number=number))
         name = reference_id(number, reference.occurrence)
@@ -326,7 +292,7 @@ class _Writer:
             f' aria-label="{label}">{number}</a></sup>'
         )
 
-    def footnotes(self, footnotes: Iterable[Footnote]) -> str:
+    def footnotes(self, footnotes: Iterable[model.Footnote]) -> str:
         items = "".join(map(self._footnote, footnotes))
         if not items:
             return ""
@@ -334,12 +300,12 @@ class _Writer:
         start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
         return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
 
-    def _footnote(self, footnote: Footnote) -> str:
+    def _footnote(self, footnote: model.Footnote) -> str:
         """A footnote; the ways back stand at the end of its last paragraph."""
         back = " ".join(self._back(footnote.number, k + 1) for k in range(footnote.references))
         last = footnote.blocks[-1] if footnote.blocks else None
         inner = self.blocks(footnote.blocks[:-1])
-        if isinstance(last, Paragraph):
+        if isinstance(last, model.Paragraph):
             inner += f"<p>{self.inlines(last.children)} {back}</p>\n"
         else:
             inner += f"{'' if last is None else self.block(last)}<p>{back}</p>\n"

@@ -5,36 +5,23 @@ Entry point: `without_links`.
 
 from __future__ import annotations
 
-from coursebuild.core.model import (
-    Emphasis,
-    FootnoteRef,
-    HardBreak,
-    Image,
-    Inline,
-    Link,
-    RawInline,
-    SoftBreak,
-    Strikethrough,
-    Strong,
-    Term,
-    Text,
-)
+from coursebuild.core import model
 
 
-def without_links(inlines: tuple[Inline, ...]) -> tuple[Inline, ...]:
+def without_links(inlines: tuple[model.Inline, ...]) -> tuple[model.Inline, ...]:
     """The inlines without links, terms, footnotes, raw HTML and pictures, in one line."""
-    kept: list[Inline] = []
+    kept: list[model.Inline] = []
     for inline in inlines:
         match inline:
-            case Link() | Term():
+            case model.Link() | model.Term():
                 kept += without_links(inline.children)
-            case Emphasis() | Strong() | Strikethrough():
+            case model.Emphasis() | model.Strong() | model.Strikethrough():
                 kept.append(type(inline)(inline.span, without_links(inline.children)))
-            case Image():
-                kept.append(Text(inline.span, inline.alt))
-            case SoftBreak() | HardBreak():
-                kept.append(Text(inline.span, " "))
-            case RawInline() | FootnoteRef():
+            case model.Image():
+                kept.append(model.Text(inline.span, inline.alt))
+            case model.SoftBreak() | model.HardBreak():
+                kept.append(model.Text(inline.span, " "))
+            case model.RawInline() | model.FootnoteRef():
                 pass
             case _:
                 kept.append(inline)

@@ -19,28 +19,7 @@ from itertools import islice
 
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    Cell,
-    CodeSpan,
-    Comparison,
-    Emphasis,
-    Filter,
-    FootnoteRef,
-    HardBreak,
-    Image,
-    Inline,
-    Link,
-    Math,
-    NumberBinding,
-    RawInline,
-    Recording,
-    SoftBreak,
-    Strikethrough,
-    Strong,
-    Table,
-    Term,
-    Text,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.changes import number_change
@@ -63,7 +42,7 @@ _PLACES = 64
 class RowCell(Struct, frozen=True):
     """A cell of a recorded table."""
 
-    cell: Cell
+    cell: model.Cell
     mapped: MappedText
     canon: Canon
 
@@ -84,7 +63,9 @@ class RowMatch(Struct, frozen=True):
     pairs: tuple[tuple[RowCell, Number, Number], ...]
 
 
-def table_rows(table: Table, filters: Iterable[Filter] = ()) -> tuple[tuple[RowCell, ...], ...]:
+def table_rows(
+    table: model.Table, filters: Iterable[model.Filter] = ()
+) -> tuple[tuple[RowCell, ...], ...]:
     """The body rows of a table; cells and rows without text are left out."""
     rules = tuple(filters)
     texts = ([(cell, cell_text(cell, rules)) for cell in row] for row in table.rows)
@@ -96,10 +77,10 @@ def table_rows(table: Table, filters: Iterable[Filter] = ()) -> tuple[tuple[RowC
 
 
 def compare_table(
-    recording: Recording,
-    table: Table,
-    comparison: Comparison,
-    filters: tuple[Filter, ...],
+    recording: model.Recording,
+    table: model.Table,
+    comparison: model.Comparison,
+    filters: tuple[model.Filter, ...],
     ran: Side,
 ) -> Verdict:
     """The verdict on a recorded table."""
@@ -117,7 +98,7 @@ def _row_text(row: Sequence[RowCell]) -> str:
 
 
 def _row_changes(
-    found: RowMatch, ran: Side, comparison: Comparison, line_starts: Sequence[int]
+    found: RowMatch, ran: Side, comparison: model.Comparison, line_starts: Sequence[int]
 ) -> list[Change]:
     if found.line < 0:
         first, last = found.row[0].cell.span, found.row[-1].cell.span
@@ -137,7 +118,7 @@ class TableMatcher:
     """Matches the rows of one table with the lines of one output."""
 
     def __init__(
-        self, rows: Sequence[tuple[RowCell, ...]], ran: Side, comparison: Comparison
+        self, rows: Sequence[tuple[RowCell, ...]], ran: Side, comparison: model.Comparison
     ) -> None:
         self.rows = rows
         self.comparison = comparison
@@ -259,7 +240,7 @@ _RUN = re.compile(r"\s{2,}|[^\S ]")
 _ENDS = re.compile(r"\A\s+|\s+\Z")
 
 
-def cell_text(cell: Cell, filters: Iterable[Filter] = ()) -> MappedText:
+def cell_text(cell: model.Cell, filters: Iterable[model.Filter] = ()) -> MappedText:
     """The plain text of a cell, filtered; origins are offsets in the lesson's source.
 
     Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
@@ -280,30 +261,36 @@ def cell_text(cell: Cell, filters: Iterable[Filter] = ()) -> MappedText:
     return MappedText(folded.text.replace("\u2212", "-"), folded.segments)
 
 
-def _stretches(inlines: Iterable[Inline]) -> Iterator[tuple[str, Span]]:
+def _stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
     for inline in inlines:
         match inline:
-            case Text():
+            case model.Text():
                 yield inline.text, inline.span
-            case CodeSpan():
+            case model.CodeSpan():
                 yield inline.text, _inside_backticks(inline)
-            case NumberBinding():
+            case model.NumberBinding():
                 yield inline.text, inline.text_span
-            case Math():
+            case model.Math():
                 yield inline.tex.text, inline.tex.span()
-            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+            case (
+                model.Emphasis()
+                | model.Strong()
+                | model.Strikethrough()
+                | model.Link()
+                | model.Term()
+            ):
                 yield from _stretches(inline.children)
-            case Image():
+            case model.Image():
                 yield inline.alt, inline.span
-            case SoftBreak() | HardBreak():
+            case model.SoftBreak() | model.HardBreak():
                 yield " ", inline.span
-            case RawInline():
+            case model.RawInline():
                 yield (" " if inline.html.startswith("<br") else ""), inline.span
-            case FootnoteRef():
+            case model.FootnoteRef():
                 pass
 
 
-def _inside_backticks(code: CodeSpan) -> Span:
+def _inside_backticks(code: model.CodeSpan) -> Span:
     """The place of a code span's text: what stands between the backticks, without padding."""
     written = code.span.text
     ticks = len(written) - len(written.lstrip("`"))

@@ -15,27 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from coursebuild.core.model import (
-    Block,
-    BlockQuote,
-    Callout,
-    CodeBlock,
-    Heading,
-    HtmlBlock,
-    HtmlFlow,
-    Inline,
-    Label,
-    ListBlock,
-    ListItem,
-    Math,
-    MathBlock,
-    Paragraph,
-    Recording,
-    Script,
-    Table,
-    ThematicBreak,
-    plain_text,
-)
+from coursebuild.core import model
 from coursebuild.core.syntax.attributes import Braces, read_label
 from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
@@ -87,16 +67,16 @@ class TextReader:
                 read = self._later(i + 1)
                 self.session.notes.write(Written(label, label_span, self._span(token), read))
 
-    def _later(self, at: int) -> Callable[[], tuple[Block, ...]]:
+    def _later(self, at: int) -> Callable[[], tuple[model.Block, ...]]:
         """Reads the footnote whose first token has the index `at`."""
 
-        def read() -> tuple[Block, ...]:
+        def read() -> tuple[model.Block, ...]:
             self.at = at
             return self._blocks("footnote_reference_close")
 
         return read
 
-    def read(self) -> tuple[Block, ...]:
+    def read(self) -> tuple[model.Block, ...]:
         """The blocks of the text, its footnotes left for later."""
         blocks = self._blocks(None)
         self.balance.finish()
@@ -104,9 +84,9 @@ class TextReader:
 
     # -- walking
 
-    def _blocks(self, stop: str | None) -> tuple[Block, ...]:
+    def _blocks(self, stop: str | None) -> tuple[model.Block, ...]:
         """The blocks up to a closing token, which is passed."""
-        out: list[Block] = []
+        out: list[model.Block] = []
         self.balance.enter()
         while self.at < len(self.tokens):
             token = self.tokens[self.at]
@@ -128,7 +108,7 @@ class TextReader:
 
     # -- leaves
 
-    def _paragraph(self, token: PositionedToken) -> Block:
+    def _paragraph(self, token: PositionedToken) -> model.Block:
         self.at += 2
         content = self._content(token)
         children = self.inlines.read(content)
@@ -141,8 +121,8 @@ class TextReader:
             self.session.diagnostics += near_caption(children, span, kind)
         if not self.nested and content.text.startswith(WORD):
             children, shown = read_figure(children, span, self.session.figures)
-            return Paragraph(span, children, token.hidden, shown)
-        return Paragraph(span, children, token.hidden)
+            return model.Paragraph(span, children, token.hidden, shown)
+        return model.Paragraph(span, children, token.hidden)
 
     def _next_kind(self) -> str | None:
         """The kind of the fence that follows, if one does."""
@@ -151,7 +131,7 @@ class TextReader:
             return None
         return (token.info.split() or [""])[0]
 
-    def _heading(self, token: PositionedToken) -> Heading:
+    def _heading(self, token: PositionedToken) -> model.Heading:
         self.at += 2
         span = self._span(token)
         attributes = read_attributes(self._content(token))
@@ -162,7 +142,7 @@ class TextReader:
         session.diagnostics += heading_mistakes(span, level, above, children, lesson=session.lesson)
         if not self.nested:
             session.level = level
-        return Heading(
+        return model.Heading(
             span,
             level,
             children,
@@ -170,26 +150,28 @@ class TextReader:
             attributes.value.classes,
         )
 
-    def _anchor(self, attributes: Attributes, children: tuple[Inline, ...]) -> tuple[str, bool]:
+    def _anchor(
+        self, attributes: Attributes, children: tuple[model.Inline, ...]
+    ) -> tuple[str, bool]:
         anchors = self.session.anchors
         if attributes.id is not None and attributes.id_span is not None:
             anchors.take(attributes.id, attributes.id_span)
             return attributes.id, True
-        return anchors.make(plain_text(children)), False
+        return anchors.make(model.plain_text(children)), False
 
-    def _fence(self, token: PositionedToken) -> Block:
+    def _fence(self, token: PositionedToken) -> model.Block:
         fence = read_fence(token, self.base, nested=self.nested)
         block = fence_block(fence, self.session, self.texts)
-        if isinstance(block, Script) and not block.norun and self._next_kind() == "text":
+        if isinstance(block, model.Script) and not block.norun and self._next_kind() == "text":
             below = self.tokens[self.at]
             if below.info.split() == ["text"]:  # its keys are told as what they are
                 self.session.report(no_caption(self._span(below)))
         return block
 
-    def _code(self, token: PositionedToken) -> CodeBlock:
+    def _code(self, token: PositionedToken) -> model.CodeBlock:
         code = locate(self.base, token.rows)
         self._fence_inside(code)
-        return CodeBlock(
+        return model.CodeBlock(
             self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )
 
@@ -207,24 +189,24 @@ class TextReader:
         self.session.report(diagnose("fence-indented", place, message, help=help))
         self.session.closes_indented = not closed
 
-    def _html(self, token: PositionedToken) -> HtmlBlock | HtmlFlow:
+    def _html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
         """Raw HTML, kept as it is unless it holds formulas."""
         html = locate(self.base, token.rows)
         if self.nested or "$" in html.text:
             content = trimmed(html, " \t\n")
             children = self.inlines.read(content, html=True)
-            if self.nested or any(isinstance(child, Math) for child in children):
-                return HtmlFlow(content.span(), children)
+            if self.nested or any(isinstance(child, model.Math) for child in children):
+                return model.HtmlFlow(content.span(), children)
         else:
             for tag in tags(html.text):
                 self.balance.add(tag, html.text, html.span)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
-        return HtmlBlock(self._span(token), text, media_of(html.text, html.span))
+        return model.HtmlBlock(self._span(token), text, media_of(html.text, html.span))
 
-    def _rule(self, token: PositionedToken) -> ThematicBreak:
-        return ThematicBreak(self._span(token))
+    def _rule(self, token: PositionedToken) -> model.ThematicBreak:
+        return model.ThematicBreak(self._span(token))
 
-    def _math(self, token: PositionedToken) -> MathBlock:
+    def _math(self, token: PositionedToken) -> model.MathBlock:
         text = locate(self.base, token.rows)
         start, end = text.text.index("$$") + 2, len(text.text)
         if token.info != "unclosed":
@@ -241,9 +223,9 @@ class TextReader:
             self.session.report(wrong)
         elif not tex.text:
             self.session.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
-        return MathBlock(self._span(token), tex, self._label(text, end + 2))
+        return model.MathBlock(self._span(token), tex, self._label(text, end + 2))
 
-    def _label(self, text: Excerpt, at: int) -> Label | None:
+    def _label(self, text: Excerpt, at: int) -> model.Label | None:
         """The label of the formula that ends before an offset."""
         braces = Braces.of_label(text.text, at, len(text.text))
         label = read_label(text, braces, self.session.report) if braces is not None else None
@@ -253,46 +235,46 @@ class TextReader:
 
     # -- containers
 
-    def _quote(self, token: PositionedToken) -> BlockQuote | Callout:
+    def _quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, opened = self._span(token), self.tokens[self.at]
         head = read_head(self._content(opened)) if opened.type == "paragraph_open" else None
         if head is None:
-            return BlockQuote(span, self._blocks("blockquote_close"))
+            return model.BlockQuote(span, self._blocks("blockquote_close"))
         return self._callout(span, head)
 
-    def _callout(self, span: Span, head: Head) -> Callout:
+    def _callout(self, span: Span, head: Head) -> model.Callout:
         kind = resolve(head, self.session.callouts)
         self.session.diagnostics += kind.diagnostics
         title = self.inlines.read(head.title)
         self.at += 3
-        first: tuple[Block, ...] = ()
+        first: tuple[model.Block, ...] = ()
         if head.rest.text:
-            first = (Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
+            first = (model.Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
         blocks = (*first, *self._blocks("blockquote_close"))
-        return Callout(span, kind.value, head.kind.span(), title, head.folded, blocks)
+        return model.Callout(span, kind.value, head.kind.span(), title, head.folded, blocks)
 
-    def _list(self, token: PositionedToken) -> ListBlock:
+    def _list(self, token: PositionedToken) -> model.ListBlock:
         ordered = token.type == "ordered_list_open"
-        items: list[ListItem] = []
+        items: list[model.ListItem] = []
         while (item := self.tokens[self.at]).type == "list_item_open":
             self.at += 1
             items.append(self._item(item))
         self.at += 1
-        return ListBlock(
+        return model.ListBlock(
             self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
 
-    def _item(self, token: PositionedToken) -> ListItem:
+    def _item(self, token: PositionedToken) -> model.ListItem:
         blocks = self._blocks("list_item_close")
         marker = self.base.span(token.start, token.start + len(token.info) + 1)
         span = marker.to(blocks[-1].span) if blocks else marker
-        return ListItem(span, blocks, token.meta.get("checked"))
+        return model.ListItem(span, blocks, token.meta.get("checked"))
 
-    def _table(self, token: PositionedToken) -> Table:
+    def _table(self, token: PositionedToken) -> model.Table:
         table, self.at = self._read_table(self.at - 1)
         return table
 
-    def _read_table(self, at: int) -> tuple[Table, int]:
+    def _read_table(self, at: int) -> tuple[model.Table, int]:
         return read_table(self.tokens, at, self.base, self.inlines.read, self.session.report)
 
     def _footnote(self, token: PositionedToken) -> None:
@@ -305,7 +287,7 @@ class TextReader:
 
     # -- recorded output
 
-    def _recording(self, caption: tuple[Inline, ...], span: Span) -> Recording | None:
+    def _recording(self, caption: tuple[model.Inline, ...], span: Span) -> model.Recording | None:
         """The recording whose caption was just read, if what follows is its body."""
         token = self.tokens[self.at] if self.at < len(self.tokens) else None
         kind = "" if token is None else token.type
@@ -324,7 +306,7 @@ class TextReader:
         return None
 
 
-_READERS: dict[str, Callable[[TextReader, PositionedToken], Block | None]] = {
+_READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]] = {
     "paragraph_open": TextReader._paragraph,
     "heading_open": TextReader._heading,
     "fence": TextReader._fence,
@@ -346,19 +328,19 @@ class Texts:
     def __init__(self, session: ParsingState) -> None:
         self._session = session
 
-    def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
+    def blocks(self, excerpt: Excerpt) -> Parsed[tuple[model.Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
         base = normalized(excerpt)
         return self._session.apart(
             lambda: TextReader(base, self._session, self._definitions(), nested=True).read()
         )
 
-    def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
+    def inlines(self, excerpt: Excerpt) -> Parsed[tuple[model.Inline, ...]]:
         """The inlines of a text that is one paragraph at most."""
         content = trimmed(normalized(excerpt))
         return self._session.apart(lambda: self._read_inlines(content))
 
-    def _read_inlines(self, content: Excerpt) -> tuple[Inline, ...]:
+    def _read_inlines(self, content: Excerpt) -> tuple[model.Inline, ...]:
         balance = Balance(self._session.report)
         reader = InlineReader(self._definitions(), self._session, balance)
         inlines = reader.read(content)

@@ -16,45 +16,7 @@ import re
 from collections.abc import Iterable
 from typing import Protocol, assert_never
 
-from coursebuild.core.model import (
-    Block,
-    BlockQuote,
-    Callout,
-    Cell,
-    CodeBlock,
-    CodeSpan,
-    Emphasis,
-    FeatureBlock,
-    Footnote,
-    FootnoteRef,
-    HardBreak,
-    Heading,
-    HtmlBlock,
-    HtmlFlow,
-    Image,
-    Inline,
-    Link,
-    ListBlock,
-    ListItem,
-    Math,
-    MathBlock,
-    Mjcf,
-    NumberBinding,
-    Paragraph,
-    PlainCode,
-    RawInline,
-    Recording,
-    Script,
-    SoftBreak,
-    Strikethrough,
-    Strong,
-    Table,
-    Target,
-    Term,
-    Text,
-    ThematicBreak,
-    plain_text,
-)
+from coursebuild.core import model
 from coursebuild.core.pages.look import OwnBlock
 from coursebuild.core.pages.marks import (
     code_span,
@@ -81,7 +43,7 @@ from coursebuild.features.markdown.texts import (
 class MarkdownContext(Protocol):
     """What depends on where the Markdown goes."""
 
-    def href(self, target: Target) -> str:
+    def href(self, target: model.Target) -> str:
         """The address of a link."""
         ...
 
@@ -93,7 +55,7 @@ class MarkdownContext(Protocol):
         """A reference to a footnote."""
         ...
 
-    def named(self, target: Target) -> str:
+    def named(self, target: model.Target) -> str:
         """What a link without a text says: the number of a formula; empty for none."""
         ...
 
@@ -106,17 +68,17 @@ class MarkdownContext(Protocol):
         ...
 
 
-def write_blocks(blocks: Iterable[Block], context: MarkdownContext) -> str:
+def write_blocks(blocks: Iterable[model.Block], context: MarkdownContext) -> str:
     """Blocks one after the other, an empty line between two, without the last line end."""
     return _Writer(context).blocks(blocks)
 
 
-def write_inlines(inlines: tuple[Inline, ...], context: MarkdownContext) -> str:
+def write_inlines(inlines: tuple[model.Inline, ...], context: MarkdownContext) -> str:
     """Inlines in one line, such as a title."""
     return _Writer(context).line(inlines)
 
 
-def write_footnotes(footnotes: Iterable[Footnote], context: MarkdownContext) -> str:
+def write_footnotes(footnotes: Iterable[model.Footnote], context: MarkdownContext) -> str:
     """The definitions of footnotes, which are referred to as `[^1]`."""
     return "\n\n".join(
         hang(f"[^{note.number}]: ", write_blocks(note.blocks, context), 4) for note in footnotes
@@ -124,8 +86,16 @@ def write_footnotes(footnotes: Iterable[Footnote], context: MarkdownContext) -> 
 
 
 _APART = (
-    *(HtmlBlock, Callout, PlainCode, Script, Recording, Mjcf, FeatureBlock),
-    *(Table, MathBlock),
+    *(
+        model.HtmlBlock,
+        model.Callout,
+        model.PlainCode,
+        model.Script,
+        model.Recording,
+        model.Mjcf,
+        model.FeatureBlock,
+    ),
+    *(model.Table, model.MathBlock),
 )
 """Blocks that an empty line parts from others, even in a tight list."""
 
@@ -136,13 +106,13 @@ class _Writer:
     def __init__(self, context: MarkdownContext) -> None:
         self.context = context
 
-    def line(self, inlines: Iterable[Inline]) -> str:
+    def line(self, inlines: Iterable[model.Inline]) -> str:
         return " ".join(self.inlines(inlines, line=True).split("\n")).strip()
 
     # --- blocks
 
-    def blocks(self, blocks: Iterable[Block], *, tight: bool = False) -> str:
-        parts: list[tuple[Block, str]] = []
+    def blocks(self, blocks: Iterable[model.Block], *, tight: bool = False) -> str:
+        parts: list[tuple[model.Block, str]] = []
         for block in blocks:
             before = parts[-1][0] if parts else None
             text = self.block(block, before)
@@ -158,51 +128,57 @@ class _Writer:
             written += text
         return written
 
-    def block(self, block: Block, after: Block | None = None) -> str:
+    def block(self, block: model.Block, after: model.Block | None = None) -> str:
         match block:
-            case Heading():
+            case model.Heading():
                 return self._heading(block)
-            case Paragraph():
+            case model.Paragraph():
                 return self.inlines(block.children)
-            case HtmlFlow():
+            case model.HtmlFlow():
                 return "".join(map(self._in_html, block.children))
-            case ListBlock():
-                return self._list(block, other=isinstance(after, ListBlock))
-            case BlockQuote():
+            case model.ListBlock():
+                return self._list(block, other=isinstance(after, model.ListBlock))
+            case model.BlockQuote():
                 return quoted(self.blocks(block.blocks))
-            case CodeBlock():
+            case model.CodeBlock():
                 return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
-            case HtmlBlock():
+            case model.HtmlBlock():
                 return raw_html(block, self.context.url).rstrip("\n")
-            case ThematicBreak():
+            case model.ThematicBreak():
                 return "___"
-            case MathBlock():
+            case model.MathBlock():
                 tex, tag = no_empty_lines(block.tex.text), self._tag(block.span.start)
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
-            case Table():
+            case model.Table():
                 return self._table(block)
-            case Callout() | PlainCode() | Script() | Recording() | Mjcf():
+            case (
+                model.Callout()
+                | model.PlainCode()
+                | model.Script()
+                | model.Recording()
+                | model.Mjcf()
+            ):
                 return self.context.own(block)
-            case FeatureBlock():
+            case model.FeatureBlock():
                 return self.context.own(block)
             case _:
                 assert_never(block)
 
-    def _in_html(self, inline: Inline) -> str:
+    def _in_html(self, inline: model.Inline) -> str:
         """An inline in HTML, where text is no Markdown."""
-        if isinstance(inline, Text):
+        if isinstance(inline, model.Text):
             return escape(inline.text)
         return self._inline(inline, line=False, cell=False)
 
-    def _heading(self, heading: Heading) -> str:
+    def _heading(self, heading: model.Heading) -> str:
         text = _LAST_MARKS.sub(r"\1\\\2", self.line(heading.children))
         return f"{'#' * heading.level} {text}".rstrip()
 
-    def _list(self, block: ListBlock, *, other: bool) -> str:
+    def _list(self, block: model.ListBlock, *, other: bool) -> str:
         """A list; one right after another has other marks, by which it is known as another."""
         number, mark = block.start, "*" if other else "-"
         tight = all(
-            is_tight(inner) or not isinstance(inner, Paragraph)
+            is_tight(inner) or not isinstance(inner, model.Paragraph)
             for item in block.items
             for inner in item.blocks
         )
@@ -214,68 +190,70 @@ class _Writer:
             items.append(self._item(f"{mark} ", item, tight=tight))
         return ("\n" if tight else "\n\n").join(items)
 
-    def _item(self, mark: str, item: ListItem, *, tight: bool) -> str:
+    def _item(self, mark: str, item: model.ListItem, *, tight: bool) -> str:
         text = self.blocks(item.blocks, tight=tight)
         if item.checked is not None:
             text = f"[{'x' if item.checked else ' '}] {text or '&nbsp;'}"
-        elif item.blocks and isinstance(item.blocks[0], ListBlock):
+        elif item.blocks and isinstance(item.blocks[0], model.ListBlock):
             text = f"\n{text}"  # three marks in a line would be a break
         return hang(mark, text, len(mark))
 
-    def _table(self, block: Table) -> str:
+    def _table(self, block: model.Table) -> str:
         rows = (map(self._cell, row) for row in block.rows)
         return table(map(self._cell, block.header), rows, (one or "" for one in block.align))
 
-    def _cell(self, cell: Cell) -> str:
+    def _cell(self, cell: model.Cell) -> str:
         return self.inlines(cell.children, line=True, cell=True).replace("\n", " ")
 
     # --- inlines
 
-    def inlines(self, inlines: Iterable[Inline], *, line: bool = False, cell: bool = False) -> str:
+    def inlines(
+        self, inlines: Iterable[model.Inline], *, line: bool = False, cell: bool = False
+    ) -> str:
         text = self._joined(inlines, line=line, cell=cell)
         return text if line else guarded(text)
 
-    def _joined(self, inlines: Iterable[Inline], *, line: bool, cell: bool) -> str:
+    def _joined(self, inlines: Iterable[model.Inline], *, line: bool, cell: bool) -> str:
         return "".join([self._inline(one, line=line, cell=cell) for one in inlines])
 
-    def _inline(self, inline: Inline, *, line: bool, cell: bool) -> str:
+    def _inline(self, inline: model.Inline, *, line: bool, cell: bool) -> str:
         match inline:
-            case Text():
+            case model.Text():
                 return text_source(inline, cell=cell)
-            case SoftBreak():
+            case model.SoftBreak():
                 return " " if line else "\n"
-            case HardBreak():
+            case model.HardBreak():
                 if line:
                     return " "
                 return "\\\n" if inline.span.text.startswith("\\") else "  \n"
-            case CodeSpan():
+            case model.CodeSpan():
                 source = inline.span.text
                 ticks = source[: len(source) - len(source.lstrip("`"))]
                 return piped(code_span(inline.text, ticks), cell=cell)
-            case NumberBinding():
+            case model.NumberBinding():
                 return escaped(number_text(inline))
-            case Math():
+            case model.Math():
                 tag = self._tag(inline.span.start) if inline.display else ""
                 return formula(inline, tag, cell=cell)
-            case Emphasis():
+            case model.Emphasis():
                 mark = delimiter(inline.span.text, "*")
                 return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
-            case Strong():
+            case model.Strong():
                 mark = delimiter(inline.span.text, "*") * 2
                 return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
-            case Term():
+            case model.Term():
                 return f"*{self._joined(inline.children, line=line, cell=cell)}*"
-            case Strikethrough():
+            case model.Strikethrough():
                 return f"~~{self._joined(inline.children, line=line, cell=cell)}~~"
-            case Link():
+            case model.Link():
                 text = self._joined(inline.children, line=line, cell=cell)
                 return self._link(inline, text, cell=cell)
-            case Image():
+            case model.Image():
                 url = self.context.url(inline.url)
                 return piped(picture(inline.alt, url, inline.title), cell=cell)
-            case RawInline():
+            case model.RawInline():
                 return piped(raw_html(inline, self.context.url), cell=cell)
-            case FootnoteRef():
+            case model.FootnoteRef():
                 return self.context.reference(inline.number)
             case _:
                 assert_never(inline)
@@ -284,9 +262,9 @@ class _Writer:
         number = self.context.number(start)
         return f"\\tag{{{number}}}" if number else ""
 
-    def _link(self, node: Link, text: str, *, cell: bool) -> str:
+    def _link(self, node: model.Link, text: str, *, cell: bool) -> str:
         source = node.span.text
-        if source == f"<{plain_text(node.children)}>" and not cell:
+        if source == f"<{model.plain_text(node.children)}>" and not cell:
             return source
         href = self.context.href(node.target)
         text = text or escaped(self.context.named(node.target))

@@ -16,40 +16,7 @@ from typing import Literal, assert_never
 
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    Block,
-    BlockQuote,
-    Callout,
-    CodeBlock,
-    Document,
-    Emphasis,
-    FeatureBlock,
-    FootnoteRef,
-    HardBreak,
-    Heading,
-    HtmlBlock,
-    HtmlFlow,
-    Image,
-    Inline,
-    Link,
-    ListBlock,
-    Math,
-    MathBlock,
-    Mjcf,
-    NumberBinding,
-    Paragraph,
-    PlainCode,
-    RawInline,
-    Recording,
-    Script,
-    SoftBreak,
-    Strikethrough,
-    Strong,
-    Table,
-    Term,
-    Text,
-    ThematicBreak,
-)
+from coursebuild.core import model
 from coursebuild.core.model.inlines import CodeSpan
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
 from coursebuild.core.registry import kind_of_block
@@ -80,7 +47,7 @@ _TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | r
 
 
 def document_sections(
-    document: Document,
+    document: model.Document,
     lead: Iterable[str],
     labels: Mapping[str, str],
     shown: Mapping[int, Struct],
@@ -132,52 +99,52 @@ class SectionReader:
         """A name by which the section is found as well."""
         self._also[name] = None
 
-    def shown(self, block: FeatureBlock) -> Struct | None:
+    def shown(self, block: model.FeatureBlock) -> Struct | None:
         """What its page shows of the course beside a block."""
         return self._shown.get(block.span.start)
 
-    def blocks(self, blocks: Iterable[Block]) -> None:
+    def blocks(self, blocks: Iterable[model.Block]) -> None:
         """Blocks in order."""
         for block in blocks:
             self._block(block)
 
-    def _block(self, block: Block) -> None:
+    def _block(self, block: model.Block) -> None:
         match block:
-            case Paragraph() | HtmlFlow():
+            case model.Paragraph() | model.HtmlFlow():
                 self.add("text", self.text(block.children))
-            case Heading():
+            case model.Heading():
                 heading = _line(self.text(block.children))
                 self.ended()
                 self._begin(block.anchor, heading, block.level)
-            case ListBlock():
+            case model.ListBlock():
                 for item in block.items:
                     self.blocks(item.blocks)
-            case BlockQuote():
+            case model.BlockQuote():
                 self.blocks(block.blocks)
-            case Callout():
+            case model.Callout():
                 label = self._labels.get(block.kind, block.kind)
                 self.add("text", f"{label}: {self.text(block.title)}" if block.title else label)
                 self.blocks(block.blocks)
-            case MathBlock():
+            case model.MathBlock():
                 self.add("formula", self._formula(block.tex.text))
-            case Table():
+            case model.Table():
                 for row in (block.header, *block.rows):
                     self.add("text", " | ".join(self.text(cell.children) for cell in row))
-            case HtmlBlock():
+            case model.HtmlBlock():
                 self.add("text", unescape(_TAG.sub(" ", block.html)))
-            case ThematicBreak():
+            case model.ThematicBreak():
                 pass
-            case CodeBlock() | PlainCode() | Mjcf():
+            case model.CodeBlock() | model.PlainCode() | model.Mjcf():
                 self.add("code", block.code.text)
-            case Script():
+            case model.Script():
                 self._also[block.path] = None
                 self.add("code", block.code.text)
-            case Recording():
-                if isinstance(block.body, Table):
+            case model.Recording():
+                if isinstance(block.body, model.Table):
                     self._block(block.body)
                 else:
                     self.add("output", block.body.text)
-            case FeatureBlock():
+            case model.FeatureBlock():
                 kind_of_block(block).index(self, block)
             case _:
                 assert_never(block)
@@ -187,27 +154,33 @@ class SectionReader:
         self._also |= dict.fromkeys(names)
         return text
 
-    def text(self, inlines: Iterable[Inline]) -> str:
+    def text(self, inlines: Iterable[model.Inline]) -> str:
         """The text of inlines, as the search has it."""
         return "".join(map(self._inline, inlines))
 
-    def _inline(self, inline: Inline) -> str:
+    def _inline(self, inline: model.Inline) -> str:
         match inline:
-            case Text() | CodeSpan() | NumberBinding():
+            case model.Text() | CodeSpan() | model.NumberBinding():
                 return inline.text
-            case Math():
+            case model.Math():
                 if inline.meaning is not None:
                     self._also[inline.meaning.text] = None
                 return self._formula(inline.tex.text)
-            case SoftBreak() | HardBreak():
+            case model.SoftBreak() | model.HardBreak():
                 return " "
-            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+            case (
+                model.Emphasis()
+                | model.Strong()
+                | model.Strikethrough()
+                | model.Link()
+                | model.Term()
+            ):
                 return self.text(inline.children)
-            case Image():
+            case model.Image():
                 return inline.alt
-            case RawInline():
+            case model.RawInline():
                 return " " if inline.html.lower().startswith("<br") else ""
-            case FootnoteRef():
+            case model.FootnoteRef():
                 return ""
             case _:
                 assert_never(inline)

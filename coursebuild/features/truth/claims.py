@@ -19,29 +19,7 @@ from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    Course,
-    Document,
-    Emphasis,
-    Heading,
-    Image,
-    Inline,
-    Lesson,
-    Link,
-    Math,
-    MathBlock,
-    NumberBinding,
-    Page,
-    Recording,
-    Strikethrough,
-    Strong,
-    Term,
-    TermTarget,
-    Text,
-    UrlTarget,
-    block_inlines,
-    walk_blocks,
-)
+from coursebuild.core import model
 from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.arithmetic.chains import check_arithmetic
@@ -89,16 +67,18 @@ class Claims(Struct, frozen=True):
         return f"{1000 * self.proven // self.all / 10:.1f}" if self.all else ""
 
 
-def claims_of(document: Document) -> Claims:
+def claims_of(document: model.Document) -> Claims:
     """The claims of a document whose text may be left out."""
     known = (document.summaries or {}).get("truth")
     return known if isinstance(known, Claims) else document_claims(document)
 
 
-def documents_of(course: Course) -> Iterator[tuple[Lesson | Page, Document]]:
+def documents_of(
+    course: model.Course,
+) -> Iterator[tuple[model.Lesson | model.Page, model.Document]]:
     """The lessons, and the pages that every page's menu has, as far as they are written."""
     pages = (page for page in course.pages if page.menu)
-    owners: tuple[Lesson | Page, ...] = (*course.lessons, *pages)
+    owners: tuple[model.Lesson | model.Page, ...] = (*course.lessons, *pages)
     for owner in owners:
         if owner.document is not None:
             yield owner, owner.document
@@ -112,17 +92,17 @@ def total(claims: Iterable[Claims]) -> Claims:
     return Claims(bound, computed, given, places)
 
 
-def document_claims(document: Document) -> Claims:
+def document_claims(document: model.Document) -> Claims:
     """The claims of a document, from its text."""
     counter = _Counter()
     recorded: set[int] = set()
-    for block in walk_blocks(document.blocks):
-        if isinstance(block, Recording):
+    for block in model.walk_blocks(document.blocks):
+        if isinstance(block, model.Recording):
             recorded.add(id(block.body))
-        if isinstance(block, MathBlock):
+        if isinstance(block, model.MathBlock):
             counter.formula(block.tex, block.label.source if block.label else None)
-        elif not isinstance(block, Heading) and id(block) not in recorded:
-            counter.inlines(block_inlines(block))
+        elif not isinstance(block, model.Heading) and id(block) not in recorded:
+            counter.inlines(model.block_inlines(block))
     for span, numbers in counter.alternatives:
         counter.add("bound" if numbers <= counter.marked else "", span)
     bound, computed, given = map(counter.kinds.count, KINDS)
@@ -143,32 +123,33 @@ class _Counter:
         else:
             self.open.append(span)
 
-    def inlines(self, inlines: Iterable[Inline]) -> None:
+    def inlines(self, inlines: Iterable[model.Inline]) -> None:
         """The claims of a line."""
         for inline in inlines:
             match inline:
-                case Text():
+                case model.Text():
                     self.text(inline)
-                case NumberBinding():
+                case model.NumberBinding():
                     for number in scan_prose(inline.text):
                         self.marked.add(number.text)
                         self.add("bound" if inline.source is None else "given", inline.span)
-                case Math():
+                case model.Math():
                     source = inline.source
                     if source is None and inline.label is not None:
                         source = inline.label.source
                     self.formula(inline.tex, source)
-                case Image():
+                case model.Image():
                     numbers = {number.text for number in claimed(inline.alt)}
                     self.alternatives += [(inline.span, {number}) for number in sorted(numbers)]
-                case Link(target=UrlTarget() | TermTarget()) if not _is_address(inline):
-                    self.inlines(inline.children)
-                case Emphasis() | Strong() | Strikethrough() | Term():
+                case model.Link(target=model.UrlTarget() | model.TermTarget()):
+                    if not _is_address(inline):
+                        self.inlines(inline.children)
+                case model.Emphasis() | model.Strong() | model.Strikethrough() | model.Term():
                     self.inlines(inline.children)
                 case _:
                     pass
 
-    def text(self, text: Text) -> None:
+    def text(self, text: model.Text) -> None:
         """The claims of plain text."""
         exact = text.span.end - text.span.start == len(text.text)
         for number in claimed(text.text):
@@ -204,10 +185,10 @@ def claimed(text: str) -> Iterator[Number]:
             yield number
 
 
-def _is_address(link: Link) -> bool:
+def _is_address(link: model.Link) -> bool:
     """Whether a link shows its address."""
-    shown = "".join(child.text for child in link.children if isinstance(child, Text))
-    return isinstance(link.target, UrlTarget) and shown in link.target.url
+    shown = "".join(child.text for child in link.children if isinstance(child, model.Text))
+    return isinstance(link.target, model.UrlTarget) and shown in link.target.url
 
 
 def _is_claim(side: FormulaSide, tex: str) -> bool:
