@@ -81,9 +81,10 @@ def read(path: Path) -> Module:
         if isinstance(node, ast.Import):
             imports |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node not in for_types:
-            imports.add("." * node.level + (node.module or ""))
-            if node.module == "coursebuild":
-                imports |= {f"coursebuild.{alias.name}" for alias in node.names}
+            if node.module in ("coursebuild", "coursebuild.core"):
+                imports |= {f"{node.module}.{alias.name}" for alias in node.names}
+            else:
+                imports.add("." * node.level + (node.module or ""))
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             calls.add(node.func.id)
     docstring = ast.get_docstring(tree)

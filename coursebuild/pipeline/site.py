@@ -10,7 +10,6 @@ this key.
 from __future__ import annotations
 
 import functools
-import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING
@@ -18,7 +17,6 @@ from typing import TYPE_CHECKING
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import Digests
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.prepared import (
     prepared_copy,
@@ -26,33 +24,28 @@ from coursebuild.core.engine.prepared import (
     prepared_folder,
 )
 from coursebuild.core.engine.tool import step_key
-from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
-from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Results, SiteFile
-from coursebuild.core.pages import meta, urls, zips
+from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.compressed import compressed_files
-from coursebuild.core.pages.dark import dark_colours, dark_drawing
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
 from coursebuild.core.pages.shared import PageFacts, common_characters
-from coursebuild.core.run.packages import distributions, module_files
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Source, key_of, text_digest
+from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.downloads import Downloads
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.pages import Pages
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.fonts import FontJob
-
-_DIGEST = hashlib.sha256().digest_size * 2
 
 
 class Site(Struct, frozen=True):
@@ -124,12 +117,9 @@ class SiteMaker:
         self.documents.rest()
         names, shared = self._shared(None if whole_fonts else pages.facts)
         own = self.library.feature_files
-        files: list[SiteFile] = [*shared, *own, *self._copies(own), *self._downloads()]
-        around = self._around()
-        archives = {archive.path: archive for archive in zips.archives(self.library, around)}
-        for one in archives.values():
-            files.append(CachedFile(one.path, step_key("archive", one.key), one.packed))
-        context = functools.partial(self._context, pages, names, archives, around.imports)
+        downloads = Downloads.of(self.library, self.assets, self.documents, self.root, self.store)
+        files: list[SiteFile] = [*shared, *own, *self._copies(own), *downloads.files]
+        context = functools.partial(self._context, pages, names, downloads)
         added, listed = added_files(context)
         files += [*added, OutputFile(urls.ROBOTS, meta.robots(self.course))]
         if self.course.base_url:
@@ -181,8 +171,7 @@ class SiteMaker:
         self,
         pages: Pages,
         names: Names,
-        archives: Mapping[str, zips.Archive],
-        imports: Callable[[str], frozenset[str]],
+        downloads: Downloads,
         feature: str,
     ) -> SiteContext:
         """What a feature makes further files from."""
@@ -193,68 +182,9 @@ class SiteMaker:
             pages.noted(feature),
             functools.partial(pages.note, feature),
             functools.partial(self.store.get_or_create, "parts", local=True),
-            archives,
-            imports,
+            downloads.archives,
+            downloads.imports,
         )
-
-    # --- downloads
-
-    def _downloads(self) -> Iterator[SiteFile]:
-        """Scripts, models, and files of the course."""
-        for path, (script, _) in self.library.scripts.items():
-            yield CachedFile(path, script.code.digest.hex(), script.code.text.encode)
-        for model in self.course.models:
-            path = urls.model_file_path(model.name)
-            yield OutputFile(path, model.source.text.encode())
-        digests, dark = Digests(self.store), self._drawings()
-        for path in self.course.files:
-            digest = digests.file(f"{self.root}/{path}")
-            read = functools.partial(read_bytes, self.root, path)
-            if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
-                digest = hashlib.sha256(read()).hexdigest()
-            yield CachedFile(urls.file_path(path), digest, read)
-            if path in dark:
-                made = functools.partial(self._dark, read)
-                yield CachedFile(urls.dark_path(path), step_key("dark drawing", digest), made)
-        digests.save()
-
-    def _drawings(self) -> frozenset[str]:
-        """The drawings of scripts that have a dark sibling."""
-        drawn = (figure for d in self.course.documents for figure in recorded_figures(d))
-        return frozenset(figure.path for figure in drawn if figure.has_dark)
-
-    def _dark(self, read: Callable[[], bytes]) -> bytes:
-        known = dark_colours(self.assets.file("css/site.css").decode())
-        return dark_drawing(read().decode(), known).encode()
-
-    def _around(self) -> zips.Surroundings:
-        """What scripts need around them."""
-        if not self.library.scripts:
-            return zips.Surroundings()
-        folders = [self.root / package.path for package in self.course.packages]
-        library = functools.cache(functools.partial(module_files, folders=folders))
-        meshes = tuple(
-            OutputFile(path, read_bytes(self.root, path))
-            for path in self.course.files
-            if path.startswith("models/")
-        )
-        around = zips.Surroundings((), library, meshes, self._imports())
-        modules = zips.imported_modules(self.course, around)
-        packages = tuple(zips.Package(*p) for p in distributions(self.store, modules))
-        return replace(around, packages=packages)
-
-    def _imports(self) -> Callable[[str], frozenset[str]]:
-        """What Python texts import: those of lessons are known."""
-        scripts, known = self.library.scripts, self.documents.imports
-        found = {scripts[path][0].code.digest: known[path] for path in scripts.keys() & known}
-
-        def imports(text: str) -> frozenset[str]:
-            digest = text_digest(text)
-            if digest not in found:
-                found[digest] = zips.imports(text)
-            return found[digest]
-
-        return imports
 
 
 def _cut_font(store: Memo, job: FontJob) -> bytes:

@@ -1,0 +1,117 @@
+"""What can be downloaded beside pages: scripts, models, files of the course, archives of scripts.
+
+Entry point: `Downloads.of`. What is in an archive says `core.pages.zips`.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.engine.digests import Digests
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.tool import step_key
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.pages import urls, zips
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.dark import dark_colours, dark_drawing
+from coursebuild.core.pages.library import Library
+from coursebuild.core.run.packages import distributions, module_files
+from coursebuild.core.text.source import text_digest
+from coursebuild.pipeline.documents import Documents
+
+_DIGEST = hashlib.sha256().digest_size * 2
+
+
+class Downloads(Struct, frozen=True):
+    """The files, and what of them others are made from."""
+
+    files: tuple[SiteFile, ...]
+    archives: Mapping[str, zips.Archive]
+    """Archives of scripts by site path."""
+    imports: Callable[[str], frozenset[str]]
+    """Says what a Python text imports."""
+
+    @classmethod
+    def of(
+        cls, library: Library, assets: Assets, documents: Documents, root: Path, store: Memo
+    ) -> Downloads:
+        """Those of a course whose documents were read."""
+        imports = _imports(library, documents)
+        around = _surroundings(library, root, store, imports)
+        archives = {archive.path: archive for archive in zips.archives(library, around)}
+        packed = (
+            CachedFile(one.path, step_key("archive", one.key), one.packed)
+            for one in archives.values()
+        )
+        files = (*_scripts_and_models(library), *_files(library, assets, root, store), *packed)
+        return cls(files, archives, imports)
+
+
+def _scripts_and_models(library: Library) -> Iterator[SiteFile]:
+    for path, (script, _) in library.scripts.items():
+        yield CachedFile(path, script.code.digest.hex(), script.code.text.encode)
+    for model in library.course.models:
+        yield OutputFile(urls.model_file_path(model.name), model.source.text.encode())
+
+
+def _files(library: Library, assets: Assets, root: Path, store: Memo) -> Iterator[SiteFile]:
+    """Files of the course that pages show or link to, and dark siblings of its drawings."""
+    digests = Digests(store)
+    drawn = (figure for d in library.course.documents for figure in recorded_figures(d))
+    dark = frozenset(figure.path for figure in drawn if figure.has_dark)
+    for path in library.course.files:
+        digest = digests.file(f"{root}/{path}")
+        read = functools.partial(read_bytes, root, path)
+        if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
+            digest = hashlib.sha256(read()).hexdigest()
+        yield CachedFile(urls.file_path(path), digest, read)
+        if path in dark:
+            made = functools.partial(_dark, assets, read)
+            yield CachedFile(urls.dark_path(path), step_key("dark drawing", digest), made)
+    digests.save()
+
+
+def _dark(assets: Assets, read: Callable[[], bytes]) -> bytes:
+    known = dark_colours(assets.file("css/site.css").decode())
+    return dark_drawing(read().decode(), known).encode()
+
+
+def _surroundings(
+    library: Library, root: Path, store: Memo, imports: Callable[[str], frozenset[str]]
+) -> zips.Surroundings:
+    """What scripts need around them."""
+    if not library.scripts:
+        return zips.Surroundings()
+    folders = [root / package.path for package in library.course.packages]
+    ours = functools.cache(functools.partial(module_files, folders=folders))
+    meshes = tuple(
+        OutputFile(path, read_bytes(root, path))
+        for path in library.course.files
+        if path.startswith("models/")
+    )
+    around = zips.Surroundings((), ours, meshes, imports)
+    modules = zips.imported_modules(library.course, around)
+    packages = tuple(zips.Package(*p) for p in distributions(store, modules))
+    return replace(around, packages=packages)
+
+
+def _imports(library: Library, documents: Documents) -> Callable[[str], frozenset[str]]:
+    """What Python texts import: those of lessons are known."""
+    scripts, known = library.scripts, documents.imports
+    found = {scripts[path][0].code.digest: known[path] for path in scripts.keys() & known}
+
+    def imports(text: str) -> frozenset[str]:
+        digest = text_digest(text)
+        if digest not in found:
+            found[digest] = zips.imports(text)
+        return found[digest]
+
+    return imports
