@@ -122,6 +122,19 @@ class MarkdownWriter(Protocol):
         """A text behind its label, which is shown on demand where that can be."""
 
 
+class Picture(Struct, frozen=True):
+    """A picture of a block, which leads to it."""
+
+    path: str
+    """Its site path."""
+    width: int
+    """Pixels, as the height."""
+    height: int
+    title: str
+    anchor: str
+    """The block's, on its page."""
+
+
 class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """A kind of fence, from its text to a page."""
 
@@ -140,6 +153,8 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """The block in a page."""
     markdown: Callable[[MarkdownWriter, B], str]
     """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
+    picture: Callable[[B, Struct | None], Picture | None] = lambda block, shown: None
+    """A picture of the block for lists of lessons, made with what is shown of its trial."""
     wide: bool = True
     """Whether it takes the whole width of the text, so that no docked block can stand beside it."""
     index: Callable[[IndexReader, B], None] = lambda reader, block: None

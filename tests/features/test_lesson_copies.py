@@ -108,7 +108,7 @@ def test_a_lesson_as_markdown(files: dict[str, bytes]) -> None:
     text = files["lessons/0.1-falling.md"].decode()
     assert text.startswith(
         "# 0.1 Falling\n\nA body falls.\n\n"
-        "[Level 0: Start](../levels/0.md) · Complete · 20 minutes\n\n"
+        "[Level 0: Start](../levels/0.md) · Published · 20 minutes\n\n"
         "After this lesson you can\n\n- Say what falls\n- Measure it\n\n"
         "## Part\n\nSee [Lesson 1.1](1.1-spinning.md), [there](1.1-spinning.md#more),"
         " [the box](../models/box.md), [the page](../about.md) and\n[here](#part)."

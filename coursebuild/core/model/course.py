@@ -66,7 +66,7 @@ class Page(Struct, frozen=True):
     path: str
     document: Document | None
     menu: bool = True
-    """Whether every page's menu has it; the foot has them all."""
+    """Whether every page's menu has it."""
 
 
 class MjcfModel(Struct, frozen=True):

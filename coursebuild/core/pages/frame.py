@@ -150,9 +150,8 @@ def _values(
         "touch_icon": place.href(names.touch_icon),
         "home": place.href(urls.HOME),
         "credits": place.href(names.credits),
-        "menu": _navigation(library, place, menu=True),
+        "menu": _menu(library, place),
         "own": _own_navigation(library, place),
-        "more": _navigation(library, place, menu=False),
         "course": course,
         "source": course.repository if "{path}" not in course.repository else "",
         "results": library.results,
@@ -189,9 +188,9 @@ def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
     return (*PAGE_WORDS, *found, *(key for key in needed if key in keys))
 
 
-def _navigation(library: Library, place: urls.Place, *, menu: bool) -> tuple[NavLink, ...]:
-    """Links to the pages that are in the menu, or to the others."""
-    pages = (page for page in library.course.pages if page.menu is menu)
+def _menu(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
+    """Links to the pages that are in the menu; the home page has a place of its own there."""
+    pages = (page for page in library.course.pages if page.menu and page.id != "home")
     paths = ((urls.page_path(page), page.title) for page in pages)
     return tuple(NavLink(place.href(path), title, path == place.path) for path, title in paths)
 

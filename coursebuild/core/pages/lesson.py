@@ -46,11 +46,12 @@ class LessonHead(Struct, frozen=True):
         return cls(lesson.id, lesson.title, lesson.summary, lesson.minutes, lesson.objectives)
 
 
-class LevelName(Struct, frozen=True):
-    """A level as a lesson names it."""
+class LessonLevel(Struct, frozen=True):
+    """The level of a lesson, with all its lessons."""
 
     id: str
     title: str
+    lessons: tuple[LessonLink, ...]
 
 
 def lesson_link(
@@ -111,7 +112,11 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         "lesson": LessonHead.of(lesson),
         "status": lesson.status.value,
         "draft": lesson.status is Status.DRAFT,
-        "level": LevelName(level.id, level.title),
+        "level": LessonLevel(
+            level.id,
+            level.title,
+            tuple(lesson_link(library, place, other) for other in level.lessons),
+        ),
         "home": place.href(urls.HOME),
         "level_href": place.href(urls.level_path(level)),
         "needs": lesson_link(library, place, lesson, needs=True).needs,

@@ -43,6 +43,9 @@ class PageEntry(Struct, frozen=True):
                 return library.lessons[self.id].document
             case "page":
                 return library.pages[self.id].document
+            case "home":
+                opening = library.pages.get("home")
+                return None if opening is None else opening.document
             case _:
                 return None
 
@@ -60,7 +63,7 @@ def page_list(library: Library) -> Iterator[PageEntry]:
     for kind in library.added_pages:
         yield PageEntry(kind.path, kind.name)
     for page in course.pages:
-        if page.document is not None:
+        if page.document is not None and page.id != "home":
             yield PageEntry(urls.page_path(page), "page", page.id)
     yield PageEntry(urls.NOT_FOUND, "notfound")
 

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.cards import galleries, lesson_cards
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
@@ -49,12 +50,19 @@ class Named(Struct, frozen=True):
 
 
 def home_inputs(library: Library) -> PageInputs:
-    """What the home page shows: the course map."""
+    """What the home page shows: what can be read, and the whole plan.
+
+    The document of the page `home` opens it, if there is one; its summary is enough.
+    """
     course = library.course
     place = urls.Place(urls.HOME)
+    home = library.pages.get("home")
+    document = None if home is None else home.document
     written = [lesson for lesson in library.order if lesson.document is not None]
     values = {
         "course": CourseHead(course.title, course.summary),
+        "cards": lesson_cards(library, place),
+        "galleries": galleries(library, place),
         "levels": tuple(level_view(library, place, level) for level in course.levels),
         "start": lesson_link(library, place, written[0]) if written else None,
         "total": len(library.order),
@@ -67,7 +75,10 @@ def home_inputs(library: Library) -> PageInputs:
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
     }
     head = PageHead(urls.HOME, "home", course.title, course.summary, meta.course_data(library))
-    return PageInputs(head, "home.html", values)
+    if document is None:
+        return PageInputs(head, "home.html", {**values, "article": ""})
+    shown = document_inputs(library, place, document)
+    return PageInputs(head, "home.html", values, document.source.path, shown)
 
 
 def level_inputs(library: Library, level: Level) -> PageInputs:

@@ -72,8 +72,8 @@ def model_file_path(name: str) -> str:
 
 
 def page_path(page: Page) -> str:
-    """`about.html`."""
-    return f"{page.id}.html"
+    """`about.html`; the page `home` opens the home page."""
+    return HOME if page.id == "home" else f"{page.id}.html"
 
 
 def owner_path(owner: Lesson | Page) -> str:

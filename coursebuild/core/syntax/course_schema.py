@@ -179,9 +179,7 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     id: Annotated[Slug, Meta(description="the page's name in links and in its address")]
     title: Text
     file: Annotated[Text, Meta(description="its Markdown, relative to the project")]
-    menu: Annotated[
-        bool, Meta(description="whether it stands in the menu, or only in the foot")
-    ] = True
+    menu: Annotated[bool, Meta(description="whether it stands in the menu of every page")] = True
 
 
 class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):

@@ -14,7 +14,7 @@ from coursebuild.features.lab.files import publish_labs
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
 from coursebuild.features.lab.markdown import lab_markdown
 from coursebuild.features.lab.model import Lab
-from coursebuild.features.lab.page import draw_lab, index_lab
+from coursebuild.features.lab.page import draw_lab, index_lab, lab_picture
 from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.schema import SimLab, refine_schema
 
@@ -44,6 +44,7 @@ FEATURE = Feature(
             draw=draw_lab,
             markdown=lab_markdown,
             index=index_lab,
+            picture=lab_picture,
         ),
     ),
     check=check_labs,

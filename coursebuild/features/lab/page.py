@@ -13,7 +13,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import IndexReader
+from coursebuild.core.features import IndexReader, Picture
 from coursebuild.core.model import ModelTarget
 from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
@@ -93,6 +93,14 @@ def shown_lab(page: PageContext, block: Lab) -> ShownLab | None:
     """What the page has of the lab's trial; `None` where it was not tried."""
     found = page.shown.trials.get(block.span.start)
     return found if isinstance(found, ShownLab) else None
+
+
+def lab_picture(block: Lab, shown: Struct | None) -> Picture | None:
+    """What the trial recorded; `None` where it did not come to its end."""
+    if not isinstance(shown, ShownLab) or shown.record is None:
+        return None
+    width, height = shown.record.size
+    return Picture(shown.picture, width, height, block.fields.title, shown.name)
 
 
 def index_lab(reader: IndexReader, lab: Lab) -> None:

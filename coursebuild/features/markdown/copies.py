@@ -3,7 +3,7 @@
 Entry points: `note_markdown`, the text of a page; `markdown_files`, the files of all pages; `head`
 and `markdown_href`, parts of them.
 
-A lesson or page of the course is written from its document. Every other page (the map, levels,
+A lesson or page of the course is written from its document. Every other page (home, levels,
 models, measured figures) is written from its HTML, so that it says what the page says.
 """
 
@@ -20,7 +20,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.lesson import LessonHead, LessonLink, LevelName
+from coursebuild.core.pages.lesson import LessonHead, LessonLevel, LessonLink
 from coursebuild.core.pages.marks import code_span, escaped, guarded, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
@@ -48,7 +48,7 @@ def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> by
     """The text of a page; nothing where it has no copy."""
     if not urls.has_copies(inputs.head.path):
         return b""
-    if page is not None:
+    if page is not None and inputs.head.path != urls.HOME:
         text = _document_copy(inputs, page)
     else:
         place = urls.Place(inputs.head.path)
@@ -102,7 +102,7 @@ def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
 def _facts(inputs: PageInputs, lesson: LessonHead, words: Strings, locate: Locate) -> list[str]:
     facts = []
     level, href = inputs.values.get("level"), inputs.values.get("level_href")
-    if isinstance(level, LevelName) and isinstance(href, str):
+    if isinstance(level, LessonLevel) and isinstance(href, str):
         name = f"{words('level.label', id=level.id)}: {level.title}"
         facts.append(link(_line(name), locate(href)))
     facts.append(_line(words(f"status.{inputs.values['status']}")))

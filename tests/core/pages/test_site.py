@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.links import check_links
-from support.rendered_course import Make
+from support.rendered_course import MAP, Make
 
 LESSON = """## First part
 
@@ -286,7 +286,7 @@ def test_the_lesson_page(site: dict[str, bytes]) -> None:
     for part in (
         '<h1><span class="number">0.1</span> Falling</h1>',
         '<li class="status status-complete" title="Written, and every output in it verified.">'
-        "Complete</li>",
+        "Published</li>",
         "<li>20 minutes</li>",
         "<li>Say what falls</li>\n<li>Measure it</li>",
         '<li><a href="#first-part">First part</a>\n<ol>\n<li><a href="#detail">Detail</a></li>\n'
@@ -320,11 +320,39 @@ def test_a_planned_lesson_says_so_and_what_can_be_read(site: dict[str, bytes]) -
     assert '<a href="1.1-spinning.html">1.1 Spinning &lt;fast&gt;</a>' in page
 
 
-def test_the_map_shows_status_minutes_and_needs(site: dict[str, bytes]) -> None:
+def test_a_lesson_lists_its_level_and_leads_on_both_ways(site: dict[str, bytes]) -> None:
+    page = pages(site)["lessons/1.1-spinning.html"]
+    listed = page.split('<nav class="level-nav"')[1].split("</nav>")[0]
+    assert re.findall(r'<a href="(.*?)"( aria-current="page")?>', listed) == [
+        ("1.1-spinning.html", ' aria-current="page"'),
+        ("1.2-later.html", ""),
+    ]
+    assert re.findall(r'rel="(\w+)" href="(.*?)"', listed) == [
+        ("prev", "0.1-falling.html"),
+        ("next", "1.2-later.html"),
+    ]
+
+
+def test_home_shows_written_lessons_as_cards(site: dict[str, bytes]) -> None:
     home = pages(site)["index.html"]
-    assert "2 levels, 3 lessons, 2 written so far" in home
+    cards = home.split('<ul class="cards">')[1].split("</ul>")[0]
+    assert re.findall(r'<li class="card.*?data-lesson="(.*?)"', cards) == ["0.1", "1.1"]
+
+
+def test_the_page_home_opens_the_home_page(make: Make) -> None:
+    home = '[[page]]\nid = "home"\ntitle = "Welcome"\nfile = "content/pages/home.md"\n'
+    site = make("Text.", course=MAP + home, home="Come in.").site()
+    home = pages(site)["index.html"]
+    assert "<p>Come in.</p>" in home and 'class="cards"' in home
+    assert "home.html" not in site
+    assert "Come in." in site["index.md"].decode()
+
+
+def test_the_plan_shows_status_minutes_and_needs(site: dict[str, bytes]) -> None:
+    home = pages(site)["index.html"]
+    assert "Levels: 2, lessons: 3, published: 2" in home
     assert '<a class="button" href="lessons/0.1-falling.html">Start with 0.1 Falling</a>' in home
-    row = home.split('<li class="row row-planned" data-lesson="1.2">')[1].split("</li>")[0]
+    row = home.split('<li class="row row-planned">')[1].split("</li>")[0]
     assert '<a href="lessons/1.2-later.html">Later</a>' in row
     assert '<span class="status status-planned">Planned</span>' in row
     assert '<span class="minutes">1 min</span>' in row
