@@ -150,7 +150,7 @@ def test_the_nodes_of_a_drawing_are_links(page: Page, base: str) -> None:
     expect(narrow).to_be_visible()
     until(page, "() => document.documentElement.scrollWidth === 320")
     comes(page, lambda: large_enough(narrow.get_by_role("link").first))
-    narrow.get_by_role("link", name="1.1 Lesson one (Complete)").click()
+    narrow.get_by_role("link", name="1.1 Lesson one (Published)").click()
     page.wait_for_url("**/1.1-one.html")
 
 

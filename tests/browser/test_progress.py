@@ -32,7 +32,7 @@ def marked(page: Page, id: str, text: str) -> None:
 def test_page_is_as_it_was_built_at_first(calm: BrowserContext, site: str) -> None:
     page = opened(calm, site)
     expect(page.locator(".start a")).to_have_text("Start with 1.1 Push & <em>pull</em>")
-    expect(page.locator("[data-mark]")).to_have_text([""] * 4)
+    expect(page.locator("[data-mark]")).to_have_text([""] * 3)
     assert page.evaluate("() => localStorage.length") == 0
     assert quiet(page), SAID[page]
 
