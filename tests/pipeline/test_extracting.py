@@ -79,22 +79,6 @@ def test_an_edited_file_is_never_overwritten(make: Make) -> None:
     assert folder.read("examples/sub/b.py") == b"print('b')\n"
 
 
-def test_extract_without_manifest_overwrites_no_other_text(make: Make) -> None:
-    folder = make(TWO)
-    for manifest in (b"", b"{", b"[]", b'{"files": {"../x": []}}', None):
-        folder.write(folder.lesson(), TWO)
-        (folder.root / "examples/a.py").unlink(missing_ok=True)
-        assert folder.main("extract").status == 0
-        if manifest is None:
-            (folder.root / "examples/.extracted.json").unlink()
-        else:
-            folder.write("examples/.extracted.json", manifest)
-        folder.replace(folder.lesson(), "print('a')", "print('A')")
-        done = folder.main("extract")
-        assert (done.status, done.out.count("error[example-edited]")) == (1, 1), manifest
-        assert folder.read("examples/a.py") == b"print('a')\n"
-
-
 # --- adopting
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -324,39 +323,6 @@ def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
     desk.fresh = False
     found = desk.recall()
     assert found is not None and found.stdout == "three\n", "the new result is the one that is kept"
-
-
-def test_a_damaged_result_is_told_once_and_run_again(desk: Desk) -> None:
-    desk.run()
-    (path,) = entries(desk)
-    whole = path.read_bytes()
-    for at in range(0, len(whole), 29):
-        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x40]) + whole[at + 1 :])
-        desk.told.clear()
-        assert desk.recall() is None
-        assert desk.recall() is None
-        (told,) = desk.told
-        assert told.endswith("in .coursebuild is damaged: it is made again")
-        desk.run()
-    for end in (0, 1, 31, 32, 33, len(whole) - 1):
-        path.write_bytes(whole[:end])
-        assert desk.recall() is None
-        desk.run()
-    other = replace(JOB, args=("-v",))
-    desk.run(job=other)
-    (two,) = set(entries(desk)) - {path}
-    two.write_bytes(path.read_bytes())
-    assert desk.recall(other) is None, "it is under the name of another"
-
-
-def test_several_commands_at_once(desk: Desk) -> None:
-    threads = [threading.Thread(target=desk.run, args=(LOOKED,)) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert desk.recall() is not None
-    assert len(entries(desk)) == 1
 
 
 def test_another_machine_has_the_result(desk: Desk, tmp_path: Path) -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -140,19 +138,6 @@ def test_files_of_somebody_else_are_never_removed(make: Make) -> None:
         (folder.root / name).unlink()
 
 
-def test_an_empty_folder_and_a_linked_one_take_a_site(make: Make, tmp_path: Path) -> None:
-    folder = make(GOOD)
-    (folder.root / "public").mkdir(mode=0o711)
-    assert folder.main("build").status == 0
-    assert stat.S_IMODE((folder.root / "public").stat().st_mode) == 0o711
-    site = folder.tree("public")
-    (tmp_path / "elsewhere").mkdir()
-    (folder.root / "linked").symlink_to(tmp_path / "elsewhere")
-    assert folder.main("build", "--out", "linked").status == 0
-    assert (folder.root / "linked").is_symlink()
-    assert Folder(tmp_path / "elsewhere").tree() == site
-
-
 def test_caches_that_are_gone_or_damaged_are_made_again(make: Make, stores: Path) -> None:
     folder = make(GOOD + "Őrült żółw\n")  # for which fonts are cut
     assert folder.main("build").status == 0
@@ -177,14 +162,3 @@ def test_check_works_where_caches_cannot_be_written(make: Make) -> None:
     shutil.rmtree(folder.root / ".coursebuild")
     (folder.root / ".coursebuild").write_text("a file in their place")
     assert folder.main("check").status == 0
-
-
-def test_files_of_the_site_can_be_read_by_a_web_server(make: Make) -> None:
-    folder = make(GOOD)
-    before = os.umask(0o077)
-    try:
-        assert folder.main("build").status == 0
-    finally:
-        os.umask(before)
-    for path in [folder.root / "public", *(folder.root / "public").rglob("*")]:
-        assert stat.S_IMODE(path.stat().st_mode) == (0o755 if path.is_dir() else 0o644), path

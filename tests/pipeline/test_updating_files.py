@@ -47,22 +47,6 @@ def test_a_lesson_saved_or_removed_meanwhile_is_not_written(make: Make) -> None:
     assert not (folder.root / three).exists()
 
 
-def test_a_linked_lesson_stays_a_link_and_none_outside_is_written(make: Make) -> None:
-    folder = make(GOOD, GOOD)
-    folder.write("drafts/hello.md", STALE)
-    outside = folder.root.parent / "outside.md"
-    outside.write_text(STALE.replace("hello.py", "outside.py"))
-    for number, target in ((1, "../../drafts/hello.md"), (2, outside)):
-        (folder.root / folder.lesson(number)).unlink()
-        (folder.root / folder.lesson(number)).symlink_to(target)
-    done = folder.main("update")
-    assert (done.status, "leads out of the project" in done.out) == (1, True)
-    assert "OLD" in outside.read_text()
-    assert (folder.root / folder.lesson()).is_symlink()
-    assert folder.text("drafts/hello.md") == GOOD
-    assert [path.name for path in (folder.root / "drafts").iterdir()] == ["hello.md"]
-
-
 def test_update_keeps_permissions_and_leaves_a_read_only_lesson_alone(make: Make) -> None:
     """By root too, who may write it."""
     folder = make(STALE, "## Two\n\n" + block("y.py", "print(2)", "OLD"))

@@ -34,14 +34,6 @@ def summary(report: ExamplesReport) -> tuple[tuple[str, ...], ...]:
     return report.written, report.unchanged, report.removed, tuple(b.path for b in report.blocked)
 
 
-def test_first_time(tmp_path: Path) -> None:
-    assert summary(write_examples(tmp_path, [B, A])) == ((A[0], B[0]), (), (), ())
-    for path, data in (A, B):
-        assert (tmp_path / path).read_bytes() == data
-        assert not (tmp_path / path).stat().st_mode & stat.S_IXUSR
-    assert listing(tmp_path) == [".extracted.json", "a.py", "sub", "sub/deep", "sub/deep/b.py"]
-
-
 def test_no_scripts_no_folder(tmp_path: Path) -> None:
     assert summary(write_examples(tmp_path, [])) == ((), (), (), ())
     assert list(tmp_path.iterdir()) == []
@@ -52,13 +44,6 @@ def test_unchanged_files_are_not_touched(tmp_path: Path) -> None:
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "examples").rglob("*")}
     assert summary(write_examples(tmp_path, [A, B])) == ((), (A[0], B[0]), (), ())
     assert {p: p.stat().st_mtime_ns for p in (tmp_path / "examples").rglob("*")} == before
-
-
-def test_changed_in_the_lesson(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A, B])
-    report = write_examples(tmp_path, [(A[0], b"print(3)\n"), B])
-    assert summary(report) == ((A[0],), (B[0],), (), ())
-    assert (tmp_path / A[0]).read_bytes() == b"print(3)\n"
 
 
 def test_edited_by_hand(tmp_path: Path) -> None:
@@ -89,12 +74,6 @@ def test_the_edit_was_taken_back(tmp_path: Path) -> None:
     write_examples(tmp_path, [(A[0], b"next\n")])
     (tmp_path / A[0]).write_bytes(A[1])
     assert summary(write_examples(tmp_path, [(A[0], b"next\n")])) == ((A[0],), (), (), ())
-
-
-def test_deleted_files_come_back(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A])
-    (tmp_path / A[0]).unlink()
-    assert summary(write_examples(tmp_path, [A])) == ((A[0],), (), (), ())
 
 
 def test_scripts_that_no_lesson_has_go(tmp_path: Path) -> None:

@@ -139,11 +139,6 @@ def test_however_it_steps(run: Run, step: str) -> None:
     assert found(run(f"{HEAD}{FAST}{step}\n")) == warned(LINE + 2)
 
 
-def test_in_a_function_the_line_is_that_of_the_step(run: Run) -> None:
-    function = "def simulate(data):\n    data.qvel[0] = 1e20\n    mujoco.mj_step(model, data)\n"
-    assert found(run(HEAD + function + "simulate(data)\n")) == warned(LINE + 3)
-
-
 def test_in_a_thread(run: Run) -> None:
     thread = "import threading\nt = threading.Thread(target=mujoco.mj_step, args=(model, data))\n"
     assert found(run(HEAD + FAST + thread + "t.start(); t.join()\n"))[0].sign is Sign.VELOCITIES
@@ -219,14 +214,6 @@ def test_however_mujoco_is_imported(run: Run, imported: str) -> None:
     text = HEAD.replace("import mujoco\n", imported, 1) + FAST + STEP
     [one] = found(run(text))
     assert one.sign is Sign.VELOCITIES
-
-
-def test_data_of_a_model_that_was_compiled_again_is_looked_at_as_well(run: Run) -> None:
-    text = HEAD + "spec = mujoco.MjSpec.from_string(XML)\nmodel = spec.compile()\n"
-    text += "model, data = spec.recompile(model, mujoco.MjData(model))\n"
-    assert [one.sign for one in found(run(text + STEP + "data.qpos[0] = float('inf')\n"))] == [
-        Sign.STATE
-    ]
 
 
 def test_a_state_that_was_never_stepped_is_the_scripts_own(run: Run) -> None:
