@@ -124,7 +124,8 @@ def test_outside_of_a_course_gives_2(tmp_path: Path) -> None:
 
 
 def test_help_version_and_schemas_are_printed_anywhere(tmp_path: Path) -> None:
-    for arguments in (["--help"], ["check", "--help"], ["--version"]):
+    in_build = ["-C", "build", "bench", "--help"]  # a folder that is called like a command
+    for arguments in (["--help"], ["check", "--help"], ["--version"], in_build):
         done = Folder(tmp_path).main(*arguments)
         assert (done.status, done.err, bool(done.out)) == (0, "", True), arguments
     for name in ("quiz", "lab", "course"):
