@@ -74,6 +74,7 @@ slug = "falling"
 title = "Falling"
 status = "complete"
 summary = "A body falls."
+aliases = ["free fall", "drop"]
 objectives = ["Say what falls", "Measure it"]
 minutes = 20
 

@@ -238,6 +238,7 @@ def course(
                 title=slug,
                 status=Status.COMPLETE,
                 summary="",
+                aliases=(),
                 objectives=(),
                 prerequisites=(),
                 prerequisite_spans=(),

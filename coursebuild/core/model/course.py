@@ -34,6 +34,8 @@ class Lesson(Struct, frozen=True):
     title: str
     status: Status
     summary: str
+    aliases: tuple[str, ...]
+    """Other names, by which the search finds it."""
     objectives: tuple[str, ...]
     prerequisites: tuple[str, ...]
     prerequisite_spans: tuple[Span, ...]

@@ -39,11 +39,14 @@ class LessonHead(Struct, frozen=True):
     summary: str
     minutes: int | None
     objectives: tuple[str, ...]
+    aliases: tuple[str, ...] = ()
+    """Other names, which the page does not show."""
 
     @classmethod
     def of(cls, lesson: Lesson) -> LessonHead:
         """The head of a lesson of the map."""
-        return cls(lesson.id, lesson.title, lesson.summary, lesson.minutes, lesson.objectives)
+        about = (lesson.summary, lesson.minutes, lesson.objectives, lesson.aliases)
+        return cls(lesson.id, lesson.title, *about)
 
 
 class LessonLevel(Struct, frozen=True):

@@ -144,6 +144,9 @@ class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
     title: Text
     status: Literal["complete", "draft", "planned"]
     summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
+    aliases: Annotated[
+        tuple[Text, ...], Meta(description="other names, by which the search finds it")
+    ] = ()
     objectives: Annotated[
         tuple[Text, ...], Meta(description="what a learner can do afterwards")
     ] = ()

@@ -151,6 +151,7 @@ def _lesson(node: ObjectNode, fields: LessonTable, level: str) -> Lesson:
         title=fields.title,
         status=Status(fields.status),
         summary=fields.summary,
+        aliases=fields.aliases,
         objectives=fields.objectives,
         prerequisites=fields.prerequisites,
         prerequisite_spans=spans,

@@ -61,7 +61,9 @@ def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
 def page_sections(inputs: PageInputs, document: Document | None, body: str) -> tuple[Section, ...]:
     """What stands on a page; see `note_page`."""
     head = inputs.values.get("lesson")
-    lead = (inputs.head.description, *(head.objectives if isinstance(head, LessonHead) else ()))
+    lead: tuple[str, ...] = (inputs.head.description,)
+    if isinstance(head, LessonHead):
+        lead += (", ".join(head.aliases), *head.objectives)
     if document is not None:
         known = inputs.shown or ShownDocument()
         labels = {kind: shown.label for kind, shown in known.callouts.items()}

@@ -86,6 +86,7 @@ def test_a_lesson_by_its_sections(make: Make) -> None:
     start, outer, inner, empty = sections
     assert said(start) == [
         ("text", "A body falls."),
+        ("text", "free fall, drop"),
         ("text", "Say what falls"),
         ("text", "Measure it"),
         ("text", "Before any heading, at I_xx."),
