@@ -219,6 +219,11 @@ test('controls, buttons, steps, states', async () => {
   bench.send({ type: 'restore', lab: 'a', state })
   bench.send({ type: 'state', lab: 'a' })
   assert.deepEqual(bench.of('state')[1].state, state)
+  const before = bench.of('playing').length
+  bench.send({ type: 'press', lab: 'a', index: 2, play: true })
+  assert.equal(bench.of('playing').length, before, 'its code pauses')
+  bench.send({ type: 'control', lab: 'a', index: 0, value: 2, play: true })
+  assert.equal(bench.of('playing').length, before + 1)
 })
 
 test('stopAt and divergence pause', async () => {

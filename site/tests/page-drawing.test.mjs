@@ -94,6 +94,7 @@ const described = (parts = {}) => ({
   layout: { geoms: 8, sites: 8, lights: 8, cameras: 8, flex: 8, skin: 8, trail: 8, longestTrail: 0 },
   extent: 1, center: [0, 0, 0], visual: { headlight: HEAD, znear: 0.01, zfar: 50 },
   bodies: [], geoms: [], sites: [], materials: [], textures: [], meshes: [], hfields: [], lights: [], flexes: [], skins: [],
+  springs: [], pins: [], floor: null, camera: { distance: 1 },
   ...parts,
 }) // prettier-ignore
 

@@ -112,7 +112,7 @@ def test_with_a_graphics_processor_there_are_shadows_too(
     """By way of a browser that says it had one: mirrors, and maps for all kinds of lights."""
     ready(shown[0], ENDLESS)
     without = np.array(shown[0].evaluate(GREENS, ENDLESS))
-    with browsers["webgl"].new_context(viewport=WINDOW) as context:
+    with browsers["webgl"].new_context(viewport=WINDOW, device_scale_factor=2) as context:
         context.add_init_script(
             "const { prototype } = WebGL2RenderingContext, { getParameter } = prototype\n"
             "prototype.getParameter = function (name) {\n"

@@ -170,6 +170,7 @@ def _overlays(fields: SimLab) -> list[str]:
 _CONTROL = {
     "type": None, "label": None, "unit": "", "min": None, "max": None, "step": None,
     "value": None, "digits": None, "options": (), "param": None, "init": False, "reset": False,
+    "play": False,
 }  # fmt: skip
 """What is said of a control of each kind."""
 

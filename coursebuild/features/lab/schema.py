@@ -102,6 +102,7 @@ class Button(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", 
 
     label: Annotated[Text, Meta(description="unique among the controls of the lab")]
     run: Annotated[Text, Meta(description="statements run when it is pressed")]
+    play: Annotated[bool, Meta(description="pressing it starts the motion")] = True
 
 
 Control: TypeAlias = Slider | Select | Button
@@ -200,7 +201,7 @@ class CommonLab(Struct, frozen=True):
 
     title: Annotated[str, Meta(description="the caption; plain text")] = ""
     note: Annotated[OptionalBlocks, Meta(description="Markdown under the lab")] = ""
-    height: Annotated[Height, Meta(description="of the canvas, in px")] = 320
+    height: Annotated[Height, Meta(description="of a picture 480 px wide, in px")] = 300
     dock: Annotated[bool, Meta(description="stays beside the text on wide screens")] = False
 
 
@@ -211,7 +212,7 @@ class SimLab(Struct, frozen=True, forbid_unknown_fields=True):
     xml: Annotated[Text | None, Meta(description="the model itself, as MJCF")] = None
     title: Annotated[str, Meta(description="the caption; plain text")] = ""
     note: Annotated[OptionalBlocks, Meta(description="Markdown under the lab")] = ""
-    height: Annotated[Height, Meta(description="of the canvas, in px")] = 320
+    height: Annotated[Height, Meta(description="of a picture 480 px wide, in px")] = 300
     dock: Annotated[bool, Meta(description="stays beside the text on wide screens")] = False
     key: Annotated[
         Annotated[int, Meta(ge=0)] | Text | None,

@@ -44,10 +44,12 @@ from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.models import LabModel, model_of_lab, saved_model
 from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import TrialReply, read_trial
+from coursebuild.features.lab.schema import Camera
 from coursebuild.features.lab.verdict import (
     Parity,
     code_diagnostic,
     deep_diagnostics,
+    far_diagnostics,
     parity_diagnostics,
     reset_diagnostics,
     shallow_diagnostics,
@@ -175,13 +177,16 @@ class _Attempt(Struct, frozen=True):
             steps_per_second=reading.steps_per_second,
             tried=len(reading.tried),
             parity=_parity_text(reply, parity, offer),
+            fill=None if reading.main is None else reading.main["fill"],
             cached=cached,
             unexported=offer.reason,
         )
-        output = LabOutput(module.code, module.config, mjb, script=offer.script)
+        config = _framed(module.config, reading.main)
+        output = LabOutput(module.code, config, mjb, script=offer.script)
         if self.context.static and not found and reading.main is not None:
             output = self._drawn(output, key, reading.main)
         found += [*deep_diagnostics(lab, reading), *reset_diagnostics(lab, reading)]
+        found += far_diagnostics(lab, reading)
         return TrialResult(lab.span, line, output), found
 
     def _failed(self, module: LabModule, began: float) -> TrialResult:
@@ -276,6 +281,15 @@ class _Attempt(Struct, frozen=True):
             lambda: draw_picture(self.lab, main),
         )
         return replace(output, record=lab_record(self.lab, main), picture=picture)
+
+
+def _framed(config: str, main: dict[str, Any] | None) -> str:
+    """A lab's data with the camera that its trial has found."""
+    if main is None:
+        return config
+    camera = {name: main["scene"]["camera"][name] for name in Camera.__struct_fields__}
+    data = {**json.loads(config), "camera": camera, "floor": main["scene"]["floor"]}
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
 
 
 def _is_lasting(reply: dict[str, Any]) -> bool:

@@ -146,6 +146,23 @@ def shallow_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
         yield diagnose("lab-shallow", span, what, help="take `deep` away")
 
 
+def far_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+    """That what moves is small in the picture, because of the lab's own camera."""
+    fill = trial.main["fill"] if trial.main is not None else None
+    if trial.main is None or fill is None:
+        return
+    most = trial.main["mostFill"]
+    if fill < _SMALL and fill < most / 2:
+        what = (
+            f"what moves fills {100 * fill:.2g} % of the picture, and could fill {100 * most:.2g} %"
+        )
+        help = "without `distance` and `target` the camera fits the motion"
+        yield diagnose("lab-far", lab.place(("camera",)), what, help=help)
+
+
+_SMALL = 0.1
+
+
 def _failure(lab: Lab, failure: TrialFailure) -> Diagnostic:
     tried = f"while trying: {failure.during}" if failure.during not in ("", "start") else ""
     text, help = _explain(lab, failure)

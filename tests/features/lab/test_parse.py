@@ -88,7 +88,7 @@ def test_the_least_that_a_lab_needs() -> None:
     lab = parse('{"model": "m"}').value
     assert lab is not None
     assert (lab.note, lab.fields) == ((), SimLab(model="m"))
-    assert (lab.fields.height, lab.is_docked(), lab.verify) == (320, False, Verify())
+    assert (lab.fields.height, lab.is_docked(), lab.verify) == (300, False, Verify())
     assert parse('{"model": "m", "overlays": ["com"], "camera": {"azimuth": 1}}').diagnostics == ()
 
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from coursebuild.features.lab.picture.light import Light, Material, shaded, studio
 from coursebuild.features.lab.picture.raster import NORMAL, POSITION, UV, Eye, GBuffer, rotate
 from coursebuild.features.lab.picture.shapes import Array, Surface
+from coursebuild.features.lab.picture.studio import Floor, edges
 from coursebuild.features.lab.picture.textures import Texture, TextureMapping, sharpness, sky
 
 _SAMPLES = 2
@@ -60,6 +61,13 @@ class Solid(Struct, frozen=True):
     """Where its upper face is along its z axis, m, if that can reflect."""
     open: bool = False
     """Whether both of its sides are outside."""
+    body: bool = False
+    """Whether it is a thing with an edge and a shadow."""
+
+    def placed(self) -> Surface:
+        """Its surface in the world."""
+        vertices = rotate(self.surface.vertices, self.rotation) + self.position
+        return replace(self.surface, vertices=vertices, uv=None)
 
     @property
     def opaque(self) -> bool:
@@ -104,6 +112,7 @@ def draw(
     size: tuple[int, int],
     light: Light | None = None,
     background: Texture | None = None,
+    floor: Floor | None = None,
 ) -> NDArray[np.uint8]:
     """The picture: (height, width, 4) bytes, RGBA, clear where there is nothing.
 
@@ -121,7 +130,7 @@ def draw(
     if mirror is not None:
         reflected = _Canvas(_mirrored(mirror, camera.eye(width, height)), light)
         reflected.paint([solid for solid in shown if solid is not mirror], None, None)
-    canvas.paint(shown, mirror, reflected)
+    canvas.paint(shown, mirror, reflected, floor, lines=True)
     if background is not None:
         canvas.put_behind(background)
     mean = canvas.colour.reshape(height, _SAMPLES, width, _SAMPLES, 4).mean(axis=(1, 3))
@@ -166,15 +175,25 @@ class _Canvas:
         """RGB times how much is covered, and how much is covered."""
 
     def paint(
-        self, solids: Sequence[Solid], mirror: Solid | None, reflected: _Canvas | None
+        self,
+        solids: Sequence[Solid],
+        mirror: Solid | None,
+        reflected: _Canvas | None,
+        floor: Floor | None = None,
+        *,
+        lines: bool = False,
     ) -> None:
-        """Draw solids; `mirror` shows what is in `reflected`."""
+        """Draw solids, with lines around them; `mirror` shows what is in `reflected`."""
         buffer = GBuffer(self.eye)
         opaque = [solid for solid in solids if solid.opaque]
         for i, solid in enumerate(opaque):
             buffer.add(i, solid.surface, solid.position, solid.rotation, front=False)
         for i, solid in enumerate(opaque):
             self._colour(buffer, i, solid, reflected if solid is mirror else None)
+        if lines and opaque:
+            edges(self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool))
+        if floor is not None:
+            floor.paint(self.colour, buffer, [solid.placed() for solid in solids if solid.body])
         for solid in sorted((s for s in solids if not s.opaque), key=self._depth, reverse=True):
             film = GBuffer(self.eye)
             film.depth = buffer.depth.copy()

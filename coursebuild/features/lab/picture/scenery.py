@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.features.lab.picture.draw import Solid
 from coursebuild.features.lab.picture.light import Material, material_of
+from coursebuild.features.lab.picture.marks import coil, pin
 from coursebuild.features.lab.picture.shapes import (
     Array,
     Kind,
@@ -73,12 +75,27 @@ class _Scene:
                 if item["group"] in _VISIBLE:
                     row = self._row(self.layout[part] + _GEOM * i, _GEOM)
                     looks = self._looks(item["material"])
-                    found.append(self._solid(item["type"], item.get("data", -1), row, looks))
+                    solid = self._solid(item["type"], item.get("data", -1), row, looks)
+                    if solid is not None and part == "geoms" and not solid.plane:
+                        solid = replace(solid, body=True)
+                    found.append(solid)
         found += self._soft()
+        found += self._marks()
         start = self.layout["trail"] + 3 * int(self.frame[2])
         for i in range(int(self.frame[1])):
             found.append(self._decoration(self._row(start + _DECORATION * i, _DECORATION)))
         return (solid for solid in found if solid is not None)
+
+    def _marks(self) -> Iterator[Solid]:
+        """Springs and pins."""
+        for spring in self.scene["springs"]:
+            starts = (self.layout["geoms"] + _GEOM * spring[end] for end in ("from", "to"))
+            a, b = (self._row(start, 3) for start in starts)
+            if np.isfinite((a, b)).all() and np.any(a != b):
+                yield coil(a, b, spring["radius"])
+        for hinge in self.scene["pins"]:
+            distance = self.scene["camera"]["distance"]
+            yield pin(np.array(hinge["position"]), np.array(hinge["axis"]), distance)
 
     def _row(self, start: int, floats: int) -> Array:
         return self.frame[start : start + floats]

@@ -19,10 +19,13 @@ from coursebuild.features.lab.picture.draw import FreeCamera, draw
 from coursebuild.features.lab.picture.light import light_of
 from coursebuild.features.lab.picture.plots import plot_svg
 from coursebuild.features.lab.picture.scenery import scene_solids
+from coursebuild.features.lab.picture.studio import Floor
 from coursebuild.features.lab.picture.textures import SKY, texture_of
 from coursebuild.features.lab.reply import unpack_arrays
 
 _WIDTH = 640
+_USUAL = 1.6
+"""Width of a view over its height."""
 _FROM_AFAR = 1000.0
 _LARGE = 1e9
 """From here on numbers are shown as powers of ten, as in the live lab."""
@@ -38,12 +41,19 @@ def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
     if camera["orthographic"]:  # whose `fovy` is a length: the same seen from far away
         distance *= _FROM_AFAR
         fovy = math.degrees(2 * math.atan(fovy / 2 / distance))
+    else:  # a narrow picture shows all of its width
+        width, height = _size(lab)
+        wider = max(1.0, _USUAL * height / width)
+        fovy = math.degrees(2 * math.atan(wider * math.tan(math.radians(fovy) / 2)))
     target = tuple(camera["target"])
     seen = FreeCamera(camera["azimuth"], camera["elevation"], distance, target, fovy)
     light = light_of(scene, np.asarray(frame, dtype=float), seen.forward)
     skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
     solids = tuple(scene_solids(scene, frame))
-    return png(draw(solids, seen, _size(lab), light, next(skies, None)))
+    floor = None
+    if scene["floor"] is not None and not scene["lights"]:
+        floor = Floor(scene["floor"], distance, target)
+    return png(draw(solids, seen, _size(lab), light, next(skies, None), floor))
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:

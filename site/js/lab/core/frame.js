@@ -25,6 +25,7 @@ const GEOM = 19
 const LIGHT = 7
 const CAMERA = 13
 const DECORATION = 24
+const AXIS = 0.4 // of the thickness that MuJoCo gives them
 const MOST_DECORATIONS = 2000
 const DEFAULT_COLOUR = [0.5, 0.5, 0.5, 1] // MuJoCo's default colour: a geom that has it takes that of its material
 
@@ -41,6 +42,7 @@ export class Pictures {
   constructor(engine, handles, config, sampler) {
     const { mj } = engine
     this.engine = engine
+    this.handles = handles
     this.model = handles.model
     this.data = handles.shown
     this.config = config
@@ -72,7 +74,7 @@ export class Pictures {
 
   /** What does not move. */
   describe() {
-    return describeScene(this.engine, this.model, this.config, this.camera, this.layout)
+    return describeScene(this.engine, this.handles, this.config, this.camera, this.layout)
   }
 
   /**
@@ -134,10 +136,13 @@ export class Pictures {
 
   writeDecorations(target, start, count) {
     const { ints, floats } = this.geoms
+    const { CYLINDER } = this.engine.k.geom
     for (let i = 0, at = start; i < count; i++, at += DECORATION) {
       const from = this.geoms.at(i)
       for (let j = 0; j < 4; j++) target[at + j] = ints[from + j]
       target.set(floats.subarray(from + 10, from + 30), at + 4) // size, position, matrix, colour, emission
+      // The axes of MuJoCo's frames, long cylinders, are so thick that they cover what they stand in.
+      if (ints[from] === CYLINDER && target[at + 6] > target[at + 4]) target.fill(AXIS * target[at + 4], at + 4, at + 6)
     }
   }
 }

@@ -13,12 +13,12 @@ const ROLE_RGB = 1
 
 /**
  * @param {import('./engine.js').Engine} engine
- * @param {object} model MjModel
+ * @param {import('./engine.js').Handles} handles
  * @param {object} config the lab's data
  * @param {object} camera an MjvCamera to work with
  * @param {object} layout of the frames
  */
-export function describeScene(engine, model, config, camera, layout) {
+export function describeScene(engine, { model, shown: data }, config, camera, layout) {
   const { mj, k } = engine
   const name = (type, i) => nameOf(engine, model, type, i)
   const each = (count, make) => Array.from({ length: count }, (_, i) => make(i))
@@ -27,6 +27,7 @@ export function describeScene(engine, model, config, camera, layout) {
     layout: { ...layout },
     timestep: model.opt.timestep,
     camera: freeCamera(mj, model, config.camera, camera),
+    floor: config.floor ?? null,
     center: Array.from(stat.center),
     extent: stat.extent,
     visual: visual(vis),
@@ -51,6 +52,8 @@ export function describeScene(engine, model, config, camera, layout) {
       material: model.site_matid[i],
     })),
     joints: each(model.njnt, (i) => ({ name: name(k.obj.JOINT, i), type: model.jnt_type[i], body: model.jnt_bodyid[i] })),
+    springs: each(model.njnt, (i) => spring(k, model, i)).filter((found) => found !== null),
+    pins: each(model.njnt, (i) => pin(k, model, data, i)).filter((found) => found !== null),
     materials: each(model.nmat, (i) => material(model, i, name(k.obj.MATERIAL, i))),
     textures: each(model.ntex, (i) => texture(model, i, name(k.obj.TEXTURE, i))),
     meshes: each(model.nmesh, (i) => mesh(model, i, name(k.obj.MESH, i))),
@@ -64,6 +67,24 @@ export function describeScene(engine, model, config, camera, layout) {
 
 const part = (array, start, count) => array.slice(start, start + count)
 const row = (array, i, n) => Array.from(array.subarray(n * i, n * i + n))
+
+/** A slide joint that is a spring, between the geoms that it holds apart; of a body in the world, the nearest that stands still. */
+function spring(k, model, i) {
+  const body = model.jnt_bodyid[i]
+  if (model.jnt_type[i] !== k.joint.SLIDE || !(model.jnt_stiffness[i] > 0) || model.body_geomnum[body] === 0) return null
+  const to = model.body_geomadr[body]
+  const parent = model.body_parentid[body]
+  const first = model.body_geomadr[parent]
+  const holders = Array.from({ length: model.body_geomnum[parent] }, (_, j) => first + j)
+  const from = holders.find((geom) => model.geom_type[geom] > k.geom.HFIELD)
+  return from === undefined ? null : { from, to, radius: 0.4 * Math.min(model.geom_rbound[from], model.geom_rbound[to]) }
+}
+
+/** A hinge that is fixed to the world. */
+function pin(k, model, data, i) {
+  if (model.jnt_type[i] !== k.joint.HINGE || model.body_weldid[model.body_parentid[model.jnt_bodyid[i]]] !== 0) return null
+  return { position: row(data.xanchor, i, 3), axis: row(data.xaxis, i, 3) }
+}
 
 /** MuJoCo's free camera for the model, with what the lab says instead. */
 function freeCamera(mj, model, wanted, camera) {

@@ -5,7 +5,8 @@
  * in degrees. World lengths in metres, z up. Movements are in parts of the view's height, as in MuJoCo.
  */
 
-const RADIANS = Math.PI / 180
+import { cameraAxes } from '../core/framing.js'
+
 const STEEPEST = 90
 
 export class OrbitCamera {
@@ -22,13 +23,7 @@ export class OrbitCamera {
 
   /** Unit vectors of the picture in the world: to the right, up, and into it. */
   axes() {
-    const a = this.azimuth * RADIANS
-    const e = this.elevation * RADIANS
-    return {
-      right: [Math.sin(a), -Math.cos(a), 0],
-      up: [-Math.sin(e) * Math.cos(a), -Math.sin(e) * Math.sin(a), Math.cos(e)],
-      forward: [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)],
-    }
+    return cameraAxes(this)
   }
 
   /** Where the camera is (m). */
@@ -45,7 +40,7 @@ export class OrbitCamera {
 
   /** Move with the picture: what is at the target's depth follows the pointer. */
   pan(dx, dy) {
-    const height = 2 * this.distance * Math.tan((this.fovy * RADIANS) / 2)
+    const height = 2 * this.distance * Math.tan((this.fovy * Math.PI) / 360)
     const { right, up } = this.axes()
     this.target = this.target.map((x, i) => x + height * (dy * up[i] - dx * right[i]))
   }

@@ -65,7 +65,7 @@ const fromAbove = (x, y) => [(1 + x) / 2, (1 - y) / 2]
 
 const box = () => unit('box', () => new BoxGeometry(2, 2, 2), onFace)
 const ball = () => unit('ball', () => sphere(0, Math.PI, 2 * QUARTER))
-const cylinder = () => unit('cylinder', () => barrel(false), onLid)
+export const cylinder = () => unit('cylinder', () => barrel(false), onLid)
 const tube = () => unit('tube', () => barrel(true))
 const dome = () => unit('dome', () => sphere(0, Math.PI / 2, QUARTER), null, 1)
 const bowl = () => unit('bowl', () => sphere(Math.PI / 2, Math.PI / 2, QUARTER), null, -1)

@@ -23,7 +23,7 @@ import { View } from './view.js'
 const TEXT_EVERY = 90 // ms: faster than this no eye reads a number
 const PLOT_EVERY = 30
 const SETTLED = 400 // ms after which a paused lab's last picture is there
-const HEIGHT = 300 // CSS pixels
+const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
 export class Instrument {
@@ -33,6 +33,7 @@ export class Instrument {
     this.textAt = this.plotAt = -Infinity
     this.rest = 0 // timer of what is to be said of a pause
     this.pressed = false
+    this.begun = false // whether it has moved, or the reader has begun to step
     this.wanted = null
     this.build()
     this.simulation = new Simulation({
@@ -56,18 +57,18 @@ export class Instrument {
     })
     this.hands = new Hands(this.view, {
       pull: (request) => this.simulation.pull(request),
-      keys: { ' ': () => this.togglePlay(), '.': () => this.simulation.step(), r: () => this.reset() },
+      keys: { ' ': () => this.togglePlay(), '.': () => this.step(), r: () => this.reset() },
     })
     this.transport = buildTransport(words, {
       play: () => this.togglePlay(),
-      step: () => this.simulation.step(),
+      step: () => this.step(),
       reset: () => this.reset(),
       speed: (factor) => this.simulation.speed(factor),
       full: document.fullscreenEnabled ? () => this.toggleFull() : null,
     })
     this.controls = buildControls(config.controls, {
-      set: (index, value) => this.simulation.set(index, value),
-      press: (index) => this.simulation.press(index),
+      set: (index, value) => this.simulation.set(index, value, !this.begun),
+      press: (index) => this.simulation.press(index, config.controls[index].play),
     })
     const overlays = buildOverlays(config, words, (name, on) => this.simulation.overlay(name, on))
     this.readouts = buildReadouts(config.readouts, formatReadout)
@@ -78,11 +79,8 @@ export class Instrument {
       h('div', { class: 'lab-screen' }, this.view.element, this.transport.full),
       this.transport.element,
       this.notices.shown,
-      this.controls.element,
-      overlays,
-      this.readouts.element,
       ...this.plots.map((plot) => plot.element),
-      this.foot(),
+      h('div', { class: 'lab-panel' }, this.controls.element, overlays, this.readouts.element, this.foot()),
       this.notices.spoken,
     )
     this.controls.show(this.values)
@@ -147,6 +145,7 @@ export class Instrument {
     this.transport.setEnabled(state === 'paused' || state === 'playing')
     this.controls.setEnabled(state !== 'ended')
     if (state === 'playing') {
+      this.begun = true
       this.notices.clear()
       this.notices.say(this.words('lab.live.said_playing'))
     }
@@ -200,6 +199,11 @@ export class Instrument {
       this.notices.clear()
       this.simulation.play()
     }
+  }
+
+  step() {
+    this.begun = true
+    this.simulation.step()
   }
 
   reset() {

@@ -31,7 +31,8 @@ export class Plot {
     this.element = h('figure', { class: 'lab-plot', role: 'img', 'aria-label': `${this.caption}: ${names(config)}` })
     this.chart = null
     this.dirty = false
-    this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width))
+    this.element.style.setProperty('--height', `${config.height ?? HEIGHT}px`)
+    this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
     this.resizer.observe(this.element)
     this.unwatch = watchTheme(() => this.recolour())
   }
@@ -54,13 +55,13 @@ export class Plot {
     this.chart.setData(this.history.data())
   }
 
-  resize(width) {
+  resize(width, height) {
     if (width < 40) return
-    const size = { width: Math.floor(width), height: this.config.height ?? HEIGHT }
+    const size = { width: Math.floor(width), height: Math.floor(height) }
     if (this.chart === null) {
       this.colours = palette(this.element)
       this.chart = new uPlot(this.options(size), this.history.data(), this.element)
-    } else if (this.chart.width !== size.width) this.chart.setSize(size)
+    } else this.chart.setSize(size)
   }
 
   recolour() {

@@ -92,14 +92,14 @@ export class Simulation {
     this.send(message)
   }
 
-  /** Set a control to a value. */
-  set(index, value) {
-    this.send({ type: 'control', index, value })
+  /** Set a control to a value; `play`: and go on from there. */
+  set(index, value, play = false) {
+    this.send({ type: 'control', index, value, play })
   }
 
-  /** Press a button. */
-  press(index) {
-    this.send({ type: 'press', index })
+  /** Press a button; `play`: and go on from there, unless its code pauses. */
+  press(index, play = false) {
+    this.send({ type: 'press', index, play })
   }
 
   overlay(name, on) {

@@ -11,7 +11,8 @@
 
 import { ColorManagement, LinearSRGBColorSpace, PCFShadowMap, WebGLRenderer } from 'three'
 
-const SHARPEST = 2 // device pixels per CSS pixel
+const SHARPEST = 3 // device pixels per CSS pixel
+const STILL = 2 // at least, for a picture at rest without a graphics processor
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i
 
 // MuJoCo computes with colours as they are written: no conversion to light intensities and back.
@@ -34,7 +35,7 @@ export class Stage {
     const canvas = document.createElement('canvas')
     canvas.className = 'lab-canvas'
     const software = drawsInSoftware()
-    this.renderer = new WebGLRenderer({ canvas, antialias: !software, alpha: true, powerPreference: 'low-power' })
+    this.renderer = new WebGLRenderer({ canvas, antialias: !software, alpha: true, stencil: true, powerPreference: 'low-power' })
     this.renderer.outputColorSpace = LinearSRGBColorSpace
     this.renderer.shadowMap.enabled = !software
     this.renderer.shadowMap.type = PCFShadowMap
@@ -42,9 +43,11 @@ export class Stage {
     canvas.addEventListener('webglcontextrestored', () => this.views.forEach((view) => this.invalidate(view)))
   }
 
-  /** Device pixels per CSS pixel. */
+  /** Device pixels per CSS pixel. Without a graphics processor what moves is coarse, and at rest drawn fine. */
   get sharpness() {
-    return this.software ? 1 : Math.min(SHARPEST, window.devicePixelRatio || 1)
+    const real = globalThis.devicePixelRatio || 1
+    if (!this.software) return Math.min(SHARPEST, real)
+    return this.moving.size > 0 ? 1 : Math.max(STILL, real)
   }
 
   add(view) {
@@ -62,7 +65,7 @@ export class Stage {
   /** Say that a view moves, or has come to rest. */
   setMoving(view, moving) {
     if (moving) this.moving.add(view)
-    else this.moving.delete(view)
+    else if (this.moving.delete(view)) this.invalidate(view) // which shows it finer
     this.choose()
   }
 

@@ -1,7 +1,7 @@
-/** What bends: skins, flexes and the trail of a site, whose points come with every frame. */
+/** What bends: skins and flexes, whose points come with every frame. */
 
 import {
-  BufferAttribute, BufferGeometry, DynamicDrawUsage, InstancedMesh, Line, LineBasicMaterial, Mesh, Sphere, Vector3,
+  BufferAttribute, BufferGeometry, DynamicDrawUsage, InstancedMesh, Mesh, Sphere, Vector3,
 } from 'three' // prettier-ignore
 import { ropePieces } from './geometry.js'
 
@@ -95,7 +95,7 @@ class Cloth {
 }
 
 /** Lines with the radius of the flex and round ends: a tube for each element, a ball for each vertex. */
-class Ropes {
+export class Ropes {
   constructor(material, { count, elements, radius }) {
     const { tube, knot } = ropePieces()
     this.elements = elements
@@ -137,37 +137,6 @@ export function stretch(out, at, points, a, b, radius) {
   const x = s.map((value) => n * value)
   const y = [0, 1, 2].map((i) => z[(i + 1) % 3] * x[(i + 2) % 3] - z[(i + 2) % 3] * x[(i + 1) % 3])
   out.set([...x, 0, ...y, 0, ...half, 0, ...[0, 1, 2].map((i) => (points[a + i] + points[b + i]) / 2), 1], at)
-}
-
-/** The path of a site. */
-export class Trail {
-  constructor(parent, layout) {
-    this.at = layout.trail
-    this.geometry = new BufferGeometry()
-    this.position = dynamic(new Float32Array(3 * layout.longestTrail), 3)
-    this.geometry.setAttribute('position', this.position)
-    this.geometry.boundingSphere = EVERYWHERE
-    this.material = new LineBasicMaterial()
-    this.line = new Line(this.geometry, this.material)
-    parent.add(this.line)
-  }
-
-  /** @param {[number, number, number]} rgb in [0, 1] */
-  paint(rgb) {
-    this.material.color.setRGB(...rgb)
-  }
-
-  update(frame, count) {
-    this.position.array.set(frame.subarray(this.at, this.at + 3 * count))
-    this.position.needsUpdate = true
-    this.geometry.setDrawRange(0, count)
-  }
-
-  dispose() {
-    this.line.removeFromParent()
-    this.geometry.dispose()
-    this.material.dispose()
-  }
 }
 
 /** A colour left at MuJoCo's default is that of the material. */

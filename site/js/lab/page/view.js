@@ -9,12 +9,13 @@ import { OrbitCamera } from './camera.js'
 import { h } from './dom.js'
 import { channels, resolve, watchTheme } from './palette.js'
 import { stage } from './stage.js'
+import { BESIDE } from './studio.js'
 import { World, aim } from './world.js'
 
 export class View {
   /**
    * @param {object} options
-   * @param {number} options.height CSS pixels
+   * @param {number} options.height CSS pixels, where it is 480 wide
    * @param {string} options.label what the picture shows, for who cannot see it
    * @param {string} options.name of the view, and how keys move it
    * @param {HTMLImageElement | null} [options.poster] a picture that is shown until there is a live one
@@ -25,9 +26,10 @@ export class View {
     this.element = h('div', { class: 'lab-view', tabIndex: 0, role: 'group', 'aria-label': name }, this.still)
     this.poster = poster === null ? null : h('img', { class: 'lab-poster', src: poster.src, alt: '' })
     if (this.poster !== null) this.element.append(this.poster)
-    this.element.style.setProperty('--height', `${height}px`)
+    this.element.style.setProperty('--height', height)
     this.lens = new PerspectiveCamera()
     this.lens.matrixAutoUpdate = false
+    this.lens.layers.enable(BESIDE)
     this.world = null
     this.camera = null
     this.frame = null
@@ -90,6 +92,7 @@ export class View {
     if (this.world === null || this.frame === null || this.width === 0) return false
     this.world.update(this.frame, this.camera)
     aim(this.lens, this.camera, this.world.description, this.width, this.height)
+    this.world.edges.update(this.width, this.height)
     this.poster?.remove()
     return true
   }
@@ -138,7 +141,7 @@ export class View {
     const { right, up, forward } = this.camera.axes()
     const eye = this.camera.position()
     const depth = point.reduce((sum, x, i) => sum + (x - eye[i]) * forward[i], 0)
-    const half = depth * Math.tan((this.camera.fovy * Math.PI) / 360)
+    const half = depth * Math.tan((this.lens.fov * Math.PI) / 360)
     const [x, y] = this.coordinates(clientX, clientY)
     const aspect = this.width / this.height
     return eye.map((e, i) => e + depth * forward[i] + half * (x * aspect * right[i] + y * up[i]))

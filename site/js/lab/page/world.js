@@ -7,16 +7,19 @@
 import { CubeTexture, Matrix4, Raycaster, Scene, Vector2 } from 'three'
 import { GEOM, hfieldGeometry, meshGeometry } from './geometry.js'
 import { Lights } from './lights.js'
+import { Coil, Pin, Trail } from './marks.js'
 import { Materials } from './materials.js'
 import { Mirror } from './mirror.js'
 import { Solid } from './solid.js'
-import { Flex, Skin, Trail } from './surfaces.js'
+import { Edges, Floor } from './studio.js'
+import { Flex, Skin } from './surfaces.js'
 
 const SHOWN_GROUPS = 3 // MuJoCo's viewer shows groups 0, 1 and 2 at first
 const ROW = 19 // floats of a geom or site in a frame
 const SIZE = 12
 const COLOUR = 15
 const DECORATION = 24
+const USUAL = 1.6 // width of a view over its height
 
 export class World {
   /** @param {object} description what the worker's `ready` holds as `scene` */
@@ -31,11 +34,24 @@ export class World {
     this.sites = description.sites.map((site) => (site.group < SHOWN_GROUPS ? this.solid(site) : null))
     this.skins = description.skins.map((skin) => new Skin(this.scene, this.materials, skin, description.layout))
     this.flexes = description.flexes.map((flex) => new Flex(this.scene, this.materials, flex, description.layout))
+    this.coils = description.springs.map((spring) => new Coil(this.scene, this.materials, spring, description.layout))
+    this.pins = description.pins.map((pin) => new Pin(this.scene, this.materials, pin, description.camera.distance))
     this.trail = description.layout.longestTrail > 0 ? new Trail(this.scene, description.layout) : null
     this.decorations = new Map()
+    this.edges = new Edges()
+    this.floor = this.stand()
     this.mirror = this.polished()
     this.setSky()
     this.raycaster = new Raycaster()
+  }
+
+  /** What a model without lights of its own stands on, if anything falls in it. */
+  stand() {
+    const solids = this.geoms.filter((solid) => solid !== null && !solid.plane)
+    const bodies = solids.flatMap(({ meshes }) => meshes)
+    for (const { meshes, material } of solids) for (const mesh of meshes) this.edges.add(mesh, material)
+    const { floor, camera, lights } = this.description
+    return floor === null || lights.length > 0 ? null : new Floor(this.scene, floor, camera.distance, bodies)
   }
 
   setSky() {
@@ -85,9 +101,11 @@ export class World {
     this.place(this.sites, frame, layout.sites, sight)
     this.skins.forEach((skin) => skin.update(frame))
     this.flexes.forEach((flex) => flex.update(frame))
+    this.coils.forEach((coil) => coil.update(frame))
     const points = frame[2]
     this.trail?.update(frame, points)
     this.decorate(frame, layout.trail + 3 * points, frame[1], sight)
+    this.floor?.update(camera.target)
     this.lights.update(frame, sight.eye, camera.axes().forward)
   }
 
@@ -148,7 +166,9 @@ export class World {
     this.lights.dispose()
     this.materials.dispose()
     this.mirror?.dispose()
-    for (const thing of [...this.meshes, ...this.hfields, ...this.skins, ...this.flexes, this.trail]) thing?.dispose()
+    this.edges.dispose()
+    this.floor?.dispose()
+    for (const thing of [...this.meshes, ...this.hfields, ...this.skins, ...this.flexes, ...this.coils, ...this.pins, this.trail]) thing?.dispose()
     for (const solid of [...this.geoms, ...this.sites, ...[...this.decorations.values()].flat()]) solid?.remove()
     this.scene.clear()
   }
@@ -166,8 +186,10 @@ export function aim(lens, camera, { extent, visual }, width, height) {
       0, 0, 0, 1,
     ), // prettier-ignore
   )
-  lens.fov = camera.fovy
   lens.aspect = width / Math.max(1, height)
+  // A view that is narrower than 16 : 10 shows all of its width.
+  const half = Math.tan((camera.fovy * Math.PI) / 360) * Math.max(1, USUAL / lens.aspect)
+  lens.fov = (Math.atan(half) * 360) / Math.PI
   lens.near = Math.min(visual.znear * extent, 0.2 * camera.distance)
   lens.far = Math.max(visual.zfar * extent, 4 * camera.distance)
   lens.updateProjectionMatrix()

@@ -14,6 +14,7 @@ import { EngineError } from '../core/engine.js'
 import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, plottable, readable } from '../core/piece.js'
+import { Framing } from '../core/framing.js'
 import { packed } from './base64.js'
 import { deepContact } from './deep.js'
 import { ParityRecorder } from './parity.js'
@@ -63,6 +64,7 @@ class Trial {
     this.meant = (value) => new RegExp(`\\b${Math.abs(value)}\\b`).test(code)
     this.steps = 0
     this.took = 0
+    this.framing = null
   }
 
   run() {
@@ -78,6 +80,7 @@ class Trial {
       }
       this.claims()
       if (reply.main !== null && this.took === 0) this.pace(reply.main)
+      if (reply.main !== null) this.frame(reply.main)
     } catch (error) {
       if (!(error instanceof Ended)) this.fail([], 'engine', String(error.message ?? error), null)
     }
@@ -96,6 +99,17 @@ class Trial {
     }
   }
 
+  /** Let the camera show all that has moved, where the lab does not say otherwise. */
+  frame(main) {
+    const { camera } = main.scene
+    const fitting = camera.orthographic ? null : this.framing.fit()
+    if (fitting === null) return
+    if (this.config.camera?.distance == null && this.config.camera?.target == null) Object.assign(camera, fitting)
+    main.scene.floor = this.framing.floor()
+    main.fill = this.framing.fill(camera)
+    main.mostFill = this.framing.fill(fitting)
+  }
+
   // --- one attempt
 
   /** Do something with a fresh lab; what goes wrong is noted under its own entry. */
@@ -109,6 +123,7 @@ class Trial {
       lab = new Lab(this.engine, this.bytes, this.config, this.code)
       lab.start()
       this.state(lab)
+      this.framing?.begin()
       result = action(lab)
       this.shared(action)
     } catch (error) {
@@ -215,6 +230,7 @@ class Trial {
       const started = (progress.last = this.now())
       const { steps, stopped } = lab.step(Math.min(due, left, SLICE))
       this.measure(lab, steps, this.now() - started)
+      if (lab.diverged === null) this.framing.see(lab)
       left -= steps
       this.state(lab)
       if (stopped === 'diverged' || stops.includes(stopped)) return stopped
@@ -246,6 +262,9 @@ class Trial {
     const wanted = this.seconds ?? stopAt ?? SECONDS
     const most = this.seconds === null ? STEPS : Infinity
     const due = Math.min(most, Math.ceil(wanted / timestep))
+    this.framing = new Framing(lab, lab.scene().camera)
+    this.framing.begin()
+    this.framing.see(lab)
     this.look(lab)
     const start = picture(lab)
     const atStart = lab.state().physics
@@ -277,6 +296,8 @@ class Trial {
       pictures,
       plots: record(lab),
       parity,
+      fill: null, // see `frame`
+      mostFill: null,
       resetDiffers: resetDiffers(lab, atStart),
     }
   }

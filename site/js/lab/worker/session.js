@@ -83,6 +83,14 @@ export class Session {
     this.post('paused', { reason })
   }
 
+  /** Do what a reader asks for; with `play` it goes on from there, unless lab code has paused it. */
+  act(action, play) {
+    this.lab.interrupted = false
+    action(this.lab)
+    this.changed()
+    if (play && !this.lab.interrupted) this.play()
+  }
+
   /** After lab code has run: the values of the controls, and what became of the state. */
   changed() {
     this.stale = true
@@ -195,14 +203,8 @@ const HANDLERS = {
     session.changed()
   },
   speed: (session, { factor }) => session.clock.setSpeed(factor),
-  control(session, { index, value }) {
-    session.lab.setControl(index, value)
-    session.changed()
-  },
-  press(session, { index }) {
-    session.lab.press(index)
-    session.changed()
-  },
+  control: (session, { index, value, play }) => session.act((lab) => lab.setControl(index, value), play),
+  press: (session, { index, play }) => session.act((lab) => lab.press(index), play),
   overlay(session, { name, on }) {
     session.lab.pictures.setOverlay(name, on)
     session.stale = true

@@ -1,0 +1,175 @@
+/**
+ * The camera that shows all of a motion, as a photographer would: from its direction, as near as the motion allows, with a margin.
+ *
+ *   const framing = new Framing(lab, camera)        its azimuth, elevation and fovy
+ *   framing.begin(); framing.see(lab); …            a run, and each moment of it
+ *   framing.fit() → { distance, target } | null     null: nothing moves
+ *
+ * Runs in which something flies off are left out: those that would take the camera much farther away than the first run does.
+ *
+ * A camera sees a point if the point lies on the inner side of the picture's four edges, each of which is a plane through the
+ * camera. So all that has to be known of a moment is how far what moves reaches in the directions of their normals. Coordinates
+ * are those of the camera: to the right, up, and into the picture.
+ */
+
+const ASPECT = 1.6 // width of a view over its height
+const MARGIN = 0.9 // of the view is the motion's
+const AROUND = 0.3 // of the motion's size: so far around it, what stands still belongs to the picture
+const FARTHEST = 3.5 // distances of the first run's camera
+const GAP = 0.04 // of the motion's size: between it and the floor
+const LEVEL = 0.999
+const SHOWN_GROUPS = 3
+const RADIANS = Math.PI / 180
+const AXES = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+const EDGES = AXES.length // where the normals of the edges begin
+
+/** Unit vectors of a free camera's picture in the world: to the right, up, and into it. */
+export function cameraAxes({ azimuth, elevation }) {
+  const [a, e] = [azimuth * RADIANS, elevation * RADIANS]
+  return {
+    right: [Math.sin(a), -Math.cos(a), 0],
+    up: [-Math.sin(e) * Math.cos(a), -Math.sin(e) * Math.sin(a), Math.cos(e)],
+    forward: [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)],
+  }
+}
+
+export class Framing {
+  /** @param {import('./lab.js').Lab} lab @param {{azimuth: number, elevation: number, fovy: number}} camera in degrees */
+  constructor({ engine, model, data }, camera) {
+    const { right, up, forward } = cameraAxes(camera)
+    this.world = ([x, y, z]) => right.map((r, i) => x * r + y * up[i] + z * forward[i])
+    this.kinds = engine.k.geom
+    const half = Math.tan((camera.fovy / 2) * RADIANS)
+    this.slopes = [ASPECT * half, half] // of the picture's right and upper edge
+    const [x, y] = this.slopes.map((slope) => MARGIN * slope)
+    this.normals = [...AXES, [1, 0, -x], [-1, 0, -x], [0, 1, -y], [0, -1, -y]]
+    this.directions = [...this.normals.map(this.world), [0, 0, -1]] // and down
+    const shown = Array.from(model.geom_type, (_, i) => i).filter((i) => isShown(model, i))
+    const moves = (i) => model.body_weldid[model.geom_bodyid[i]] !== 0 || model.body_mocapid[model.geom_bodyid[i]] >= 0
+    this.moving = shown.filter(moves)
+    this.still = shown.filter((i) => !moves(i) && model.geom_type[i] > this.kinds.HFIELD)
+    const { gravity } = model.opt
+    this.falls = gravity[2] < 0 && Math.hypot(gravity[0], gravity[1]) < -gravity[2]
+    const level = shown.filter((i) => model.geom_type[i] === this.kinds.PLANE && data.geom_xmat[9 * i + 8] > LEVEL)
+    this.planes = level.map((i) => data.geom_xpos[3 * i + 2])
+    this.runs = []
+    this.around = []
+  }
+
+  /** A run begins. */
+  begin() {
+    this.runs.push([])
+  }
+
+  /** What was seen of the first run. */
+  get first() {
+    return this.runs[0]
+  }
+
+  /** The moments that a camera is to show. */
+  get moments() {
+    const near = this.distanceOf(this.first) * FARTHEST
+    return this.runs.flatMap((run) => (this.distanceOf([...this.first, ...run]) <= near ? run : []))
+  }
+
+  distanceOf(moments) {
+    return moments.length > 0 ? this.place(moments).distance : 0
+  }
+
+  /** Take in where everything is: what moves, what tendons are fixed to, the site that leaves a trail. */
+  see(lab) {
+    const { model, sampler } = lab
+    const { data } = lab.sync()
+    const points = [...rows(data.flexvert_xpos, 0, model.nflexvert), ...rows(data.site_xpos, sampler.site, sampler.site < 0 ? 0 : 1)]
+    for (let i = 0; i < model.ntendon; i++) points.push(...rows(data.wrap_xpos, data.ten_wrapadr[i], data.ten_wrapnum[i]))
+    const reach = this.directions.map((d) =>
+      Math.max(...this.moving.map((i) => this.support(model, data, i, d)), ...points.map((p) => dot(p, d))),
+    )
+    if (reach.every(Number.isFinite)) this.runs.at(-1).push(reach)
+    this.around = this.still.map((i) => this.directions.map((d) => this.support(model, data, i, d)))
+  }
+
+  /** How far a geom reaches in a direction. */
+  support(model, data, i, d) {
+    const m = data.geom_xmat.subarray(9 * i, 9 * i + 9)
+    const local = [0, 1, 2].map((j) => m[j] * d[0] + m[3 + j] * d[1] + m[6 + j] * d[2])
+    const [a, b, c] = model.geom_size.subarray(3 * i, 3 * i + 3)
+    const centre = dot(data.geom_xpos.subarray(3 * i, 3 * i + 3), d)
+    const { SPHERE, CAPSULE, ELLIPSOID, CYLINDER } = this.kinds
+    switch (model.geom_type[i]) {
+      case SPHERE:
+        return centre + a * Math.hypot(...local)
+      case CAPSULE:
+        return centre + a * Math.hypot(...local) + b * Math.abs(local[2])
+      case ELLIPSOID:
+        return centre + Math.hypot(a * local[0], b * local[1], c * local[2])
+      case CYLINDER:
+        return centre + a * Math.hypot(local[0], local[1]) + b * Math.abs(local[2])
+      default: {
+        const [x, y, z, ...halves] = model.geom_aabb.subarray(6 * i, 6 * i + 6)
+        return centre + dot([x, y, z], local) + dot(halves, local.map(Math.abs))
+      }
+    }
+  }
+
+  /** The camera, or null where nothing moves. */
+  fit() {
+    const { moments } = this
+    return moments.length > 0 ? this.place(moments) : null
+  }
+
+  /** The camera that sees all of some moments, and what stands still close to them. */
+  place(moments) {
+    const reach = furthest(moments)
+    const room = reach.slice(0, EDGES).map((x) => x + AROUND * sizeOf(reach))
+    for (const still of this.around) {
+      const clipped = room.map((x, i) => Math.min(x, still[i]))
+      if ([0, 2, 4].some((i) => clipped[i] < -clipped[i + 1])) continue
+      this.normals.forEach((normal, i) => {
+        const corner = normal.reduce((sum, n, j) => sum + Math.max(n * clipped[2 * j], -n * clipped[2 * j + 1]), 0)
+        reach[i] = Math.max(reach[i], corner)
+      })
+    }
+    const [right, left, top, bottom] = reach.slice(EDGES)
+    const [x, y] = this.slopes.map((slope) => MARGIN * slope)
+    const depth = Math.min(-(right + left) / (2 * x), -(top + bottom) / (2 * y))
+    const middle = (reach[4] - reach[5]) / 2
+    return { distance: middle - depth, target: this.world([(right - left) / 2, (top - bottom) / 2, middle]) }
+  }
+
+  /** The height of the floor: that of a level plane of the model, else under everything; null where nothing falls. */
+  floor() {
+    const { moments } = this
+    if (!this.falls || moments.length === 0) return null
+    if (this.planes.length > 0) return Math.max(...this.planes)
+    const reach = furthest(moments)
+    const size = sizeOf(reach)
+    const feet = this.around.map((still) => still.at(-1)).filter((down) => down < reach.at(-1) + 2 * size)
+    return -Math.max(reach.at(-1) + GAP * size, ...feet)
+  }
+
+  /** The part of a camera's picture that the rectangle around what moves fills, in the mean of the first run. */
+  fill({ distance, target }) {
+    const [x, y, z] = this.directions.filter((_, i) => i < EDGES && i % 2 === 0).map((d) => dot(target, d))
+    const part = (low, high, middle, half) => Math.max(0, Math.min(high - middle, half) - Math.max(low - middle, -half)) / (2 * half)
+    const shares = this.first.map(([right, left, top, bottom, back, front]) => {
+      const depth = Math.max(1e-9, (back - front) / 2 - z + distance)
+      const [w, h] = this.slopes.map((slope) => slope * depth)
+      return part(-left, right, x, w) * part(-bottom, top, y, h)
+    })
+    return shares.reduce((sum, share) => sum + share, 0) / shares.length
+  }
+}
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+const furthest = (moments) => moments[0].map((_, i) => Math.max(...moments.map((moment) => moment[i])))
+const sizeOf = (reach) => Math.max(...[0, 2, 4].map((i) => reach[i] + reach[i + 1]))
+const rows = (array, first, count) => Array.from({ length: count }, (_, i) => array.subarray(3 * (first + i), 3 * (first + i) + 3))
+
+/** Whether a geom is drawn, by its group and its colour. */
+function isShown(model, i) {
+  const material = model.geom_matid[i]
+  const own = model.geom_rgba[4 * i + 3]
+  const alpha = material >= 0 && own === 1 ? model.mat_rgba[4 * material + 3] : own
+  return model.geom_group[i] < SHOWN_GROUPS && alpha > 0
+}

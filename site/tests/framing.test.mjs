@@ -1,0 +1,122 @@
+/** The camera of a motion: all of it is seen, and no nearer camera of the same direction would see all. */
+
+import assert from 'node:assert/strict'
+import { before, test } from 'node:test'
+import { Framing, cameraAxes } from '../js/lab/core/framing.js'
+import { Lab } from '../js/lab/core/lab.js'
+import { code, compile, config, newEngine } from './helpers.mjs'
+
+const DIRECTION = { azimuth: 70, elevation: -25, fovy: 45 }
+const GEOMS = `
+  <geom type="sphere" size=".1"/><geom type="capsule" size=".05" fromto="0 0 0 .3 .1 .4"/>
+  <geom type="box" size=".1 .2 .3" pos=".2 .5 0" euler="20 40 60"/><geom type="cylinder" size=".1" fromto="0 0 0 0 -.3 .3"/>
+  <geom type="ellipsoid" size=".1 .05 .3" pos="-.4 0 0"/>`
+const model = (around, body = GEOMS, option = '') => `<mujoco>${option}<worldbody>${around}
+  <body pos="0 0 1"><freejoint/>${body}</body></worldbody></mujoco>`
+
+let engine
+before(async () => {
+  engine = await newEngine()
+})
+
+/** The framing of half a second, and where its camera sees the points: to the right and up, 1 at the edges. */
+function framed(xml, direction = DIRECTION) {
+  const lab = new Lab(engine, compile(engine, xml), config(), code({}))
+  lab.start()
+  const framing = new Framing(lab, direction)
+  framing.begin()
+  const points = []
+  for (let i = 0; i < 10; i++) {
+    framing.see(lab)
+    points.push(...cloud(lab))
+    lab.step(25)
+  }
+  lab.dispose()
+  const camera = framing.fit()
+  const { right, up, forward } = cameraAxes(direction)
+  const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0)
+  const half = Math.tan((direction.fovy * Math.PI) / 360)
+  const seen = points.map((p) => {
+    const d = p.map((x, i) => x - camera.target[i] + camera.distance * forward[i])
+    const depth = dot(d, forward)
+    return [dot(d, right) / (1.6 * half * depth), dot(d, up) / (half * depth), depth]
+  })
+  return { framing, camera, seen }
+}
+
+/** Points of the surfaces of boxes and balls around everything that moves. */
+function* cloud({ model: m, data }) {
+  for (let i = 0; i < m.ngeom; i++) {
+    if (m.geom_bodyid[i] === 0) continue
+    const at = data.geom_xpos.subarray(3 * i, 3 * i + 3)
+    if (m.geom_type[i] === engine.k.geom.SPHERE) {
+      const r = m.geom_size[3 * i]
+      for (let k = 0; k < 400; k++) {
+        const [z, a] = [(k + 0.5) / 200 - 1, 2.4 * k]
+        const s = Math.sqrt(1 - z * z)
+        yield [at[0] + r * s * Math.cos(a), at[1] + r * s * Math.sin(a), at[2] + r * z]
+      }
+    } else yield Array.from(at)
+  }
+}
+
+test('all that moves is seen, and touches an edge of the margin', () => {
+  const ball = '<geom type="sphere" size=".2"/>'
+  const { seen } = framed(model('', ball))
+  assert.ok(seen.every(([, , depth]) => depth > 0))
+  const most = Math.max(...seen.flatMap(([x, y]) => [Math.abs(x), Math.abs(y)]))
+  assert.ok(Math.abs(most - 0.9) < 0.01, `${most}`)
+  for (const [x, y] of framed(model('')).seen) assert.ok(Math.max(Math.abs(x), Math.abs(y)) < 0.9)
+})
+
+test('what stands still close by is seen, and what lies far off draws the camera nowhere', () => {
+  const wide = framed(model('', GEOMS, '<option gravity="0 0 0"/>')).camera.distance
+  const close = framed(model('<geom type="box" size=".05 .05 .05" pos="0 0 1.6"/>', GEOMS, '<option gravity="0 0 0"/>')).camera.distance
+  const far = framed(model('<geom type="box" size=".05 .05 .05" pos="0 0 9"/>', GEOMS, '<option gravity="0 0 0"/>')).camera.distance
+  assert.ok(close > wide)
+  assert.equal(far, wide)
+})
+
+test('the floor is the plane of the model, or under everything, and there is none where nothing falls', () => {
+  const plane = '<geom type="plane" size="1 1 1" pos="0 0 -.5"/>'
+  assert.equal(framed(model(plane)).framing.floor(), -0.5)
+  const { framing } = framed(model(''))
+  assert.ok(framing.floor() < -0.3 && framing.floor() > -0.6, `${framing.floor()}`)
+  assert.equal(framed(model('', GEOMS, '<option gravity="0 0 0"/>')).framing.floor(), null)
+})
+
+test('what fills the picture is told for any camera', () => {
+  const { framing, camera } = framed(model('', '<geom type="sphere" size=".2"/>', '<option gravity="0 0 0"/>'))
+  const part = framing.fill(camera)
+  assert.ok(part > 0.4 && part < 0.81 / 1.6, `${part}`)
+  assert.ok(Math.abs(framing.fill({ ...camera, distance: 3 * camera.distance }) / part - 1 / 9) < 0.01)
+  assert.equal(framing.fill({ ...camera, target: [50, 0, 0] }), 0)
+})
+
+test('a model in which nothing moves has no camera of its own', () => {
+  const lab = new Lab(engine, compile(engine, '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'), config(), code({}))
+  lab.start()
+  const framing = new Framing(lab, DIRECTION)
+  framing.begin()
+  framing.see(lab)
+  lab.dispose()
+  assert.equal(framing.fit(), null)
+  assert.equal(framing.floor(), null)
+})
+
+test('a run in which something flies off is left out', () => {
+  const lab = new Lab(engine, compile(engine, model('', GEOMS, '<option gravity="0 0 0"/>')), config(), code({}))
+  lab.start()
+  const framing = new Framing(lab, DIRECTION)
+  const run = (z) => {
+    framing.begin()
+    lab.data.qpos[2] = z
+    lab.dirty = true
+    framing.see(lab)
+    return framing.fit().distance
+  }
+  const [first, near, far] = [run(1), run(2), run(90)]
+  lab.dispose()
+  assert.ok(near > first)
+  assert.equal(far, near)
+})
