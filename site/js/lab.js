@@ -7,6 +7,7 @@
 import { h } from './lab/page/dom.js'
 import { Instrument } from './lab/page/instrument.js'
 import { mountCustom } from './lab/page/custom.js'
+import { Workbench } from './lab/page/workbench.js'
 import { readLink } from './lab/page/share.js'
 import { missing } from './lab/page/support.js'
 import { fill } from './lab/page/words.js'
@@ -26,8 +27,8 @@ export async function mountLab(element, texts) {
     const response = await fetch(base)
     if (!response.ok) throw new Error(words('lab.live.not_found', { status: response.status }))
     const config = await response.json()
-    const make = config.kind && config.kind !== 'simlab' ? mountCustom : (...rest) => new Instrument(...rest)
-    const instrument = await make(element, config, base, words)
+    const Kind = { simlab: Instrument, mjcf: Workbench }[config.kind ?? 'simlab']
+    const instrument = await (Kind ? new Kind(element, config, base, words) : mountCustom(element, config, base, words))
     const link = await readLink(window.location.hash)
     if (link?.id === config.id && link.state !== null) instrument.restore?.(link.state)
     return instrument

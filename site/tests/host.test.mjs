@@ -328,6 +328,35 @@ test('what cannot be loaded is told; messages that came early are not lost, and 
   assert.deepEqual(bench.messages.filter(({ lab }) => lab === 'f'), [])
 })
 
+test('a model that the reader wrote is compiled here; what MuJoCo says of it is told, and what is too much is refused', async () => {
+  const bench = new Bench({ codes: { plain } })
+  const world = (text) => `<mujoco>\n<worldbody>${text}</worldbody>\n</mujoco>`
+  for (const [xml, wrong] of [
+    [world('<geom size="1"/>'), null],
+    [world('\n<geom size="1" foo="2"/>'), /unrecognized attribute: 'foo'\nElement 'geom', line 3/],
+    [world('<goem/>'), /unrecognized element\nElement 'goem', line 2/],
+    [world('<geom>'), /MISMATCHED_ELEMENT .* Line number=2/s],
+    ['', /empty/],
+    ['<mujoco><include file="a.xml"/></mujoco>', /opening file 'a.xml'\nElement 'include', line 1/],
+    ['<mujoco><asset><mesh file="a.stl"/></asset></mujoco>', /opening file 'a.stl'/],
+    ['<mujoco><extension><plugin plugin="a.b"/></extension></mujoco>', /plugin a.b not found/],
+    ['<mujoco><asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset></mujoco>', /no room for this model/],
+    ['<mujoco><asset><hfield name="h" nrow="1000" ncol="1000" size="1 1 1 1"/></asset></mujoco>', /nhfielddata is 1000000, and/],
+    ['<mujoco><size memory="1900M"/></mujoco>', /allocate memory|no room/],
+    [world('<replicate count="2001"><geom size="1"/></replicate>'), /ngeom is 2001, and a page shows models up to 2000/],
+    [world(`${'<body>'.repeat(2000)}${'</body>'.repeat(2000)}`), /ELEMENT_DEPTH_EXCEEDED/],
+    [world('<body><freejoint/><geom size="1"/></body>'), null],
+  ]) {
+    bench.take()
+    await bench.load('a', { xml }, 'plain', 'missing')
+    const [{ type, kind, message, fatal }] = bench.messages
+    assert.deepEqual([type, kind, fatal], wrong ? ['error', 'load', false] : ['ready', undefined, undefined], `${xml.slice(0, 90)}: ${message}`)
+    if (wrong) assert.match(message, wrong)
+  }
+  bench.send({ type: 'ping' })
+  assert.equal(bench.of('pong').length, 1)
+})
+
 test('an engine that cannot be had is told, and tried again for the next lab', async () => {
   const bench = new Bench({ codes: { plain } })
   const { compile: working } = bench.host.around

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { Connection } from '../js/lab/page/connection.js'
 
-function setUp() {
+function setUp(url = 'worker.js') {
   const workers = []
   const start = () => {
     const worker = {
@@ -16,7 +16,7 @@ function setUp() {
     workers.push(worker)
     return worker
   }
-  return { workers, connection: new Connection('worker.js', start) }
+  return { workers, connection: new Connection(url, start) }
 }
 
 test('all labs share one worker, which starts with the first', () => {
@@ -73,4 +73,23 @@ test('a worker that does not start is told as an error', () => {
     got.map(({ type, fatal }) => [type, fatal]),
     [['error', true]],
   )
+})
+
+test('a worker of one lab ends with it, and when it does not answer', (t) => {
+  t.mock.timers.enable({ apis: ['setInterval'] })
+  const { workers, connection } = setUp('worker.js#a')
+  const got = []
+  connection.open('a', ({ kind }) => got.push(kind)).close()
+  assert.ok(workers[0].ended)
+  const line = connection.open('a', ({ kind }) => got.push(kind))
+  for (let i = 0; i < 10; i++) {
+    t.mock.timers.tick(5000)
+    workers[1].onmessage({ data: { type: 'pong' } })
+  }
+  assert.ok(!workers[1].ended, 'it answers')
+  t.mock.timers.tick(60_000)
+  assert.ok(workers[1].ended)
+  assert.deepEqual(got, ['worker'], 'told once')
+  assert.equal(workers[0].sent.filter(({ type }) => type === 'ping').length, 0)
+  line.close()
 })

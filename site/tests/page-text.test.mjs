@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { deflateRawSync } from 'node:zlib'
+import { readError } from '../js/lab/page/editor.js'
 import { fillScript, pythonLiteral } from '../js/lab/page/export.js'
 import { placeOf } from '../js/lab/page/notices.js'
 import {
@@ -145,6 +146,28 @@ test('links that are not of a lab, or broken, give no state', async () => {
 test('a link that unfolds to very much gives no state', async () => {
   const bytes = deflateRawSync(Buffer.concat([Buffer.from('{"v":[]}\n'), Buffer.alloc(16 << 20)]))
   assert.deepEqual(await readLink(`#lab=x&z=${bytes.toString('base64url')}`), { id: 'x', state: null })
+})
+
+test('a model that the reader wrote goes into a link, if it is not too long for one', async () => {
+  const state = { values: [], steps: 0, time: 0, physics: new Float64Array() }
+  const text = '<mujoco model="Ärm 😀">\n\t<worldbody/>\n</mujoco>'
+  const { link, whole } = await writeLink('a', { ...state, text })
+  assert.ok(whole)
+  assert.equal((await readLink(link)).state.text, text)
+  const long = await writeLink('a', { ...state, text: '<geom size="1"/>\n'.repeat(6000) })
+  assert.equal((await readLink(long.link)).state.text, undefined, 'unfolds to more than a page takes')
+  const noise = Array.from({ length: 20_000 }, (_, i) => Math.sin(i).toString(36)).join('')
+  assert.ok(!(await writeLink('a', { ...state, text: noise })).whole)
+})
+
+test('what MuJoCo says of a model is told with its line, in its words', () => {
+  for (const [message, line, text] of [
+    ["XML Error: Schema violation: unrecognized attribute: 'foo'\nElement 'geom', line 3\n\n", 3, "Schema violation: unrecognized attribute: 'foo'\nElement 'geom', line 3"],
+    ["Error: unknown transmission target 'q' for actuator id = 0\nElement name '', id 0, line 6\n", 6, "unknown transmission target 'q' for actuator id = 0\nElement name '', id 0, line 6"],
+    ['XML parse error 14:\nError=XML_ERROR_MISMATCHED_ELEMENT ErrorID=14 (0xe) Line number=3: XMLElement name=geom\n\n', 3, "XML: mismatched element\nElement 'geom'"],
+    ['XML parse error 8:\nError=XML_ERROR_PARSING_TEXT ErrorID=8 (0x8) Line number=1\n\n', 1, 'XML: parsing text'],
+    ["Error: Error opening file 'line 7.stl'\n", 0, "Error opening file 'line 7.stl'"],
+  ]) assert.deepEqual(readError(message), { line, text })
 })
 
 test('older links, with the physics in the JSON, are read', async () => {

@@ -74,9 +74,18 @@ raise SystemExit
 
 [^n]: A note with $y$.
 """
-OTHER = (
-    '## More {#more}\n\nBack to [it](lesson:0.1#part).\n\n```lab simlab\n{"model": "box"}\n```\n'
-)
+OTHER = """## More {#more}
+
+Back to [it](lesson:0.1#part).
+
+```lab simlab
+{"model": "box"}
+```
+
+```lab mjcf
+<mujoco/>
+```
+"""
 
 
 def site(make: Make, text: str = LESSON, **texts: str) -> dict[str, bytes]:
@@ -198,6 +207,16 @@ def test_a_lesson_as_a_notebook(files: dict[str, bytes]) -> None:
 def test_a_lesson_without_scripts_needs_no_setup(files: dict[str, bytes]) -> None:
     made = cells(files["lessons/1.1-spinning.ipynb"])
     assert {cell["cell_type"] for cell in made} == {"markdown"}
+
+
+def test_a_model_that_readers_edit_is_shown_as_code(files: dict[str, bytes]) -> None:
+    lesson = "lessons/1.1-spinning"
+    (text,) = (source(cell) for cell in cells(files[f"{lesson}.ipynb"]) if "mujoco" in source(cell))
+    for shown in (files[f"{lesson}.md"].decode(), text):
+        assert "A simulation of a model of its own.\n\n```xml\n<mujoco/>\n```\n" in shown
+    page = files[f"{lesson}.html"].decode()
+    still = page[page.index('data-kind="mjcf"') :].partition("</section>")[0]
+    assert '<code class="language-xml">' in still
 
 
 def test_ids_of_cells_stay_where_others_are_edited(make: Make, files: dict[str, bytes]) -> None:

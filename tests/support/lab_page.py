@@ -14,7 +14,7 @@ from playwright.sync_api import BrowserContext, Locator, Page, Request, Route, e
 
 from support.chromium import SLOW
 
-SWING, AUTO, ALL, TWINS = 0, 1, 2, 3
+SWING, AUTO, ALL, TWINS, EDITED = 0, 1, 2, 3, 4
 """The labs of the page, by number."""
 
 MOUNT = """async (number) => {

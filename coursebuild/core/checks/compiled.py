@@ -115,7 +115,7 @@ def broken_model(
     model: MjcfModel, result: CompileResult, readable: Callable[[str], str]
 ) -> Diagnostic:
     """Why a model does not compile."""
-    span = _line(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
+    span = line_span(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
     message = f"the model `{model.name}` does not compile: {readable(result.error)}"
     return diagnose("model-error", span, message)
 
@@ -146,7 +146,8 @@ def _parts(course: Course, models: Mapping[str, CompileResult]) -> set[str]:
     }
 
 
-def _line(code: Excerpt, line: int | None, before: int, otherwise: Span) -> Span:
+def line_span(code: Excerpt, line: int | None, before: int, otherwise: Span) -> Span:
+    """A line of a model, from 1, which has `before` more lines in front when it is compiled."""
     if line is None or not 1 <= line - before <= code.text.count("\n") + 1:
         return otherwise
     row = code.lines()[line - before - 1]
@@ -176,7 +177,7 @@ def _check_text(
             )
         return
     if result.error:
-        span = _line(text.code, result.line, text.lines_before, block.span.first_line())
+        span = line_span(text.code, result.line, text.lines_before, block.span.first_line())
         what, help = "this block", ""
         if isinstance(block, FeatureBlock):
             what = f"the model in this {kind_of_block(block).name}"

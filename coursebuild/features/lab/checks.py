@@ -10,16 +10,16 @@ from collections.abc import Callable, Iterable, Iterator
 from coursebuild.core.model import Course, Document, FeatureBlock, document_blocks
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.model import TRIED, Lab
 
 _FOLDER = "content/labs/"
 
 
 def lab_kinds(course: Course) -> frozenset[str]:
-    """`simlab`, and each `content/labs/NAME.js` that the course brings."""
+    """Those that there are, and each `content/labs/NAME.js` that the course brings."""
     names = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
     own = (name.removesuffix(".js") for name in names if name.endswith(".js"))
-    return frozenset((SIMLAB, *(name for name in own if "/" not in name)))
+    return frozenset((*TRIED, *(name for name in own if "/" not in name)))
 
 
 def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:

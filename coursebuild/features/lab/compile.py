@@ -20,7 +20,7 @@ from typing import Any, Literal
 
 from msgspec import Struct, to_builtins
 
-from coursebuild.features.lab.model import Entry, Lab
+from coursebuild.features.lab.model import MJCF, Entry, Lab
 from coursebuild.features.lab.schema import Button, Control, Overlays, Plot, Select, SimLab
 
 _NAMES = "{model, data, mj, sim, ctx, lib}"
@@ -155,6 +155,8 @@ def config_json(lab: Lab, name: str) -> str:
             for c in fields.expect
         ],
     }
+    if lab.kind == MJCF and lab.xml is not None:
+        config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n")}
     data = to_builtins(config)
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 

@@ -86,11 +86,12 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
             continue
         name, lab = trial.line.name, trial.output
         data = json.loads(lab.config)
+        edited = "xml" in data  # which the page compiles, in a worker that ends with it
         # Labs of the same model share its file.
         parts = {
             "module": publish(f"{name}.js", lab.module.encode()),
-            "mjb": publish(f"{data.get('model') or name}.mjb", lab.mjb),
-            "worker": worker,
+            "mjb": "" if edited else publish(f"{data.get('model') or name}.mjb", lab.mjb),
+            "worker": f"{worker}#{name}" if edited else worker,
             "wasm": wasm,
         }
         addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}

@@ -19,7 +19,7 @@ from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab
 from coursebuild.features.lab.engines.files import engine_digest
 from coursebuild.features.lab.engines.native import native_digest
-from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.model import TRIED, Lab
 
 SECONDS = 60.0
 """Processor time that a trial may take."""
@@ -37,7 +37,7 @@ def lab_trials(course: Course) -> Iterator[Trial]:
 def trial_inputs(trial: Trial) -> Inputs | None:
     """Those of a lab; `None` for one of the course's own kinds, which is not run."""
     lab = trial.block
-    if not isinstance(lab, Lab) or lab.kind != SIMLAB:
+    if not isinstance(lab, Lab) or lab.kind not in TRIED:
         return None
     return inputs_of(lab, compile_lab(lab, trial.name))
 

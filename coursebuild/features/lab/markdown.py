@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from coursebuild.core.model import ModelTarget
-from coursebuild.core.pages.marks import code_span, escaped, link, picture, table
+from coursebuild.core.pages.marks import code_span, escaped, fence, link, picture, table
 from coursebuild.core.pages.quantities import number
 from coursebuild.features.lab.files import LabRecord
-from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.model import MJCF, Lab
 from coursebuild.features.lab.page import (
     control_view,
     overlay_name,
@@ -37,6 +37,8 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     if live is not None and record is not None:
         parts += _recorded(writer, title, live.picture, record)
     parts.append(_about(writer, lab))
+    if lab.kind == MJCF and lab.xml is not None:
+        parts.append(fence("xml", lab.xml.text))
     if lab.fields.controls:
         views = [control_view(texts, control) for control in lab.fields.controls]
         rows = [(_cell(view.label), _cell(view.values)) for view in views]

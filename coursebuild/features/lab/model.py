@@ -15,6 +15,10 @@ from coursebuild.features.lab.schema import SimLab, Verify
 
 SIMLAB = "simlab"
 """The kind of a lab that names none."""
+MJCF = "mjcf"
+"""That of a lab whose model the reader edits."""
+TRIED = (SIMLAB, MJCF)
+"""Kinds that are tried; all others are a course's own."""
 Entry: TypeAlias = tuple[str | int, ...]
 """The way to a value inside the lab's JSON: `("controls", 2, "set")`."""
 _NAMED_BY = {"controls": ("set", "apply", "run", "label"), "expect": ("expr", "diverges")}
@@ -25,10 +29,10 @@ class Lab(FeatureBlock, frozen=True):
     """A live simulation."""
 
     kind: str
-    """`simlab`, or the name of a kind that the course adds."""
+    """`simlab`, `mjcf`, or the name of a kind that the course adds."""
     kind_span: Span
     config: str
-    """The JSON as written, for the browser and for kinds that only their own code understands."""
+    """The text as written: JSON, which of some kinds only their own code understands, or MJCF."""
     fields: SimLab
     """What the author says; of a kind of the course's own, what labs of every kind have."""
     note: tuple[Block, ...] = ()

@@ -39,7 +39,8 @@ class NamedPart(Struct, frozen=True):
 def references(lab: Lab) -> list[NamedPart]:
     """All that the pieces of a lab name outside of themselves."""
     code = dict(lab.code)
-    return [one for piece in pieces(lab) for one in _references(code[piece.entry])]
+    texts = (code[piece.entry] for piece in pieces(lab) if piece.entry in code)
+    return [one for text in texts for one in _references(text)]
 
 
 def _references(code: Excerpt) -> Iterator[NamedPart]:

@@ -19,7 +19,7 @@ from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.lab.files import ShownLab
-from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.model import MJCF, Lab
 from coursebuild.features.lab.schema import Control, Select, Slider
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
         recorded=_recorded(page, block, live),
         paper=_paper(page, live.name) if live is not None else None,
         title=title_of(page, block),
+        source=_source(page, block),
         note=page.blocks(block.note),
         model_href=page.href(ModelTarget(fields.model)) if fields.model is not None else None,
         start=start_name(page, block),
@@ -87,6 +88,14 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
         plots=tuple(plot_view(words, block, index) for index in range(len(fields.plots))),
         overlays=tuple(overlay_name(words, name) for name in fields.toggles),
     )
+
+
+def _source(page: PageContext, block: Lab) -> Markup:
+    """The model that the reader can edit, as code."""
+    if block.kind != MJCF or block.xml is None:
+        return Markup("")
+    html = page.highlight("xml", block.xml.text.rstrip("\n"))
+    return page.template("blocks/code.html", language="xml", html=html)
 
 
 def shown_lab(page: PageContext, block: Lab) -> ShownLab | None:

@@ -2,42 +2,85 @@
 
 Entry points: `parse_fence`, `sim_lab` (a lab that stands inside other JSON, as in a quiz).
 
-1. The JSON is read into nodes, and these into the declared fields.
-2. A `simlab` is checked to its end; of another kind only the fields that all labs have, since the
+1. The text of a fence `lab mjcf` is a model; the rest is said by keys. Of any other it is JSON.
+2. The JSON is read into nodes, and these into the declared fields.
+3. A `simlab` is checked to its end; of another kind only the fields that all labs have, since the
    rest is for its own code.
-3. The Markdown in it is parsed, and all of it becomes a `Lab`.
+4. The Markdown in it is parsed, and all of it becomes a `Lab`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
-from msgspec import Struct
+from msgspec import Struct, ValidationError, convert
 
 from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.info import kind_of
+from coursebuild.core.syntax.fields import Positive
+from coursebuild.core.syntax.info import Word, kind_of
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, sort_diagnostics
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.features.lab.model import SIMLAB, Entry, Lab
+from coursebuild.features.lab.model import MJCF, SIMLAB, Entry, Lab
 from coursebuild.features.lab.relations import check_lab
-from coursebuild.features.lab.schema import CommonLab, SimLab
+from coursebuild.features.lab.schema import (
+    OVERLAYS,
+    CommonLab,
+    Expect,
+    Height,
+    SimLab,
+    Verify,
+)
 
 _CODE = ("setup", "controller", "set", "apply", "run", "expr")
 """Fields that hold JavaScript."""
+_KEYS = {
+    "title": (str, "a text"),
+    "height": (Height, "a whole number from 80 to 2000"),
+    "seconds": (Positive, "a number above 0"),
+    "rtol": (Positive, "a number above 0"),
+    "diverges": (Positive, "a number above 0"),
+}
+"""Keys of a fence `lab mjcf`, and what their values are."""
+_START = "if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0);"
+"""Such a lab starts from the model's first keyframe."""
 
 
 def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
     """The lab of a fence; its kind may stand after the word `lab`."""
     keys = fence.keys(named=True)
     name = keys.value.name
+    if name is not None and name.key == MJCF:
+        return _parse_mjcf(fence, name)
     kind, place = (SIMLAB, kind_of(fence.info).span()) if name is None else (name.key, name.span)
     lab = parse_lab(fence.span, kind, place, fence.body, texts)
     return Parsed(lab.value, (*keys.diagnostics, *lab.diagnostics))
+
+
+def _parse_mjcf(fence: Fence, name: Word) -> Parsed[Lab | None]:
+    """A lab whose model the reader edits."""
+    keys = fence.keys(values=tuple(_KEYS), flags=("dock", "deep"), named=True)
+    found, given = list(keys.diagnostics), dict[str, Any]()
+    for word in keys.value.words:
+        type, what = _KEYS.get(word.key, (bool, ""))
+        try:
+            value = True if word.value is None else convert(word.value, type, strict=False)
+            given[word.key] = value
+        except ValidationError:
+            message = f"`{word.value}` is not {what}"
+            found.append(diagnose("fence-key-value", word.value_span, message))
+    verify = Verify(**{key: given.pop(key) for key in ("seconds", "rtol", "deep") if key in given})
+    diverges = given.pop("diverges", None)
+    claims = () if diverges is None else (Expect(t=diverges, diverges=True),)
+    fields = SimLab(**given, toggles=OVERLAYS, setup=_START, expect=claims, verify=verify)
+    body = fence.body
+    lab = Lab(fence.span, MJCF, name.span, body.text, fields, xml=body)
+    return Parsed(None if found else lab, tuple(found))
 
 
 def parse_lab(

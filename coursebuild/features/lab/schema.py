@@ -8,13 +8,14 @@ fields hang together (`min` below `max`, an `expect` that names a control) is ch
 
 # Annotations are no texts here: msgspec would evaluate each again in every struct that inherits it.
 
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
 from msgspec import Meta, Struct
 
 from coursebuild.core.syntax.fields import Digits, NotNegative, OptionalBlocks, Positive, Text
 
 Overlay: TypeAlias = Literal["frames", "contacts", "forces", "com", "inertia", "joints"]
+OVERLAYS: tuple[Overlay, ...] = get_args(Overlay)
 Scalar: TypeAlias = float | str
 Step: TypeAlias = Text | dict[str, Scalar]
 Height: TypeAlias = Annotated[int, Meta(ge=80, le=2000)]

@@ -40,7 +40,7 @@ from coursebuild.features.lab.export import difference as export_check
 from coursebuild.features.lab.export.trial import LabExport, exported
 from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
-from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.model import MJCF, TRIED, Lab
 from coursebuild.features.lab.models import LabModel, model_of_lab, saved_model
 from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import TrialReply, read_trial
@@ -111,7 +111,7 @@ class LabTrials:
         assert isinstance(lab, Lab)
         if any(lab.span.contains(diagnostic.span) for diagnostic in context.wrong):
             return None, []
-        if lab.kind != SIMLAB:
+        if lab.kind not in TRIED:
             return custom_lab(context, engines.native, trial, lab)
         model = model_of_lab(context, lab)
         if model is None:
@@ -261,7 +261,7 @@ class _Attempt(Struct, frozen=True):
 
     def _export(self, trial: TrialReply, parity: Parity | None) -> LabExport:
         """The script that does what the lab does."""
-        if trial.main is None:
+        if trial.main is None or self.lab.kind == MJCF:
             return LabExport(None)
         return exported(self.context, self.engines.native, self.trial, self.lab, trial.main, parity)
 

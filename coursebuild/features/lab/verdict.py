@@ -10,9 +10,11 @@ from collections.abc import Iterator
 
 from msgspec import Struct
 
+from coursebuild.core.checks.compiled import line_span
+from coursebuild.core.run.mjcf import error_line, readable_error
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.lab.compile import LabCode
-from coursebuild.features.lab.model import Entry, Lab
+from coursebuild.features.lab.model import MJCF, Entry, Lab
 from coursebuild.features.lab.reply import TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
 
@@ -167,6 +169,9 @@ def _failure(lab: Lab, failure: TrialFailure) -> Diagnostic:
     tried = f"while trying: {failure.during}" if failure.during not in ("", "start") else ""
     text, help = _explain(lab, failure)
     span = lab.place(failure.entry)
+    if lab.xml is not None and failure.kind == "engine":
+        line = error_line(failure.message, lab.xml.text)
+        span = line_span(lab.xml, line, 0, span)
     return diagnose(_RULES.get(failure.kind, "lab-throws"), span, text, label=tried, help=help)
 
 
@@ -190,14 +195,14 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
         case "diverged":
             help = (
                 "try a smaller timestep, another integrator, or a narrower range; if it is to "
-                'diverge, claim so: `"expect": [{"t": …, "diverges": true}]`'
+                f"diverge, claim so: {_written(lab, 'diverges')}"
             )
             return f"the simulation diverges{when}: {message}", help
         case "deep":
             help = (
                 "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts "
                 "(`solref`), or a narrower range; if they are to lie so, say so: "
-                '`"verify": {"deep": true}`'
+                f"{_written(lab, 'deep')}"
             )
             return f"bodies lie deep in each other{when}: {message}", help
         case "expect":
@@ -205,14 +210,20 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
             what = f"`{_short(expr)}` {message}" if expr is not None else message
             return f"the claim does not hold: {what}", ""
         case "timeout" if message == "did not finish in time":
-            return f"trying {name} takes too long", 'run less of it: `"verify": {"seconds": …}`'
+            return f"trying {name} takes too long", f"run less of it: {_written(lab, 'seconds')}"
         case "timeout":
             return f"{name} {message}", "look for a loop or a list without an end"
         case "shared":
             help = "labs run side by side; keep what this one needs in `ctx`"
             return f"{name} changes what all labs share: {message}", help
         case "engine":
-            return f"the browser's engine says: {message.replace('MuJoCo Error: ', '')}", ""
+            help = (
+                "a model that the reader edits is one text, beside which there are no files"
+                if lab.kind == MJCF and "opening file" in message
+                else ""
+            )
+            said = readable_error(message.replace("MuJoCo Error: ", ""))
+            return f"the browser's engine says: {said}", help
         case _:
             return message, ""
 
@@ -249,8 +260,21 @@ def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
         f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {allowed:g} is "
         "allowed",
         help="a controller that changes `model` while it runs cannot be repeated natively; where "
-        'the motion is chaotic say how far it may part: `"verify": {"rtol": …, "seconds": …}`',
+        f"the motion is chaotic say how far it may part: {_written(lab, 'parity')}",
     )
+
+
+_WRITTEN = {
+    "diverges": ('"expect": [{"t": …, "diverges": true}]', "diverges=…"),
+    "deep": ('"verify": {"deep": true}', "deep"),
+    "seconds": ('"verify": {"seconds": …}', "seconds=…"),
+    "parity": ('"verify": {"rtol": …, "seconds": …}', "rtol=… seconds=…"),
+}
+
+
+def _written(lab: Lab, what: str) -> str:
+    """How a lab says something: in its JSON, or by keys of its fence."""
+    return f"`{_WRITTEN[what][lab.kind == MJCF]}`"
 
 
 def _short(code: str) -> str:

@@ -7,13 +7,14 @@ import json
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import Paragraph
+from coursebuild.core.model import BlockQuote, Paragraph
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.schema import (
     Button,
     Camera,
+    Expect,
     Overlays,
     Select,
     SimLab,
@@ -116,6 +117,19 @@ def test_of_another_kind_only_what_all_have_is_checked() -> None:
         "2:51-54 field-repeated: `a` is given twice",
     ]
     assert told("[]", "graph") == ["2:1-2 field-type: the lab must be an object, not an array"]
+
+
+def test_a_model_that_readers_edit() -> None:
+    head = 'lab mjcf title="A ball" height=100 seconds=2 rtol=1e-6 diverges=3 deep dock'
+    source = Source("content/lessons/4.2-x.md", f"> ```{head}\n> <mujoco/>\n> ```\n")
+    (quoted,) = parse_document(source, frozenset(), lesson=True).value.blocks
+    assert isinstance(quoted, BlockQuote)
+    (lab,) = quoted.blocks
+    assert isinstance(lab, Lab) and lab.xml is not None
+    fields = lab.fields
+    assert (lab.kind, lab.xml.text, lab.xml.span().line) == ("mjcf", "<mujoco/>\n", 2)
+    assert (fields.title, fields.height, lab.is_docked()) == ("A ball", 100, True)
+    assert (lab.verify, fields.expect) == (Verify(2.0, 1e-6, True), (Expect(3.0, diverges=True),))
 
 
 def test_in_a_lesson() -> None:

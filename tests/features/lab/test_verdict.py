@@ -164,3 +164,16 @@ def test_a_reply_with_holes_is_read() -> None:
     assert trial.tried == ("start",)
     assert trial.steps_per_second is None
     assert trial.failures == (TrialFailure((), "throws", "something that has no text", None, ""),)
+
+
+def test_what_only_the_browsers_engine_says_of_an_edited_model_is_told_at_its_line() -> None:
+    text = '```lab mjcf\n<mujoco>\n  <include file="part.xml"/>\n</mujoco>\n```\n'
+    parsed = parse_document(Source("content/lessons/4.2-x.md", text), frozenset(), lesson=True)
+    (lab,) = parsed.value.blocks
+    assert isinstance(lab, Lab)
+    message = "XML Error: Error opening file 'part.xml'\nElement 'include', line 2\n\n"
+    failure = TrialFailure((), "engine", message, None, "start")
+    (told,) = trial_diagnostics(lab, TrialReply("3.14.0", (), (failure,), None, None))
+    assert (told.rule, told.span.text) == ("lab-engine", '<include file="part.xml"/>')
+    said = "the browser's engine says: error opening file 'part.xml' in <include>"
+    assert (told.message, "beside which there are no files" in told.help) == (said, True)

@@ -2,7 +2,7 @@
  * MuJoCo's WebAssembly build, and the models that it holds.
  *
  *   createEngine(loadMujoco, module) → Promise<Engine>
- *   engine.load(bytes)               → Handles
+ *   engine.load(model)               → Handles
  *
  * The bindings hand out C++ objects that JavaScript does not collect. Here each has one owner, who deletes it once:
  * `Handles` owns a model with its data, and whoever calls `load` owns the handles. `model.opt`, `data.warning` and the like
@@ -14,6 +14,7 @@ export class EngineError extends Error {
   constructor(message, fatal = false) {
     super(message)
     this.name = 'EngineError'
+    this.kind = 'load'
     this.fatal = fatal
   }
 }
@@ -88,20 +89,20 @@ export class Engine {
   }
 
   /**
-   * Load a compiled model.
+   * Load a model.
    *
-   * @param {Uint8Array} bytes an MJB file of the same engine version
+   * @param {Uint8Array | string} model an MJB file of the same engine version, or MJCF
    * @returns {Handles}
    */
-  load(bytes) {
-    return new Handles(this.mj, bytes)
+  load(model) {
+    return new Handles(this.mj, model)
   }
 }
 
 /** A model, its data, and a second data for looking at (see `lab.js`). */
 export class Handles {
-  constructor(mj, bytes) {
-    this.model = readModel(mj, bytes)
+  constructor(mj, model) {
+    this.model = typeof model === 'string' ? compileModel(mj, model) : readModel(mj, model)
     this.owned = [this.model]
     try {
       this.data = this.own(new mj.MjData(this.model))
@@ -143,6 +144,31 @@ function readModel(mj, bytes) {
   }
   if (model === null || model === undefined) throw new EngineError('the model does not load')
   return model
+}
+
+/** How much of what a page has to draw it draws without becoming slow. */
+const MOST = { ngeom: 2000, nsite: 2000, nlight: 100, nmeshface: 200_000, nhfielddata: 500_000, ntexdata: 64 << 20 }
+
+/** Compile MJCF that a reader may have written. It lies in no folder: a file that it names is not found. */
+function compileModel(mj, text) {
+  const model = compiled(mj, text)
+  const beyond = Object.keys(MOST).find((name) => model[name] > MOST[name])
+  if (beyond === undefined) return model
+  const has = model[beyond]
+  model.delete()
+  throw new EngineError(`${beyond} is ${has}, and a page shows models up to ${MOST[beyond]}`)
+}
+
+function compiled(mj, text) {
+  try {
+    return mj.MjModel.from_xml_string(text)
+  } catch (error) {
+    const message = String(error.message).trim()
+    const told = message.replace(/^MuJoCo Error: (Loading error: )?/, '')
+    // What is thrown by C++ itself, for lack of memory, has only the name of what it wanted to make.
+    const reason = told === message ? `the engine has no room for this model (${message})` : told
+    throw new EngineError(reason, error instanceof WebAssembly.RuntimeError)
+  }
 }
 
 /** The numbers of the enumerators that the lab needs: `k.obj.BODY`, `k.vis.COM`, `k.state.INTEGRATION`, … */

@@ -1,7 +1,7 @@
 /**
  * A lab: a model, the author's code, and the rules by which the code is run.
  *
- *   const lab = new Lab(engine, bytes, config, code)
+ *   const lab = new Lab(engine, source, config, code)
  *   lab.start(); lab.step(100); lab.readouts(); lab.dispose()
  *
  * There are two MjData. `data` is the simulation. `shown` is brought up to date from it with mj_forward whenever something is
@@ -23,18 +23,18 @@ import { Watch } from './watch.js'
 export class Lab {
   /**
    * @param {import('./engine.js').Engine} engine
-   * @param {Uint8Array} bytes the model, an MJB file
+   * @param {Uint8Array | string} source the model, an MJB file or MJCF
    * @param {object} config the lab's data (coursebuild/features/lab/compile.py)
    * @param {object} code the lab's functions (ditto)
    * @param {{play?: () => void, pause?: () => void}} [host] what `sim.play()` and `sim.pause()` do besides
    */
-  constructor(engine, bytes, config, code, host = {}) {
+  constructor(engine, source, config, code, host = {}) {
     this.engine = engine
     this.config = config
     this.code = code
     this.host = host
     this.recorder = null // of each step, for the trial
-    this.handles = engine.load(bytes)
+    this.handles = engine.load(source)
     try {
       this.build()
     } catch (error) {

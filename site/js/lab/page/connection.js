@@ -3,7 +3,12 @@
  *
  *   const line = connection(workerUrl).open(id, receive)
  *   line.send({ type: 'play' }); line.close()
+ *
+ * A lab with a `#` in the address of its worker has one of its own, which ends with the lab, and when it is silent for too long.
  */
+
+const BEAT = 5000 // ms between two questions to a worker of one lab
+const MISSED = 3 // that it may leave without an answer
 
 const connections = new Map()
 
@@ -20,6 +25,7 @@ export class Connection {
     this.start = start
     this.worker = null
     this.lines = new Map()
+    this.own = url.includes('#')
   }
 
   /**
@@ -36,7 +42,8 @@ export class Connection {
       send: (message, transfer = []) => this.worker?.postMessage({ ...message, lab: id }, transfer),
       close: () => {
         if (!this.lines.delete(id)) return
-        this.worker?.postMessage({ type: 'dispose', lab: id })
+        if (this.own) this.end()
+        else this.worker?.postMessage({ type: 'dispose', lab: id })
       },
     }
   }
@@ -49,7 +56,10 @@ export class Connection {
 
   begin() {
     this.worker = this.start(this.url)
+    this.silence = 0
+    if (this.own) this.beat = setInterval(() => this.ask(), BEAT)
     this.worker.onmessage = ({ data }) => {
+      this.silence = 0
       this.lines.get(data.lab)?.(data)
       if (data.type === 'error' && data.fatal) this.fail('the engine has ended', data.lab)
     }
@@ -57,10 +67,22 @@ export class Connection {
     this.worker.onmessageerror = () => this.fail('a message of the worker cannot be read')
   }
 
-  // The engine's memory is gone with the worker: every lab has to be told, and the next one starts a new worker.
-  fail(message, told = null) {
+  /** See whether the worker still answers. */
+  ask() {
+    if (this.silence === MISSED) this.fail('it takes too long, or too much memory')
+    this.silence += 1
+    this.worker?.postMessage({ type: 'ping' })
+  }
+
+  end() {
+    clearInterval(this.beat)
     this.worker?.terminate()
     this.worker = null
+  }
+
+  // The engine's memory is gone with the worker: every lab has to be told, and the next one starts a new worker.
+  fail(message, told = null) {
+    this.end()
     for (const [id, receive] of [...this.lines]) {
       if (id === told) continue
       receive({ type: 'error', message, entry: [], kind: 'worker', fatal: true })

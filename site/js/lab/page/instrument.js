@@ -100,7 +100,7 @@ export class Instrument {
     return h(
       'div',
       { class: 'lab-foot' },
-      act('link', () => this.simulation.save()),
+      act(...this.sharing()),
       config.exportPython ? act('export', () => this.export()) : null,
       help,
     )
@@ -223,15 +223,27 @@ export class Instrument {
     else this.simulation.restore(state)
   }
 
+  /** What the button for a link says, and does. */
+  sharing() {
+    return ['link', () => this.simulation.save()]
+  }
+
   async share(state) {
     const { link, whole } = await writeLink(this.config.id, state)
+    const key = await this.copy(link)
+    if (whole) this.notices.show(this.words(key), 'note')
+    else this.notices.show(`${this.words(key)} ${this.words('lab.live.link_controls')}`, 'warning')
+  }
+
+  /** Put a link into the address bar and, where that is allowed, the clipboard; gives the key of the text that says so. */
+  async copy(link) {
     const address = new URL(window.location.href)
     address.hash = link
     window.history.replaceState(null, '', address)
-    let key = 'lab.live.link_copied'
-    await navigator.clipboard.writeText(address.href).catch(() => (key = 'lab.live.link_shown'))
-    if (whole) this.notices.show(this.words(key), 'note')
-    else this.notices.show(`${this.words(key)} ${this.words('lab.live.link_controls')}`, 'warning')
+    return navigator.clipboard.writeText(address.href).then(
+      () => 'lab.live.link_copied',
+      () => 'lab.live.link_shown',
+    )
   }
 
   export() {

@@ -4,22 +4,25 @@
  * TEXT is base64url of a deflated content: JSON on one line (`v` the values of the controls, `n` the steps since the reset, `t` the
  * time in s), and after the line's end the whole physics as 64-bit floats, to the last bit. Where all this is too long for a link,
  * the physics is left out, and it holds the controls only. A browser that cannot deflate writes `s=TEXT`, the content as it is; in
- * older links that has the physics in the JSON, as base64 (`p`).
+ * older links that has the physics in the JSON, as base64 (`p`). A model that the reader has written is in the JSON, as `x`.
  */
 
 /** Letters of a link's text: what all browsers keep in an address, and most programs that pass it on. */
 export const LONGEST = 16_000
+
+/** Characters of a model. */
+export const LONGEST_MODEL = 100_000
 
 const LARGEST = 8 << 20 // bytes that a link may unfold to
 const LINE_END = 10
 
 /**
  * @param {string} id
- * @param {{values: unknown[], steps: number, time: number, physics: Float64Array}} state
- * @returns {Promise<{link: string, whole: boolean}>} `whole`: the physics is in it
+ * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string}} state
+ * @returns {Promise<{link: string, whole: boolean}>} `whole`: all of it is there
  */
-export async function writeLink(id, { values, steps, time, physics }) {
-  const head = new TextEncoder().encode(`${JSON.stringify({ v: values, n: steps, t: time })}\n`)
+export async function writeLink(id, { values, steps, time, physics, text }) {
+  const head = new TextEncoder().encode(`${JSON.stringify({ v: values, n: steps, t: time, x: text })}\n`)
   const floats = new Uint8Array(physics.slice().buffer)
   const all = new Uint8Array(head.length + floats.length)
   all.set(head)
@@ -39,7 +42,8 @@ async function field(bytes) {
  * Read a fragment; null if it is not of a lab; without `state` if that cannot be read.
  *
  * @param {string} fragment
- * @returns {Promise<{id: string, state: {values: unknown[], steps: number, time: number, physics: Float64Array | null} | null} | null>}
+ * @returns {Promise<{id: string, state: null | {values: unknown[], steps: number, time: number, physics: Float64Array | null,
+ *   text?: string}} | null>}
  */
 export async function readLink(fragment) {
   if (!fragment.startsWith('#lab=')) return null
@@ -56,11 +60,12 @@ export async function readLink(fragment) {
 
 function parse(bytes) {
   const end = bytes.includes(LINE_END) ? bytes.indexOf(LINE_END) : bytes.length
-  const { v, n, t, p } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
+  const { v, n, t, p, x } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
   if (!Array.isArray(v)) return null
   const floats = typeof p === 'string' ? fromBase64(p) : bytes.slice(end + 1)
   const physics = floats.length > 0 ? new Float64Array(floats.buffer) : null
-  return { values: v, steps: Number.isInteger(n) && n >= 0 ? n : 0, time: Number(t) || 0, physics }
+  const state = { values: v, steps: Number.isInteger(n) && n >= 0 ? n : 0, time: Number(t) || 0, physics }
+  return typeof x === 'string' && x.length <= LONGEST_MODEL ? { ...state, text: x } : state
 }
 
 /** Bytes through a stream that deflates or inflates them. */

@@ -128,9 +128,17 @@ export class Simulation {
     this.view?.setMoving(this.state === 'playing' && on)
   }
 
-  /** From the beginning, after the engine has ended. */
+  /** Begin with another model, MJCF. */
+  load(xml) {
+    this.config = { ...this.config, xml }
+    this.again()
+  }
+
+  /** From the beginning: with a new engine, where the lab has one of its own or the engine has ended. */
   again() {
     this.line.close()
+    cancelAnimationFrame(this.request)
+    this.request = 0
     this.connect()
     for (const message of this.chosen.values()) this.send(message)
   }

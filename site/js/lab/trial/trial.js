@@ -42,7 +42,7 @@ export function stuck(now) {
 
 /** @param {import('./guard.js').Guard | null} guard of what labs share */
 export function runTrial(engine, request, bytes, now, guard = null) {
-  return new Trial(engine, request, bytes, now, guard).run()
+  return new Trial(engine, request, request.config.xml ?? bytes, now, guard).run()
 }
 
 class Trial {

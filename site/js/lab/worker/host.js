@@ -34,6 +34,7 @@ export class Host {
     if (message.type === 'warm') return void this.start(message.wasm).catch(() => {}) // a lab that needs it will tell
     if (message.type === 'load') return void this.load(message)
     const id = message.lab
+    if (message.type === 'ping') return void this.around.post({ type: 'pong', lab: id }, [])
     if (message.type === 'dispose') {
       this.sessions.get(id)?.close()
       this.sessions.delete(id)
@@ -64,11 +65,12 @@ export class Host {
     const queue = []
     this.waiting.set(id, queue)
     try {
-      const [engine, bytes, code] = await Promise.all([this.start(wasm), fetchBytes(mjb), importModule(module)])
+      const model = config.xml ?? fetchBytes(mjb)
+      const [engine, source, code] = await Promise.all([this.start(wasm), model, importModule(module)])
       if (this.waiting.get(id) !== queue) return // disposed of, or loaded again
       const session = new Session(id, post, now)
       this.sessions.set(id, session)
-      session.open(engine, bytes, config, code)
+      session.open(engine, source, config, code)
       this.waiting.delete(id)
       queue.forEach((message) => session.receive(message))
       session.show()

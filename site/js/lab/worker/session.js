@@ -7,7 +7,6 @@
 
 import { Clock } from '../core/clock.js'
 import { Lab } from '../core/lab.js'
-import { LabError } from '../core/piece.js'
 
 const CHUNK = 2 // ms of stepping between two looks at the clock
 const LEAST = 4 // ms between two frames of a lab that runs
@@ -33,10 +32,10 @@ export class Session {
   }
 
   /** Begin with what was fetched. */
-  open(engine, bytes, config, code) {
+  open(engine, source, config, code) {
     this.guard(() => {
       const host = { play: () => this.play(), pause: () => this.stop('code') }
-      this.lab = new Lab(engine, bytes, config, code, host)
+      this.lab = new Lab(engine, source, config, code, host)
       this.lab.start()
     })
     if (this.lab === null) return
@@ -117,8 +116,7 @@ export class Session {
       action()
       return true
     } catch (error) {
-      const entry = error instanceof LabError ? error.entry : []
-      const kind = error instanceof LabError ? error.kind : 'refused'
+      const { entry = [], kind = 'refused' } = error
       const fatal = kind === 'engine' || error.fatal === true || error instanceof WebAssembly.RuntimeError
       this.failed = kind !== 'refused'
       this.post('error', { message: error.message ?? String(error), entry, kind, fatal })

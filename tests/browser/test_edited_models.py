@@ -1,0 +1,112 @@
+"""Labs whose model the reader edits: mistakes at their lines, links, and models that never end."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from support.axe import violations
+from support.lab_course import PAGE
+from support.lab_page import EDITED, lab, until, watched
+
+pytestmark = pytest.mark.browser
+
+HOLDS = "([part, whole]) => document.querySelector(part).getBoundingClientRect().right <= whole"
+ENDLESS = '<option iterations="2000000000" tolerance="0" ls_iterations="9" solver="PGS"/>'
+
+
+@pytest.fixture(scope="module")
+def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
+    """A phone's window, in which the lab is near."""
+    with browsers["webgl"].new_context(viewport={"width": 390, "height": 800}) as context:
+        page, said = watched(context)
+        page.goto(base + PAGE)
+        lab(page, EDITED)
+        yield page
+        assert said == []
+
+
+def edited(page: Page) -> tuple[Locator, Locator]:
+    """The lab with the lesson's model, and its text."""
+    found = page.locator(".lab").nth(EDITED)
+    return found, found.get_by_label("The model, as MJCF")
+
+
+def press(found: Locator, name: str) -> None:
+    found.get_by_role("button", name=name, exact=True).click()
+
+
+def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) -> None:
+    found, text = edited(page)
+    lesson = text.input_value()
+    assert lesson.startswith("<mujoco>")
+    wrong = lesson.replace('<joint axis="0 1 0"', '<joint axle="0 1 0"')
+    text.fill(wrong)
+    text.press("Control+Enter")
+    alert = found.get_by_role("alert").filter(has_text="Schema violation")
+    expect(alert).to_contain_text("unrecognized attribute: 'axle'\nElement 'joint', line 5")
+    expect(text).to_have_attribute("aria-invalid", "true")
+    expect(text).to_have_accessible_description(re.compile("Line 5: Schema violation"))
+    expect(found.locator(".lab-numbers mark")).to_have_text("5")
+    assert violations(page, ".lab-editor") == []
+    press(found, "Line 5:")
+    expect(text).to_be_focused()
+    line = text.evaluate("field => field.value.slice(field.selectionStart, field.selectionEnd)")
+    assert line.strip() == '<joint axle="0 1 0" range="-20 20"/>'
+    text.press("Tab")
+    expect(text).not_to_be_focused()
+    text.fill(wrong.replace("axle", "axis").replace("0.06", "0.04"))
+    press(found, "Compile and run")
+    expect(found).to_have_attribute("data-state", "playing")
+    expect(found.locator(".lab-time")).not_to_have_text("0.00 s")
+    expect(alert).to_be_hidden()
+    expect(text).not_to_have_attribute("aria-invalid", "true")
+    assert violations(page, ".lab") == []
+    for part in (".lab-editor", ".lab-source textarea", ".lab-transport"):
+        until(page, HOLDS, [part, 390])
+    press(found, "Pause")
+    press(found, "Back to the lesson’s model")
+    expect(text).to_have_value(lesson)
+    expect(found).to_have_attribute("data-state", "playing")
+    press(found, "Back to my model")
+    expect(text).to_have_value(re.compile("0.04"))
+    expect(found).to_have_attribute("data-state", "playing")
+
+
+def test_link_carries_the_edited_model(page: Page, base: str) -> None:
+    found, text = edited(page)
+    mine = '<mujoco>\n  <worldbody><geom name="μ" size="0.3"/></worldbody>\n</mujoco>'
+    text.fill(mine)
+    press(found, "Copy link to this model")
+    expect(page).to_have_url(re.compile("#lab=1.1-lab-5&z="))
+    other = page.context.new_page()
+    other.goto(page.url)
+    linked, its_text = edited(other)
+    expect(its_text).to_have_value(mine)
+    expect(linked).to_have_attribute("data-state", "paused")
+    expect(linked.locator(".lab-message:visible")).to_have_count(0)
+    other.close()
+    text.fill("".join(str(i**0.5) for i in range(3000)))
+    press(found, "Copy link to this model")
+    expect(found.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
+
+
+def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:
+    found, text = edited(page)
+    press(found, "Back to the lesson’s model")
+    lesson = text.input_value()
+    endless = lesson.replace("<worldbody>", f"{ENDLESS}<worldbody>").replace("0 0 0.3", "0 0 0.02")
+    text.fill(endless)
+    press(found, "Compile and run")
+    expect(found).to_have_attribute("data-state", "loading")
+    expect(found.get_by_role("alert").filter(has_text="too long")).to_be_visible()
+    expect(found).to_have_attribute("data-state", "ended")
+    text.fill(endless.replace("0 0 0.02", "0 0 0.021"))
+    press(found, "Compile and run")
+    expect(found).to_have_attribute("data-state", "loading")
+    press(found, "Back to the lesson’s model")
+    expect(text).to_have_value(lesson)
+    expect(found).to_have_attribute("data-state", "playing")
