@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
+from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import refsafe_from
 from coursebuild.numerics.front import front, verdict, words
 from coursebuild.numerics.measure import Errors, Sizes, fitted_orders
@@ -114,6 +115,9 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
     if known.horizon < first.scene.scenario.duration * (1 - 1e-9):
         notes.append(f"errors count until {known.horizon:.6g} s: the motion is not known beyond")
+    driven = driving_force(model, first.scene.scenario)
+    if driven:
+        notes.append(f"energy is not judged: {driven}")
     states = np.abs(np.hstack([known.states.qpos, known.states.qvel, known.states.act]))
     if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
         notes.append("the state holds subnormal numbers, with which processors are slow")

@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 from coursebuild.core.model.scenarios import DeclaredScenario
+from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import (
     EngineStates,
     compiled,
@@ -61,7 +62,7 @@ def measure_case(problem: Problem) -> CaseReport:
         title=problem.title,
         case=problem.case,
         engine=mujoco.__version__,
-        note=problem.note,
+        note=_note(problem),
         reference=_reference(problem),
         boundaries=boundaries(problem),
         figures=tuple(
@@ -72,6 +73,13 @@ def measure_case(problem: Problem) -> CaseReport:
         orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
         errors=tuple(line for lines in runs.values() for line in lines),
     )
+
+
+def _note(problem: Problem) -> str:
+    model = compiled(problem.mjcf, Integrator.EULER, 1e-3)
+    driven = problem.search and driving_force(model, problem.scenario)
+    said = (problem.note, f"energy is not judged: {driven}" if driven else "")
+    return "; ".join(one for one in said if one)
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:

@@ -95,25 +95,28 @@ def advance(model: Any, data: Any, steps: int = 1) -> None:
 
 
 def watched(
-    model: Any, data: Any, steps: int, seen: Peaks, thickness: Array | None = None
+    model: Any,
+    data: Any,
+    steps: int,
+    seen: Peaks,
+    thickness: Array | None = None,
+    *,
+    every: int = _WATCHED,
+    setup: Setup | None = None,
 ) -> tuple[Peaks, int]:
-    """Make so many steps, and no more once the state is no number.
+    """Make so many steps; no more once the state is no number, or beyond what can be in a setup.
 
     Gives the most that was seen, with what was `seen` before, and how many steps were made. Looks
-    at every eighth state: what shoots up takes longer to come back.
+    at every eighth state, or more seldom: what shoots up takes longer to come back.
     """
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     done = 0
-    while done < steps and seen.finite:
-        part = min(_WATCHED, steps - done)
+    while done < steps and (seen.finite if setup is None else seen.within(setup)):
+        part = min(every, steps - done)
         advance(model, data, part)
         done += part
         seen = peaks(data, seen, thickness)
     return seen, done
-
-
-def bounds_of(setup: Setup) -> Peaks:
-    """The most that can be in a run."""
-    return Peaks(setup.position_bound, setup.velocity_bound, setup.penetration_bound)
 
 
 def initial_data(scenario: Scenario, model: Any) -> Any:
@@ -235,7 +238,7 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
         table[index + 1] = invariants(model, other, data.qpos, data.qvel)
         # Where a step ends, its contacts are still those of its beginning.
         seen = replace(seen, penetration=max(seen.penetration, deepest_contact(other)))
-    judgement = judge(model, data, steps * step, seen, bounds_of(setup))
+    judgement = judge(model, data, steps * step, seen, setup)
     states = EngineStates(times, qpos, qvel, act)
     return Run(states, table[:, :2], table[:, 2:], seen.penetration, judgement)
 

@@ -7,7 +7,8 @@ Entry point: `pilot(model, scene)`.
 2. Beside it runs a twin whose beginning is off by 1e-10. Where the two are a tenth apart, errors of
    trajectories mean nothing any more: that is the horizon. The growth until there is the largest
    Lyapunov exponent, about.
-3. What was seen of positions and velocities says what can be, with room for coarse timesteps.
+3. What was seen of positions, and of energy where nothing drives the motion, else of velocities,
+   says what can be, with room for coarse timesteps.
 """
 
 from __future__ import annotations
@@ -19,20 +20,17 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.detector import Peaks, peaks
+from coursebuild.numerics.detector import Peaks, driving_force, peaks
 from coursebuild.numerics.engine import advance, initial_data, integrator_of, varied
-from coursebuild.numerics.problem import Array, Scenario, Setup
+from coursebuild.numerics.problem import ROOM, Array, Scenario, Setup
 from coursebuild.numerics.scene import Scene, SceneError
 
 NUDGE = 1e-10
 """Of the twin's beginning: rad, or relative to the model's extent; velocities likewise, per s."""
 APART = 0.1
 """Where two motions have nothing in common any more: rad, or relative to the model's extent."""
-ROOM = 10.0
-"""Velocities so many times as large as those seen are called impossible, and positions that are so
-many extents (or radians) beyond."""
-
-
+_RESTING = 0.01
+"""What moves slower than this part of the speed of a fall through the model's extent is at rest."""
 _SELDOM = 8
 """Steps from one look at how large the state is to the next."""
 
@@ -68,10 +66,11 @@ def pilot(model: Any, scene: Scene) -> Pilot:
     """
     step, scenario = min(scene.timesteps), scene.scenario
     own = varied(model, integrator_of(model), step)
+    own.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data, twin = initial_data(scenario, own), initial_data(scenario, own)
     _nudge(own, twin)
     look = _Look(own)
-    seen = peaks(data, Peaks())
+    seen = Peaks()
     times, every = scenario.times, scenario.steps(step)
     gaps = np.full(len(times), np.nan)
     for index in range(len(times)):
@@ -198,8 +197,11 @@ def _bounds(model: Any, scenario: Scenario, seen: Peaks) -> Setup:
     # A hinge without limits may go round the other way.
     hinged = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
     round_and_round = 2 * seen.velocity * scenario.duration if hinged else 0.0
+    driven = bool(driving_force(model, scenario))
+    resting = float(model.body_mass.sum()) * max(_RESTING * fall, 1e-3) ** 2
     return Setup(
         scenario=scenario,
         position_bound=2 * seen.position + ROOM * max(extent, 1.0) + round_and_round,
-        velocity_bound=ROOM * max(seen.velocity, fall, 1e-3),
+        velocity_bound=ROOM * max(seen.velocity, fall, 1e-3) if driven else math.inf,
+        energy_bound=math.inf if driven else seen.energy + ROOM * max(seen.kinetic, resting),
     )

@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 
+ROOM = 10.0
+"""So many times what is seen in small steps is called impossible: velocities, or the kinetic energy
+that comes on top of all energy."""
+
 
 class Integrator(enum.Enum):
     """MuJoCo's integrators, as the attribute `integrator` of `<option>` names them."""
@@ -154,6 +158,9 @@ class Setup(Struct, frozen=True, kw_only=True):
     """Largest |qpos| that can be, in m or rad; what is beyond grows that should not."""
     velocity_bound: float = float("inf")
     """Largest |qvel| that can be, in m/s or rad/s."""
+    energy_bound: float = float("inf")
+    """Most potential and kinetic energy together that can be, J, where nothing drives the motion;
+    infinite where something does."""
     penetration_bound: float = float("inf")
     """Deepest contact that is no fault, m."""
 
@@ -180,8 +187,12 @@ class Problem(Setup, frozen=True, kw_only=True):
     """Theory of the largest stable timestep; `None` where there is none to be had."""
     search: tuple[float, float] | None = None
     """Timesteps (s) between which the largest stable one is looked for."""
-    steps: int = 10_000
-    """Steps after which what grows must have shown itself."""
+    span: float = 0.0
+    """Simulated time after which what grows must have shown itself, s: the same for all
+    timesteps."""
+    room: float = ROOM
+    """How many times the largest kinetic energy of its motion energy may rise by, where nothing
+    drives it."""
     smooth: bool = True
     """Whether errors follow a power of the timestep: not with contact, nor where the model's own
     error remains."""

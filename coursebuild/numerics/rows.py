@@ -111,7 +111,7 @@ def measured(basis: Basis, setting: MeasuredSetting) -> MeasuredRow:
         penetration=run.penetration,
     )
     if not run.judgement.ok:
-        return MeasuredRow(replace(row, growth=_growth(basis, setting, steps)), None)
+        return MeasuredRow(replace(row, growth=_growth(basis, setting)), None)
     return _compared(basis, row, run)
 
 
@@ -149,10 +149,11 @@ def _mean_energy(run: Run, horizon: float, expected: float | None) -> float | No
     return float(later.mean()) / expected - 1
 
 
-def _growth(basis: Basis, setting: MeasuredSetting, steps: int) -> float | None:
+def _growth(basis: Basis, setting: MeasuredSetting) -> float | None:
     """By what velocities were multiplied in a step, where they grew."""
+    first, model = basis.first, with_setting(basis.model, setting)
     try:
-        growth = attempted(basis.first.setup, with_setting(basis.model, setting), steps).growth
+        growth = attempted(first.setup, model, first.setup.scenario.duration).growth
     except mujoco.FatalError:
         return None
     return growth if math.isfinite(growth) and growth > 1 else None

@@ -23,7 +23,14 @@ from coursebuild.numerics.problem import STANDARD, Integrator
 from coursebuild.numerics.reports.bench import MeasuredSetting, StableRow
 from coursebuild.numerics.reports.points import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
-from coursebuild.numerics.stability import StabilityTrial, attempted, scan
+from coursebuild.numerics.stability import (
+    DENSE,
+    Density,
+    StabilityTrial,
+    attempted,
+    scan,
+    stable_row,
+)
 
 _SOLVERS = {
     "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
@@ -93,7 +100,7 @@ def with_setting(model: Any, setting: MeasuredSetting) -> Any:
 def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
     """The largest stable timestep of every integrator, over the scenario.
 
-    The grid and the bisection are those of the hard cases. No timestep is tried of which the
+    They are searched for as those of the hard cases. No timestep is tried of which the
     scenario has fewer than 20: of so few steps none would tell.
     """
     duration = first.scene.scenario.duration
@@ -102,17 +109,17 @@ def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow,
     if search[1] <= search[0]:
         return ()
     one, thick = varied(model, Integrator.EULER, first.scene.own), thickness(model)
+    density = Density(6, 8, 1e-2) if quick else DENSE
     rows = []
     for integrator in STANDARD:
 
         def attempt(step: float, integrator: Integrator = integrator) -> StabilityTrial:
             choose(one, integrator, step)
             try:
-                return attempted(first.setup, one, round(duration / step), thick)
+                return attempted(first.setup, one, duration, thick)
             except mujoco.FatalError:
                 return StabilityTrial(step, RunStatus.DIVERGED, math.nan)
 
-        found = scan(attempt, search, grid=6 if quick else 12, resolution=1e-2 if quick else 1e-3)
-        largest = None if math.isinf(found.largest) else found.largest
-        rows.append(StableRow(integrator.value, largest, not found.islands, search))
+        found = scan(attempt, search, density)
+        rows.append(stable_row(integrator, found, first.setup, duration))
     return tuple(rows)

@@ -1,27 +1,31 @@
 """The largest stable timestep for each integrator, and how fast a run grows beyond.
 
-Entry points: `boundaries(problem)`, of a hard case; `scan(attempt, search)` and
-`attempted(setup, model, steps)`, for any scene.
+Entry points: `boundaries(problem)`, of a hard case; `scan(attempt, search)`, `attempted(setup,
+model, span)` and `stable_row`, for any scene; `bounded(problem)`, with the energy that can be.
 
-1. A grid of timesteps, even in the logarithm, is tried from end to end: stability need not be
-   monotone, and a bisection alone would find some boundary, not the first.
-2. The first boundary is then bisected.
-3. Stable is what stays within the problem's bounds, by the same judgement that every run gets. What
-   is just beyond the boundary grows slowly, so the number of steps sets the resolution.
+1. Stable is what stays within what can be over a simulated time that is the same for all timesteps,
+   by the judgement that every run gets: finite, within bounds, and where nothing drives the motion,
+   without much more energy than it has in small steps. What is just beyond a boundary grows slowly,
+   so the time sets the resolution.
+2. Stability need not be monotone. The largest stable timestep is the largest below which all that
+   were tried are stable: a grid, even in the logarithm, down to a tenth of it; a bisection at its
+   end; then others just below, which lie the closer the nearer they are. Where one of these is
+   lost, the search goes on below it.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import asdict, replace
 
-from coursebuild.numerics.detector import Peaks, RunStatus, judge
-from coursebuild.numerics.engine import bounds_of, compiled, initial_data, watched
+from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
+from coursebuild.numerics.engine import compiled, initial_data, simulate, watched
 from coursebuild.numerics.problem import (
     INTEGRATORS,
     STANDARD,
@@ -32,13 +36,31 @@ from coursebuild.numerics.problem import (
     Scenario,
     Setup,
 )
+from coursebuild.numerics.reports.bench import StableRow
 from coursebuild.numerics.reports.cases import BoundaryLine
 
-GRID = 12
-"""Timesteps tried in a decade."""
-RESOLUTION = 1e-4
-"""Relative width at which the bisection ends."""
-_LOOKS = 20
+_REACH = 10.0
+"""The grid is tried down to this part of the largest stable timestep."""
+_NEAREST, _FARTHEST = 1e-3, 0.5
+"""How far below it others are tried, relative."""
+_PARTS, _LOOKS = 20, 1000
+"""Of a run: looks at how fast it grows, and at whether it is lost."""
+_SMALL_STEPS = 100_000
+"""Steps of the run that says how much energy there can be, at most."""
+
+
+class Density(Struct, frozen=True):
+    """How densely timesteps are tried."""
+
+    grid: int = 24
+    """In a decade."""
+    near: int = 32
+    """Just below the largest stable one."""
+    resolution: float = 1e-4
+    """Relative width at which the bisection ends."""
+
+
+DENSE = Density()
 
 
 class StabilityTrial(Struct, frozen=True):
@@ -53,8 +75,11 @@ class StabilityTrial(Struct, frozen=True):
 
     @property
     def stable(self) -> bool:
-        """Whether the run stayed within the problem's bounds."""
+        """Whether the run stayed within what can be."""
         return self.status is RunStatus.OK
+
+
+# ------------------------------------------------------------------------------------- hard cases
 
 
 def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
@@ -66,10 +91,24 @@ def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
         return ()
     # Only joints with damping know `eulerdamp`.
     damped = bool(np.any(compiled(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
+    problem = bounded(problem)
     return tuple(boundary(problem, one) for one in (INTEGRATORS if damped else STANDARD))
 
 
-def boundary(problem: Problem, integrator: Integrator) -> BoundaryLine:
+def bounded(problem: Problem) -> Problem:
+    """The problem with the energy that can be: by its motion in small steps, over its span."""
+    if driving_force(compiled(problem.mjcf, Integrator.RK4, 1e-3), problem.scenario):
+        return problem
+    step, scenario = min(problem.timesteps), problem.scenario
+    looks = math.floor(min(problem.span, _SMALL_STEPS * step) / scenario.sample)
+    duration = max(looks * scenario.sample, scenario.duration)
+    longer = replace(problem, scenario=replace(scenario, duration=duration))
+    energy = simulate(longer, compiled(problem.mjcf, Integrator.RK4, step)).energy
+    most = energy.sum(axis=1).max() + problem.room * energy[:, 1].max()
+    return replace(problem, energy_bound=float(most))
+
+
+def boundary(problem: Problem, integrator: Integrator, density: Density = DENSE) -> BoundaryLine:
     """Look for the largest stable timestep.
 
     Raises:
@@ -77,26 +116,23 @@ def boundary(problem: Problem, integrator: Integrator) -> BoundaryLine:
     """
     if problem.search is None:
         raise ValueError(f"{problem.name} has no range of timesteps to search")
-    found = scan(lambda step: attempt(problem, integrator, step), problem.search)
+    found = scan(lambda step: attempt(problem, integrator, step), problem.search, density)
+    row = stable_row(integrator, found, problem, problem.span)
     theory = None if problem.limit is None else problem.limit(integrator)
-    beyond = found.beyond
+    lost = found.lost
     return BoundaryLine(
-        integrator=integrator.value,
-        largest=_finite(found.largest),
+        **asdict(row),
         theory=None if theory is None else _finite(theory.timestep),
         formula="" if theory is None else theory.source,
-        difference=_difference(found.largest, theory),
-        monotone=not found.islands,
-        islands=found.islands,
-        beyond="" if beyond is None else beyond.status.value,
-        growth=None if beyond is None else _finite(beyond.growth),
-        searched=problem.search,
+        difference=_difference(row.largest, theory),
+        beyond="" if lost is None else lost.status.value,
+        growth=None if lost is None else _finite(lost.growth),
     )
 
 
-def _difference(largest: float, theory: Limit | None) -> float | None:
+def _difference(largest: float | None, theory: Limit | None) -> float | None:
     """Measured against theory, relative; `None` where one of them is not finite, or 0."""
-    if theory is None or not (0 < theory.timestep < math.inf and 0 < largest < math.inf):
+    if theory is None or not largest or not 0 < theory.timestep < math.inf:
         return None
     return largest / theory.timestep - 1
 
@@ -105,97 +141,118 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-class Scan(Struct, frozen=True):
-    """Where timesteps cease to be stable."""
+# ----------------------------------------------------------------------------------------- search
 
-    largest: float
-    """The largest stable timestep below which all tried are stable, s; 0 where none is, infinite
-    where all tried are."""
-    islands: tuple[float, ...]
-    """Timesteps beyond that are stable all the same, s."""
-    beyond: StabilityTrial | None
-    """The first unstable one of the grid."""
+
+class Scan(Struct, frozen=True):
+    """What a search found."""
+
+    trials: tuple[StabilityTrial, ...]
+    """Of all timesteps that were tried, rising."""
+
+    @property
+    def lost(self) -> StabilityTrial | None:
+        """The first that is not stable."""
+        return next((one for one in self.trials if not one.stable), None)
 
 
 def scan(
     attempt: Callable[[float], StabilityTrial],
     search: tuple[float, float],
-    *,
-    grid: int = GRID,
-    resolution: float = RESOLUTION,
+    density: Density = DENSE,
 ) -> Scan:
-    """Look for the largest stable timestep between two (s): on a grid, then by bisection.
-
-    `grid`: timesteps tried in a decade; `resolution`: relative width at which bisection ends.
-    """
+    """Look for the largest stable timestep between two (s)."""
     low, high = search
-    count = max(2, round(grid * math.log10(high / low)) + 1)
-    steps = np.geomspace(low, high, count).tolist()
-    trials = [attempt(step) for step in steps]
-    first = next((i for i, trial in enumerate(trials) if not trial.stable), None)
-    if first is None:
-        return Scan(math.inf, (), None)
-    islands = tuple(trial.timestep for trial in trials[first:] if trial.stable)
-    largest = 0.0
-    if first > 0:
-        largest = _bisected(attempt, steps[first - 1], steps[first], resolution)
-    return Scan(largest, islands, trials[first])
+    count = max(2, round(density.grid * math.log10(high / low)) + 1)
+    grid = np.geomspace(low, high, count).tolist()
+    tried: dict[float, StabilityTrial] = {}
+    while (step := _next(tried, grid, density)) is not None:
+        tried[step] = attempt(step)
+    return Scan(tuple(tried[step] for step in sorted(tried)))
 
 
-def _bisected(
-    attempt: Callable[[float], StabilityTrial], low: float, high: float, resolution: float
-) -> float:
-    while high / low > 1 + resolution:
-        middle = math.sqrt(low * high)
-        if attempt(middle).stable:
-            low = middle
-        else:
-            high = middle
-    return low
+def _next(
+    tried: Mapping[float, StabilityTrial], grid: list[float], density: Density
+) -> float | None:
+    """The timestep to try next; `None` when the largest stable one is known."""
+    lost = min((step for step, one in tried.items() if not one.stable), default=math.inf)
+    least = 0.0 if math.isinf(lost) else lost / _REACH
+    fresh = [step for step in grid if step >= least and step not in tried]
+    stable = max((step for step in tried if step < lost), default=0.0)
+    if not fresh and stable and not math.isinf(lost):
+        if lost / stable > 1 + density.resolution:
+            return math.sqrt(lost * stable)
+        shares = np.geomspace(_NEAREST, _FARTHEST, density.near).tolist()
+        near = [stable * (1 - share) for share in shares]
+        fresh = [step for step in near if step > grid[0] and step not in tried]
+    return max(fresh, default=None)
+
+
+def stable_row(integrator: Integrator, found: Scan, setup: Setup, span: float) -> StableRow:
+    """What a search found for an integrator, over a span (s) of simulated time."""
+    steps = [one.timestep for one in found.trials]
+    below, largest = steps, None
+    if found.lost is not None:
+        below = [step for step in steps if step < found.lost.timestep]
+        largest = max(below, default=0.0)
+    islands = [one.timestep for one in found.trials[len(below) :] if one.stable]
+    return StableRow(
+        integrator=integrator.value,
+        largest=largest,
+        searched=(steps[0], steps[-1]),
+        islands=(islands[0], islands[-1]) if islands else None,
+        duration=span,
+        steps=step_count(span, max(below, default=steps[0])),
+        tried=len(below),
+        energy=_finite(setup.energy_bound),
+    )
+
+
+def step_count(span: float, timestep: float) -> int:
+    """Steps that make up a span, both in s."""
+    return math.ceil(span / timestep * (1 - 1e-12))
+
+
+# ----------------------------------------------------------------------------------------- trials
 
 
 def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
-    """Run the problem's steps at a timestep (s), whatever its duration."""
-    return attempted(problem, compiled(problem.mjcf, integrator, timestep), problem.steps)
+    """Run the problem over its span at a timestep (s)."""
+    return attempted(problem, compiled(problem.mjcf, integrator, timestep), problem.span)
 
 
 def attempted(
-    setup: Setup, model: Any, steps: int, thickness: Array | None = None
+    setup: Setup, model: Any, span: float, thickness: Array | None = None
 ) -> StabilityTrial:
-    """Make so many steps with a model's own timestep; `thickness` as for `detector.peaks`.
+    """Run a model over a span (s) with its own timestep, or until it is lost.
 
-    A command changes with the first step that begins after its time: the timestep need not divide
-    the hold.
+    `thickness` is as for `detector.peaks`. A command changes with the first step that begins after
+    its time: the timestep need not divide the hold.
     """
     data = initial_data(setup.scenario, model)
     timestep = float(model.opt.timestep)
-    chunk = max(1, steps // _LOOKS)
-    sizes: list[float] = []
+    steps = step_count(span, timestep)
+    every = max(8, steps // _LOOKS)
+    sizes: list[tuple[int, float]] = []
     seen, total = Peaks(), 0
-    for _ in range(_LOOKS):
-        for part in _parts(setup.scenario, timestep, total, chunk):
-            _command(setup.scenario, data, total * timestep)
-            seen, done = watched(model, data, part, seen, thickness)
-            total += done
-        if not seen.finite:
-            break
+    for begin, end in itertools.pairwise(_edges(setup.scenario, timestep, steps)):
+        _command(setup.scenario, data, begin * timestep)
+        seen, done = watched(model, data, end - begin, seen, thickness, every=every, setup=setup)
+        total += done
         with np.errstate(over="ignore"):
-            sizes.append(float(np.linalg.norm(data.qvel)))
-    elapsed = total * timestep
-    judgement = judge(model, data, elapsed, seen, bounds_of(setup))
-    return StabilityTrial(timestep, judgement.status, _growth(sizes, chunk))
+            sizes.append((total, float(np.linalg.norm(data.qvel))))
+        if not seen.within(setup):
+            break
+    judgement = judge(model, data, total * timestep, seen, setup)
+    return StabilityTrial(timestep, judgement.status, _growth(sizes))
 
 
-def _parts(scenario: Scenario, timestep: float, done: int, count: int) -> list[int]:
-    """Steps cut at changes of the command."""
-    if len(scenario.controls) < 2:
-        return [count]
-    end = done + count
-    edges = {done, end}
+def _edges(scenario: Scenario, timestep: float, steps: int) -> list[int]:
+    """At which steps the run is interrupted: to look, and where the command changes."""
+    edges = {steps * part // _PARTS for part in range(_PARTS + 1)}
     for index in range(1, len(scenario.controls)):
-        edges.add(min(max(math.ceil(index * scenario.hold / timestep - 1e-9), done), end))
-    cuts = sorted(edges)
-    return [b - a for a, b in itertools.pairwise(cuts)]
+        edges.add(min(math.ceil(index * scenario.hold / timestep - 1e-9), steps))
+    return sorted(edges)
 
 
 def _command(scenario: Scenario, data: Any, time: float) -> None:
@@ -204,8 +261,10 @@ def _command(scenario: Scenario, data: Any, time: float) -> None:
         data.ctrl[:] = scenario.controls[min(index, len(scenario.controls) - 1)]
 
 
-def _growth(sizes: list[float], chunk: int) -> float:
-    half = len(sizes) // 2
-    if half < 1 or not 0 < sizes[half - 1] < math.inf or not 0 < sizes[-1] < math.inf:
+def _growth(sizes: list[tuple[int, float]]) -> float:
+    if len(sizes) < 2:
         return math.nan
-    return float((sizes[-1] / sizes[half - 1]) ** (1 / ((len(sizes) - half) * chunk)))
+    (before, small), (after, large) = sizes[len(sizes) // 2 - 1], sizes[-1]
+    if not 0 < small < math.inf or not 0 < large < math.inf:
+        return math.nan
+    return float((large / small) ** (1 / (after - before)))

@@ -18,7 +18,6 @@ from coursebuild.numerics.reports.bench import (
     OrderRow,
     ScenarioReport,
     SceneReport,
-    StableRow,
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.points import (
@@ -30,6 +29,7 @@ from coursebuild.numerics.reports.points import (
     usual_setting,
 )
 from coursebuild.report.bench_columns import BETTER, FRONT, OWN, VISIBLE, columns
+from coursebuild.report.stable import STABLE, stable_again, stable_cells, stable_meaning
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,
@@ -158,28 +158,17 @@ def _stable(report: ScenarioReport, style: Style) -> list[str]:
     rows = report.stable
     if not rows:
         return []
-    columns = [
-        Column("largest stable", tuple(one.integrator for one in rows), left=True),
-        Column("timestep", tuple(_largest(one) for one in rows), left=True),
-    ]
+    columns = [Column("integrator", tuple(one.integrator for one in rows), left=True)]
+    cells = zip(*map(stable_cells, rows), strict=True)
+    columns += [Column(t, told, left=True) for t, told in zip(STABLE, cells, strict=True)]
     lines = [f"{2 * _INDENT}{line}".rstrip() for line in table(columns)]
-    lost = [visible(one.integrator) for one in rows if not one.monotone]
-    if lost:
-        text = f"not monotone, stable again beyond: {', '.join(lost)}"
-        lines.append(2 * _INDENT + style.paint(text, RED))
+    lines.append(2 * _INDENT + style.paint(stable_meaning(rows[0]), FAINT))
+    lines += [2 * _INDENT + style.paint(text, RED) for text in stable_again(rows)]
     if is_cut_short(report) and any(one.largest is None for one in rows):
         longest = seconds_text(report.duration / FEWEST_STEPS)
         text = f"longer ones than {longest} were not tried: {FEWEST_STEPS} are the whole scenario"
         lines.append(2 * _INDENT + style.paint(text, FAINT))
     return lines
-
-
-def _largest(row: StableRow) -> str:
-    if row.largest is None:
-        return f"all to {seconds_text(row.searched[1])}"
-    if row.largest == 0:
-        return f"none from {seconds_text(row.searched[0])}"
-    return seconds_text(row.largest, 4)
 
 
 def _lost(report: ScenarioReport, style: Style) -> list[str]:

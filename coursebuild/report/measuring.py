@@ -22,6 +22,7 @@ from coursebuild.numerics.reports.cases import (
 )
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
+from coursebuild.report.stable import STABLE, stable_again, stable_cells, stable_meaning
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,
@@ -115,7 +116,7 @@ def _rows(found: Sequence[Departure]) -> list[str]:
 # --- stability
 
 _ORDERS = ("order of position", "order of attitude", "order of velocity")
-_BOUNDARY = ("largest stable", "theory", "difference", "beyond", "growth a step")
+_BOUNDARY = (*STABLE, "theory", "difference", "beyond", "growth a step")
 
 
 def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
@@ -133,7 +134,8 @@ def _case(report: CaseReport, style: Style) -> str:
     if report.boundaries:
         rows = [(line.integrator, _boundary(line)) for line in report.boundaries]
         lines += _table(_BOUNDARY, rows)
-        lines += [f"  {_islands(one, style)}" for one in report.boundaries if not one.monotone]
+        lines.append(f"  {style.paint(stable_meaning(report.boundaries[0]), FAINT)}")
+        lines += [f"  {style.paint(text, RED)}" for text in stable_again(report.boundaries)]
     for name in dict.fromkeys(line.name for line in report.figures):
         found = [line for line in report.figures if line.name == name]
         rows = [(line.integrator, _figure(line)) for line in found]
@@ -171,20 +173,7 @@ def _boundary(line: BoundaryLine) -> Cells:
         theory = "all" if line.theory is None else "none"
     growth = "" if line.growth is None else f"{line.growth:.9f}"
     difference = "" if line.difference is None else f"{100 * line.difference:+.3f} %"
-    return _largest(line), theory, difference, line.beyond, growth
-
-
-def _islands(line: BoundaryLine, style: Style) -> str:
-    shown = ", ".join(f"{h:.4g}" for h in line.islands)
-    return style.paint(f"{line.integrator} is not monotone: stable again at {shown} s", RED)
-
-
-def _largest(line: BoundaryLine) -> str:
-    if line.largest is None:
-        return f"all to {_seconds(line.searched[1])}"
-    if line.largest == 0:
-        return f"none from {_seconds(line.searched[0])}"
-    return _seconds(line.largest)
+    return *stable_cells(line), theory, difference, line.beyond, growth
 
 
 def _figure(line: FigureLine) -> Cells:

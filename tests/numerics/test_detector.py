@@ -11,9 +11,9 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure
-from coursebuild.numerics.detector import Peaks, RunStatus, judge
+from coursebuild.numerics.detector import RunStatus, driving_force, judge
 from coursebuild.numerics.engine import advance, compiled, simulate
-from coursebuild.numerics.problem import Integrator
+from coursebuild.numerics.problem import Integrator, Scenario, Setup
 from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.stability import attempt
 
@@ -25,6 +25,9 @@ SPRING = """
   </worldbody>
 </mujoco>
 """
+
+
+BOUNDS = Setup(scenario=Scenario(1.0, 1.0), position_bound=1.0, velocity_bound=10.0)
 
 
 def begun(timestep: float, qpos: float = 0.0, qvel: float = 0.0) -> tuple[Any, Any]:
@@ -50,7 +53,7 @@ def test_a_slow_growth_without_any_warning_is_seen() -> None:
     advance(model, data, 130)
     assert abs(data.qpos[0]) > 100
     assert not any(warning.number for warning in data.warning)
-    found = judge(model, data, 130 * 0.2002, bounds=Peaks(1.0, 10.0, math.inf))
+    found = judge(model, data, 130 * 0.2002, setup=BOUNDS)
     assert found.status is RunStatus.SLOW_GROWTH
     assert any(reason.startswith("positions reached") for reason in found.reasons)
 
@@ -103,6 +106,36 @@ def test_every_seeded_divergence_is_flagged() -> None:
             assert trial.status in (RunStatus.DIVERGED, RunStatus.SLOW_GROWTH), (integrator, factor)
 
 
+def test_where_energy_can_be_judged() -> None:
+    """Only where nothing drives the motion: no actuator, no wind, nothing that is not counted."""
+    motor = '<motor joint="j"/>'
+    servo = '<position joint="j" kp="9"/>'
+    none, pushed = Scenario(1.0, 1.0), Scenario(1.0, 1.0, controls=((0.5,),))
+    keyed = Scenario(1.0, 1.0, keyframe=0)
+    key = '<keyframe><key ctrl="1"/></keyframe>'
+    for actuator, option, joint, rest, scenario, said in (
+        ("", "", "", "", none, ""),
+        (motor, "", "", "", none, ""),
+        (motor, "", "", "", Scenario(1.0, 1.0, controls=((0.0,),)), ""),
+        (motor, "", "", "", pushed, "actuators act"),
+        (motor, "", "", key, keyed, "actuators act"),
+        (servo, "", "", "", none, "actuators act"),
+        (servo, '<flag actuation="disable"/>', "", "", none, ""),
+        ("", "", 'damping="2" frictionloss="1"', "", none, ""),
+        ("", "", 'damping="-2"', "", none, "damping is negative"),
+    ):
+        text = f"""<mujoco><option>{option}</option><worldbody><body>
+            <joint name="j" {joint}/><geom size=".1"/></body></worldbody>
+            <actuator>{actuator}</actuator>{rest}</mujoco>"""
+        model = mujoco.MjModel.from_xml_string(text)
+        assert driving_force(model, scenario) == said, (actuator, option, joint)
+    model.dof_damping[:] = 0
+    model.opt.wind[0], model.body_gravcomp[1] = 1.0, 1.0
+    assert driving_force(model, none) == "gravity is compensated", "wind is nothing in a vacuum"
+    model.opt.density = 1.2
+    assert driving_force(model, none) == "wind blows, gravity is compensated"
+
+
 def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
     # A rod's transverse velocity grows to 1e6 rad/s, turns the axial one down, and decays again.
     problem = problem_named("thin-rod")
@@ -116,7 +149,7 @@ def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
 def test_a_good_run_is_good() -> None:
     model, data = begun(0.01, qpos=0.5)
     advance(model, data, 100)
-    good = judge(model, data, 1.0, bounds=Peaks(1.0, 10.0, math.inf))
+    good = judge(model, data, 1.0, setup=BOUNDS)
     assert good.ok and good.reasons == ()
     data.time = math.nan
     assert judge(model, data, 1.0).status is RunStatus.RESET

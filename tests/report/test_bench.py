@@ -66,11 +66,12 @@ def test_orders_and_limits_and_the_verdict() -> None:
         "    order of  position  velocity\n"
         "    Euler         1.00      0.99\n"
         "    RK4           4.00\n\n"
-        "    largest stable  timestep\n"
-        "    Euler           40 ms\n"
-        "    implicit        all to 100 ms\n"
-        "    RK4             90 ms\n"
-        "    not monotone, stable again beyond: RK4\n\n"
+        "    integrator  largest stable  steps  tried\n"
+        "    Euler       40 ms           250    60 from 1 ms\n"
+        "    implicit    all to 100 ms   100    49 from 1 ms\n"
+        "    RK4         90 ms           112    71 from 1 ms\n"
+        "    stable over 10 s; at most 2.5 J\n"
+        "    RK4 is not monotone: some are stable again, from 95 ms to 97 ms\n\n"
         "    Euler at 50 ms: diverged; the state is not finite\n"
     ) in text
 
@@ -207,8 +208,12 @@ def test_json_says_what_holds_for_a_whole_scenario() -> None:
     assert found["stable"][1] == {
         "integrator": "implicit",
         "largest": None,
-        "monotone": True,
         "searched": [0.001, 0.1],
+        "islands": None,
+        "duration": 10.0,
+        "steps": 100,
+        "tried": 49,
+        "energy": 2.5,
     }
 
 

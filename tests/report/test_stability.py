@@ -24,11 +24,14 @@ def boundary(integrator: str, largest: float | None, **other: object) -> Boundar
         "theory": 0.2,
         "formula": "hω = 2",
         "difference": None if not largest else largest / 0.2 - 1,
-        "monotone": True,
-        "islands": (),
+        "searched": TRIED,
+        "islands": None,
+        "duration": 5.0,
+        "steps": 25,
+        "tried": 60,
+        "energy": None,
         "beyond": "diverged",
         "growth": None,
-        "searched": TRIED,
     }
     return BoundaryLine(integrator, largest, **(fields | other))  # type: ignore[arg-type]
 
@@ -43,7 +46,7 @@ REPORT = CaseReport(
     boundaries=(
         boundary("Euler", 0.2),
         boundary("implicit", 0.2),
-        boundary("RK4", 0.25, monotone=False, islands=(0.4, 0.5), beyond="slow-growth", growth=1.5),
+        boundary("RK4", 0.25, islands=(0.4, 0.5), beyond="slow-growth", growth=1.5),
         boundary("discrete", None, theory=None, difference=None, beyond=""),
         boundary("none", 0.0, theory=0.0, formula="√(1+z²)"),
     ),
@@ -62,12 +65,13 @@ spring  case 5: A spring
   reference (closed, known to 1e-13): a textbook
   second: another, which differs by 2.0e-14
   begins at rest
-  largest stable     theory  difference  beyond       growth a step
-  0.2 s              0.2 s   +0.000 %    diverged                    Euler, implicit
-  0.25 s             0.2 s   +25.000 %   slow-growth  1.500000000    RK4
-  all to 10 s        all                                             discrete
-  none from 0.001 s  none                diverged                    none
-  RK4 is not monotone: stable again at 0.4, 0.5 s
+  largest stable  steps  tried         theory  difference  beyond       growth a step
+  200 ms          25     60 from 1 ms  0.2 s   +0.000 %    diverged                    Euler, implicit
+  250 ms          25     60 from 1 ms  0.2 s   +25.000 %   slow-growth  1.500000000    RK4
+  all to 10 s     25     60 from 1 ms  all                                             discrete
+  none from 1 ms  25                   none                diverged                    none
+  stable over 5 s; energy is not judged
+  RK4 is not monotone: some are stable again, from 400 ms to 500 ms
   growth      exact  difference
   1.25 m      1 m    +2.5e-01    Euler
   not finite                     RK4

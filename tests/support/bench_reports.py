@@ -33,7 +33,11 @@ CASE = CaseReport(
     engine="3.14.0",
     note="",
     reference=ReferenceLine("closed", "a textbook", 1e-13, "", None),
-    boundaries=(BoundaryLine("Euler", 0.2, 0.2, "hω = 2", 0.0, True, (), "", None, (1e-3, 1.0)),),
+    boundaries=(
+        BoundaryLine(
+            "Euler", 0.2, (1e-3, 1.0), None, 9.0, 45, 9, None, 0.2, "hω = 2", 0.0, "", None
+        ),
+    ),
     figures=(FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),),
     orders=(OrderRow("Euler", 1.0, None, None),),
     errors=(ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),),
@@ -137,9 +141,9 @@ def swing() -> ScenarioReport:
         rows,
         orders=(OrderRow("Euler", 1.0, None, 0.99), OrderRow("RK4", 4.0, None, None)),
         stable=(
-            StableRow("Euler", 0.04, True, (1e-3, 0.1)),
-            StableRow("implicit", None, True, (1e-3, 0.1)),
-            StableRow("RK4", 0.09, False, (1e-3, 0.1)),
+            StableRow("Euler", 0.04, (1e-3, 0.1), None, 10.0, 250, 60, 2.5),
+            StableRow("implicit", None, (1e-3, 0.1), None, 10.0, 100, 49, 2.5),
+            StableRow("RK4", 0.09, (1e-3, 0.1), (0.095, 0.097), 10.0, 112, 71, 2.5),
         ),
         verdict=RowVerdict(False, 13, 0.39, 1 / 32, True, text),
     )
@@ -198,7 +202,7 @@ def awkward() -> ScenarioReport:
         reference="self",
         second="",
         agreement=None,
-        stable=(StableRow("Euler", 0.0, False, (1e-4, 0.1)),),
+        stable=(StableRow("Euler", 0.0, (1e-4, 0.1), (0.01, 0.02), 10.0, 100_000, 0, None),),
         verdict=RowVerdict(False, 2, 0.5, 0.1, None, text),
         notes=("a note that does not fit into one line of a terminal, as there are some, too",),
     )

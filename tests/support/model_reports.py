@@ -72,6 +72,7 @@ def diet(*findings: Finding) -> DietReport:
 
 
 def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
+    tried = ((1e-3, 1.0), None, 50.0, 250, 60, 2.5)
     fields: dict[str, object] = {
         "name": name,
         "title": f"A <{name}>",
@@ -80,14 +81,13 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
         "note": "it swings",
         "reference": ReferenceLine("closed", "the oscillator", 1e-13, "Bulirsch–Stoer", 3.9e-13),
         "boundaries": (
-            BoundaryLine(
-                "Euler", 0.2, 0.2001, "2/ω", -5e-4, True, (), "diverged", 1.5, (1e-3, 1.0)
+            BoundaryLine("Euler", 0.2, *tried, 0.2001, "2/ω", -5e-4, "diverged", 1.5),
+            replace(
+                BoundaryLine("RK4", 0.28, *tried, None, "", None, "slow-growth", None),
+                islands=(0.3, 0.31),
             ),
-            BoundaryLine(
-                "RK4", 0.28, None, "", None, False, (0.3, 0.31), "slow-growth", None, (1e-3, 1)
-            ),
-            BoundaryLine("implicit", None, None, "", None, True, (), "", None, (1e-3, 1.0)),
-            BoundaryLine("discrete", None, None, "", None, True, (), "", None, (1e-3, 1.0)),
+            BoundaryLine("implicit", None, *tried, None, "", None, "", None),
+            BoundaryLine("discrete", None, *tried, None, "", None, "", None),
         ),
         "figures": (
             FigureLine("period", "s", "Euler", 6.283, 6.2831853, "2π√(m/k)"),

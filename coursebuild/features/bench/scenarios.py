@@ -1,7 +1,7 @@
 """A scenario that was measured, as pages show it: of a model's page, and of a lesson's `bench`.
 
-Entry points: `scenario_view(words, report, anchor)`, `plots`; `largest`, a largest stable timestep
-in words; `lost_runs`.
+Entry points: `scenario_view(words, report, anchor)`, `plots`; `stable_title`, `stable_cells` and
+`stable_again`, of largest stable timesteps; `lost_runs`.
 """
 
 from __future__ import annotations
@@ -190,28 +190,51 @@ def _stable(words: Strings, report: ScenarioReport) -> Grid | None:
     rows = report.stable
     if not rows:
         return None
-    again, short = words("measured.islands"), is_cut_short(report)
+    short = is_cut_short(report)
 
     def remark(one: StableRow) -> str:
         if one.largest is None and short:
             return words("measured.stable_short", steps=FEWEST_STEPS)
-        return "" if one.monotone else again
+        return stable_again(words, one)
 
-    columns = [
-        (words("measured.integrator"), [one.integrator for one in rows]),
-        (words("measured.largest"), [largest(words, one.largest, one.searched) for one in rows]),
-        (words("measured.remark"), [remark(one) for one in rows]),
-    ]
-    return grid(words("measured.stable"), columns, words=(words("measured.remark"),))
+    names = [one.integrator for one in rows]
+    cells = [stable_cells(words, one) for one in rows]
+    titles = ("measured.integrator", *STABLE, "measured.remark")
+    told = (names, *map(list, zip(*cells, strict=True)), [remark(one) for one in rows])
+    columns = [(words(key), column) for key, column in zip(titles, told, strict=True)]
+    return grid(stable_title(words, rows[0]), columns, words=(words("measured.remark"),))
 
 
-def largest(words: Strings, value: float | None, searched: tuple[float, float]) -> str:
-    """A largest stable timestep in words."""
-    if value is None:
-        return words("measured.stable_all", time=seconds_text(searched[1]))
-    if value == 0:
-        return words("measured.stable_none", time=seconds_text(searched[0]))
-    return seconds_text(value)
+STABLE = ("measured.largest", "measured.steps", "measured.tried")
+"""Titles of `stable_cells`."""
+
+
+def stable_title(words: Strings, row: StableRow) -> str:
+    """What a table of largest stable timesteps shows, and what is called stable."""
+    time = seconds_text(row.duration)
+    if row.energy is None:
+        return words("measured.stable", time=time)
+    return words("measured.stable_energy", time=time, energy=f"{row.energy:.3g}")
+
+
+def stable_cells(words: Strings, row: StableRow) -> tuple[str, str, str]:
+    """A largest stable timestep, the steps of a run with it, and what was tried up to it."""
+    low, high = (seconds_text(float(f"{step:.3g}")) for step in row.searched)
+    largest = words("measured.stable_all", time=high)
+    if row.largest == 0:
+        largest = words("measured.stable_none", time=low)
+    elif row.largest is not None:
+        largest = seconds_text(row.largest)
+    tried = words("measured.tried_from", count=row.tried, time=low) if row.tried else ""
+    return largest, str(row.steps), tried
+
+
+def stable_again(words: Strings, row: StableRow) -> str:
+    """Where timesteps beyond are stable again; empty where none is."""
+    if row.islands is None:
+        return ""
+    first, last = (seconds_text(float(f"{step:.3g}")) for step in row.islands)
+    return words("measured.islands", first=first, last=last)
 
 
 def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:

@@ -24,7 +24,14 @@ from coursebuild.features.bench.figures import (
     power,
     sentence,
 )
-from coursebuild.features.bench.scenarios import ORDERS, largest, lost_runs
+from coursebuild.features.bench.scenarios import (
+    ORDERS,
+    STABLE,
+    lost_runs,
+    stable_again,
+    stable_cells,
+    stable_title,
+)
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
@@ -42,7 +49,7 @@ _QUANTITIES = (
     ("velocity", "measured.velocity"),
 )
 _BOUNDARY = (
-    "measured.largest",
+    *STABLE,
     "measured.theory",
     "measured.difference",
     "measured.beyond",
@@ -130,7 +137,7 @@ def _grid(
 def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
     rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
     titles = [words(key) for key in _BOUNDARY]
-    label = words("numerics.boundaries", title=report.title)
+    label = f"{report.title}: {stable_title(words, report.boundaries[0])}" if rows else ""
     return _grid(words, label, titles, rows, left=words("measured.remark"))
 
 
@@ -138,17 +145,13 @@ def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
     theory = seconds_text(line.theory) if line.theory else ""
     if line.formula and not line.theory:
         theory = words("numerics.all" if line.theory is None else "numerics.none")
-    islands = ""
-    if not line.monotone:
-        shown = ", ".join(seconds_text(float(f"{h:.3g}")) for h in line.islands)
-        islands = words("numerics.islands", times=shown)
     return (
-        largest(words, line.largest, line.searched),
+        *stable_cells(words, line),
         theory,
         percent(line.difference),
         status_text(line.beyond) if line.beyond else "",
         "" if line.growth is None else f"{line.growth:.9f}",
-        islands,
+        stable_again(words, line),
     )
 
 

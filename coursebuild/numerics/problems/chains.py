@@ -98,6 +98,6 @@ def _problem(name: str, chain: Chain) -> Problem:
         agreement=1e-10 if not heavy else 1e-8,
         timesteps=tuple(scenario.sample / n for n in (25, 50, 100, 200, 400)),
         search=(1e-6, 1e-2) if heavy else (1e-4, 1.0),
-        steps=2000,
+        span=0.2 if heavy else 20.0,
         energy_conserved=True,
     )

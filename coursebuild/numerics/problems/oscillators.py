@@ -45,6 +45,8 @@ START = (1.0, 5.0)
 """m and m/s: from rest the semi-implicit method would seem to be of second order in velocity."""
 BOUND = 1e4
 """m: with a double root a stable state may grow a few hundred times before it decays."""
+_SPAN = 5000.0
+"""Radians over which stability is judged: just beyond its boundary an oscillator grows slowly."""
 SPRING_RATE, SERVO_RATE, EQUALITY_RATE = 10.0, 100.0, 50.0
 """√(k/m), √(kp/m) and 1/(timeconst · dampratio), rad/s."""
 TARGETS, HOLD = (0.1, -0.05), 0.05
@@ -174,6 +176,8 @@ def _spring(ratio: float) -> Problem:
         limit=lambda one: limit_of(ratio, rate, one, explicit),
         energy_conserved=ratio == 0,
         search=(1e-2 / rate, 1e2 / rate),
+        span=_SPAN * max(1.0, 0.4 * ratio) / rate,
+        room=BOUND**2,
     )
 
 
@@ -203,6 +207,8 @@ def _servo(ratio: float) -> Problem:
         timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e2 / rate),
+        span=_SPAN * max(1.0, 0.4 * ratio) / rate,
+        room=BOUND**2,
     )
 
 
@@ -228,6 +234,8 @@ def _equality(ratio: float) -> Problem:
         timesteps=divisions(0.02, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e1 / rate),
+        span=_SPAN / rate,
+        room=BOUND**2,
     )
 
 

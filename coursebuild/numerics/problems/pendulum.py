@@ -122,6 +122,7 @@ def _problem(kind: Kind, degrees: int) -> Problem:
         ),
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
         search=None if kind == "connect" else (1e-3, 3.0),
+        span=500.0,
         smooth=kind != "connect",
         energy_conserved=True,
         note=_NOTES[kind],

@@ -237,6 +237,7 @@ def problem() -> Problem:
             *(_flip(one) for one in NUDGES),
         ),
         search=(1e-4, 1.0),
+        span=100.0,
         energy_conserved=True,
         momentum_conserved=True,
         note=NEVER_STABLE,

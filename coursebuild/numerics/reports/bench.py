@@ -113,11 +113,25 @@ class StableRow(Record, frozen=True):
 
     integrator: str
     largest: float | None
-    """s; 0 where no timestep tried is stable, `None` where all are."""
-    monotone: bool
-    """Whether all timesteps beyond are unstable."""
+    """s: all that were tried up to it are stable. 0 where none is, `None` where all are."""
     searched: tuple[float, float]
-    """The timesteps between which was looked, s."""
+    """The shortest and the longest timestep that was tried, s."""
+    islands: tuple[float, float] | None
+    """Between which some beyond the largest are stable all the same, s; `None` where none is."""
+    duration: float
+    """Simulated time of each run, s."""
+    steps: int
+    """Of a run with the largest stable timestep; with the longest, or shortest, where all or none
+    is stable."""
+    tried: int
+    """How many timesteps up to the largest were tried."""
+    energy: float | None
+    """Most energy that a stable run may have, J; `None` where it is not judged."""
+
+    @property
+    def monotone(self) -> bool:
+        """Whether all timesteps that were tried beyond the largest are lost."""
+        return self.islands is None
 
 
 class RowVerdict(Record, frozen=True):

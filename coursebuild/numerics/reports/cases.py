@@ -9,31 +9,22 @@ from collections.abc import Iterable
 from typing import TypeAlias
 
 from coursebuild.numerics.reports import Record
-from coursebuild.numerics.reports.bench import OrderRow
+from coursebuild.numerics.reports.bench import OrderRow, StableRow
 
 
-class BoundaryLine(Record, frozen=True):
-    """The largest stable timestep of an integrator."""
+class BoundaryLine(StableRow, frozen=True):
+    """The largest stable timestep of an integrator, beside theory."""
 
-    integrator: str
-    largest: float | None
-    """s; 0 where no timestep tried is stable, `None` where all are."""
     theory: float | None
     """s, as `largest`; `None` also where there is no theory and so no formula."""
     formula: str
     """Where the theory comes from; empty where there is none."""
     difference: float | None
     """Measured against theory, relative."""
-    monotone: bool
-    """Whether all timesteps beyond are unstable."""
-    islands: tuple[float, ...]
-    """Those beyond that are stable all the same, s."""
     beyond: str
     """How the first unstable one tried went."""
     growth: float | None
     """By what the velocities were multiplied in a step there, where they stayed finite."""
-    searched: tuple[float, float]
-    """The timesteps between which was looked, s."""
 
 
 class FigureLine(Record, frozen=True):
