@@ -44,7 +44,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sensitivity",
         action="store_true",
-        help="move initial states by 1e-12, and say which printed digits hold",
+        help="move initial states and halve timesteps, and say which printed digits hold",
     )
     parser.add_argument(
         "--truth",

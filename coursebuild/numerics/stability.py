@@ -43,6 +43,8 @@ _REACH = 10.0
 """The grid is tried down to this part of the largest stable timestep."""
 _NEAREST, _FARTHEST = 1e-3, 0.5
 """How far below it others are tried, relative."""
+MOST_STEPS = 200_000
+"""Of one run."""
 _PARTS, _LOOKS = 20, 1000
 """Of a run: looks at how fast it grows, and at whether it is lost."""
 _SMALL_STEPS = 100_000
@@ -116,7 +118,9 @@ def boundary(problem: Problem, integrator: Integrator, density: Density = DENSE)
     """
     if problem.search is None:
         raise ValueError(f"{problem.name} has no range of timesteps to search")
-    found = scan(lambda step: attempt(problem, integrator, step), problem.search, density)
+    low, high = problem.search
+    search = max(low, problem.span / MOST_STEPS), high
+    found = scan(lambda step: attempt(problem, integrator, step), search, density)
     row = stable_row(integrator, found, problem, problem.span)
     theory = None if problem.limit is None else problem.limit(integrator)
     lost = found.lost

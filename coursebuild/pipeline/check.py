@@ -45,7 +45,7 @@ def check(
     """Verify the lessons that the names mean; all, and the pages, where there are none.
 
     `shard` is the part of the scripts and labs that this run takes; `timings` the file into which
-    it writes how long each took. `sensitivity`: say which printed digits hold when initial states
+    it writes how long each took. `sensitivity`: say which printed digits repeat when initial states
     are moved a little. `truth`: list what nothing in the course proves.
     """
     progress = Progress(quiet=options.quiet)
@@ -143,7 +143,7 @@ def _sensitivity(
     by_path = {run.path: run for run in verified.results.runs}
     ran = [extraction for extraction in extract(course).value if extraction.path in by_path]
     runs = [by_path[extraction.path] for extraction in ran]
-    measured = measure(course, options, progress, ran, runs, chosen.documents)
+    measured = measure(course, options, progress, ran, runs, chosen.documents, halve=True)
     return measured, [warning for one in measured for warning in noise(one)]
 
 

@@ -1,10 +1,11 @@
-"""`check --sensitivity`, and what `update` asks of what it records: which printed digits hold.
+"""`check --sensitivity`, and what `update` asks of what it records: which digits hold.
 
 Entry point: `measure(course, options, progress, scripts, runs, documents)`.
 
 Of scripts that use MuJoCo and whose output is recorded and as recorded, four runs are made with
 their initial states moved (`core.run.initial_state_perturbation`), each with three times the time
-limit. They are remembered like other runs.
+limit. `check` has them run a fifth time, with their steps halved (`core.run.half_steps`). All runs
+are remembered like others.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Collection, Sequence
 
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.model.sensitivity import RUNS, Sensitivity
+from coursebuild.core.model.sensitivity import HALVED, RUNS, Sensitivity
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.extract import Extraction
@@ -33,11 +34,13 @@ def measure(
     scripts: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     documents: Collection[str] | None = None,
+    *,
+    halve: bool = False,
 ) -> tuple[Sensitivity, ...]:
     """How sensitive the recorded outputs of these scripts are; of those that were run.
 
     `runs` are theirs, in the same order; `documents` the paths of those whose recorded outputs
-    count, all of them without it.
+    count, all of them without it. `halve`: run them with half the timestep too.
     """
     recordings: dict[str, list[Recording]] = {}
     for recording in recorded_outputs(course, documents):
@@ -53,7 +56,8 @@ def measure(
         for script, base in pairs
         if worth_moving(course, recordings.get(script.path, ()), base)
     ]
-    moved = _moved(todo, options, progress)
+    numbers = (*range(1, RUNS + 1), *((HALVED,) if halve else ()))
+    again = _runs(todo, options, progress, numbers)
     return tuple(
         sensitivity(
             course,
@@ -61,24 +65,26 @@ def measure(
             script.owner,
             recordings.get(script.path, ()),
             base,
-            moved.get(script.path, ()),
+            again.get(script.path, ())[:RUNS],
+            next(iter(again.get(script.path, ())[RUNS:]), None),
         )
         for script, base in pairs
     )
 
 
-def _moved(
-    scripts: Sequence[Extraction], options: Options, progress: Progress
+def _runs(
+    scripts: Sequence[Extraction], options: Options, progress: Progress, numbers: Sequence[int]
 ) -> dict[str, list[ScriptRun]]:
-    """The runs of each script with moved states, by its path."""
+    """The runs of each script with moved states or halved steps, by its path."""
     found: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
     if not scripts:
         return found
     memory = Memory(options.root, options.store)
     with contextlib.ExitStack() as stack:
         run_all = None if options.executor else stack.enter_context(ScriptServer()).run
-        for number in range(1, RUNS + 1):
-            stage = f"moving initial states, {number} of {RUNS}"
+        for number in numbers:
+            halving = number == HALVED
+            stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
             for one in run(scripts, options, progress, stage, memory, run_all, perturbation=number):
                 found[one.path].append(one)
     return found

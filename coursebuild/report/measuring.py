@@ -116,7 +116,7 @@ def _rows(found: Sequence[Departure]) -> list[str]:
 # --- stability
 
 _ORDERS = ("order of position", "order of attitude", "order of velocity")
-_BOUNDARY = (*STABLE, "theory", "difference", "beyond", "growth a step")
+_BOUNDARY = (*STABLE, "theory", "difference", "beyond", "growth")
 
 
 def stability_text(reports: Sequence[CaseReport], style: Style) -> str:

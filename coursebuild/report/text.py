@@ -152,8 +152,11 @@ _WHY = {
 
 
 def sensitivity_text(found: Sequence[Sensitivity], style: Style) -> str:
-    """A line for each script, and one for each number of which not all digits hold."""
-    lines = [f"digits that hold when initial states are moved by {PERTURBATION:.0e} (relative):"]
+    """A line for each script, and one for each number of which not all digits do both."""
+    lines = [
+        f"digits that repeat when initial states are moved by {PERTURBATION:.0e} (relative), and",
+        "digits that are converged: half the timestep does not change them",
+    ]
     for one in found:
         lines += _sensitivity(one, style)
     return "".join(line + "\n" for line in lines)
@@ -162,12 +165,12 @@ def sensitivity_text(found: Sequence[Sensitivity], style: Style) -> str:
 def _sensitivity(one: Sensitivity, style: Style) -> list[str]:
     if one.standing is not Standing.MEASURED:
         return [f"{style.paint('not asked', FAINT)} {one.path}  {_WHY[one.standing]}"]
-    whole = one.numbers - len(one.doubts)
+    repeat = one.numbers - sum(doubt.repeat < doubt.digits for doubt in one.doubts)
+    converged = one.numbers - sum(doubt.converged != doubt.digits for doubt in one.doubts)
     verdict = "chaotic" if one.chaotic else "some" if one.doubts or one.flips else "all"
     colour = GREEN if verdict == "all" else YELLOW
-    numbers = plural(one.numbers, "number")
-    said = f"{whole} of {numbers}" if whole < one.numbers else numbers
-    parts = [f"{said} in full"]
+    parts = [f"of {plural(one.numbers, 'number')} {repeat} repeat in full"]
+    parts.append(one.unhalved or f"{converged} are converged in full")
     if one.amplification is not None:
         parts.append(f"states end {_times(one.amplification)} times as far apart as they began")
     head = f"{style.paint(f'{verdict:<9}', colour)} {one.path}  {', '.join(parts)}"
@@ -185,14 +188,19 @@ def _times(size: float) -> str:
 def _doubt(row: Doubt | Flip) -> str:
     match row:
         case Doubt():
-            what = f"{row.printed}  {row.trusted} of {plural(row.digits, 'digit')}"
+            what = f"{row.printed}  of {plural(row.digits, 'digit')} {row.repeat} repeat"
+            seen = [] if row.repeat == row.digits else [f"{row.least} to {row.most}"]
+            if row.converged is not None:
+                what += f", {row.converged} are converged"
+                seen.append(f"half the timestep: {row.halved}")
             what += f", print {row.instead}" if row.instead else ""
-            what += f"  ({row.least} to {row.most})"
+            what += f"  ({'; '.join(seen)})"
+            allowed = row.repeat < row.digits and not row.compared
         case Flip():
-            what = _flip(row)
+            what, allowed = _flip(row), not row.compared
         case _:
             assert_never(row)
-    return f"{location(row.span)}  {what}" + ("" if row.compared else "  (allowed for)")
+    return f"{location(row.span)}  {what}" + ("  (allowed for)" if allowed else "")
 
 
 def _flip(row: Flip) -> str:

@@ -1,4 +1,4 @@
-"""`check --sensitivity`, and what `update` says of digits that are noise."""
+"""`check --sensitivity`: digits that repeat, and digits that are converged; noise in `update`."""
 
 from __future__ import annotations
 
@@ -115,6 +115,31 @@ while data.time < SECONDS:
     mujoco.mj_step(model, data)
 print("steps", round(data.time / 0.001))
 """
+SWING = """
+import math
+
+import mujoco
+
+XML = '''
+<mujoco>
+  <option timestep="0.05" integrator="INTEGRATOR"/>
+  <worldbody>
+    <body>
+      <joint axis="0 1 0"/>
+      <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
+    </body>
+  </worldbody>
+</mujoco>
+'''
+model = mujoco.MjModel.from_xml_string(XML)
+data = mujoco.MjData(model)
+data.qpos[0] = 1.5
+steps = 0
+while data.time < 1.98:
+    mujoco.mj_step(model, data)
+    steps += 1
+print(f"{data.qpos[0]:.7f} rad after {steps} steps of {1000 * model.opt.timestep:.1f} ms")
+"""
 LIMIT = """
 import mujoco
 
@@ -157,6 +182,7 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     folder = Folder(tmp_path_factory.mktemp("sensitivity") / "course")
     scripts = [("double", DOUBLE), ("fall", FALL), ("down", DOWN), ("rest", REST)]
     scripts += [("limit", LIMIT), ("plain", PLAIN)]
+    scripts += [(name, SWING.replace("INTEGRATOR", name)) for name in ("Euler", "RK4")]
     blocks = [block(f"{name}.py", code, "?") for name, code in scripts]
     blocks.append(block("loose.py", DOUBLE, "?", "rtol=10 atol=100"))
     folder.fill(["## One\n\n" + "".join(blocks)], stores)
@@ -187,7 +213,7 @@ def test_double_pendulum_is_chaotic_and_keeps_its_first_digits(
     assert script["numbers"] == 8
     lines = course.text(course.lesson()).splitlines()
     first = next(i for i, line in enumerate(lines, 1) if line.startswith("t 1.0 "))
-    doubted = {(one["line"] - first, one["column"]): one["trusted"] for one in script["doubts"]}
+    doubted = {(one["line"] - first, one["column"]): one["repeat"] for one in script["doubts"]}
     rows = {line for line, _ in doubted}
     assert 0 not in rows, "after a second all holds"
     assert set(doubted.values()) <= {0, 1}
@@ -199,7 +225,8 @@ def test_double_pendulum_is_chaotic_and_keeps_its_first_digits(
 def test_what_holds_and_what_does_not(course: Folder, found: dict[str, Any]) -> None:
     for name in ("fall", "down", "rest"):  # two of which end near zero
         script = found[f"examples/{name}.py"]
-        assert (script["status"], script["doubts"], script["chaotic"]) == ("measured", [], False)
+        assert (script["status"], script["chaotic"]) == ("measured", False)
+        assert all(doubt["repeat"] == doubt["digits"] for doubt in script["doubts"])
         assert script["amplification"] < 1e4
     assert found["examples/fall.py"]["numbers"] == 3
     [flip] = found["examples/limit.py"]["flips"]  # at a border other words are printed
@@ -215,27 +242,51 @@ def test_what_holds_and_what_does_not(course: Folder, found: dict[str, Any]) -> 
     assert ("sensitivity" in report, report["diagnostics"]) == (False, [])
 
 
+def test_digits_that_are_converged_are_right(course: Folder, found: dict[str, Any]) -> None:
+    exact = 0.9723658841  # rad, by Jacobi's functions
+    for name, least in (("Euler", 1), ("RK4", 4)):
+        [doubt] = found[f"examples/{name}.py"][
+            "doubts"
+        ]  # count and timestep are those of the whole
+        assert doubt["repeat"] == doubt["digits"], "all runs print the same"
+        assert doubt["printed"] != f"{exact:.7f}", "which is not right"
+        assert least <= doubt["converged"] < doubt["digits"], name
+        decimals = len(doubt["instead"].partition(".")[2])
+        assert abs(float(doubt["instead"]) - exact) < 10**-decimals, name
+
+
 def test_report_as_text(course: Folder, found: dict[str, Any]) -> None:
     done = course.main("check", "--sensitivity")
     assert done.status == 0
     assert "moving initial states" not in done.err, "all is remembered"
-    said = done.out[done.out.index("digits that hold") :].splitlines()
-    assert said[0] == "digits that hold when initial states are moved by 1e-12 (relative):"
-    [fall] = [line for line in said if "examples/fall.py" in line]
-    assert fall.startswith("all       examples/fall.py  3 numbers in full, states end ")
-    assert fall.endswith(" times as far apart as they began")
+    said = done.out[done.out.index("digits that repeat") :].splitlines()
+    assert said[:2] == [
+        "digits that repeat when initial states are moved by 1e-12 (relative), and",
+        "digits that are converged: half the timestep does not change them",
+    ]
+    at = next(i for i, line in enumerate(said) if "examples/fall.py" in line)
+    head = (
+        "some      examples/fall.py  of 3 numbers 3 repeat in full, 2 are converged in full, states"
+    )
+    assert said[at].startswith(head)
+    assert said[at].endswith(" times as far apart as they began")
+    assert re.search(
+        r"of 5 digits 5 repeat, [0-4] are converged, print \S+  \(half the", said[at + 1]
+    )
     assert "not asked examples/plain.py  it does not use MuJoCo" in said
 
 
 def test_runs_with_moved_states_are_remembered(make: Make) -> None:
     folder = recorded(make, FALL)
     folder.replace(folder.lesson(), "< 0.9999", "< 0.9998")
-    assert "moving initial states, 4 of 4" in folder.main("check", "--sensitivity").err
+    stages = ("moving initial states, 4 of 4", "halving timesteps")
+    first = folder.main("check", "--sensitivity")
+    assert all(stage in first.err for stage in stages)
     again = folder.main("check", "--sensitivity")
-    assert "moving initial states" not in again.err
-    assert "3 numbers in full" in again.out
+    assert not any(stage in again.err for stage in stages)
+    assert "of 3 numbers 3 repeat in full" in again.out
     fresh = folder.main("check", "--sensitivity", "--no-cache")
-    assert "moving initial states, 4 of 4" in fresh.err
+    assert all(stage in fresh.err for stage in stages)
 
 
 def test_what_is_known_of_the_run_itself_stays(make: Make) -> None:
@@ -291,6 +342,7 @@ def test_update_asks_only_where_it_writes(make: Make) -> None:
     assert done.status == 0
     assert "output-noise" not in done.out
     assert "moving initial states, 1 of 4 (1)" in done.err
+    assert "halving" not in done.err
     done = folder.main("update")
     assert "moving initial states" not in done.err
     assert "every recorded output is up to date" in done.out

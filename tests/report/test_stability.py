@@ -65,11 +65,11 @@ spring  case 5: A spring
   reference (closed, known to 1e-13): a textbook
   second: another, which differs by 2.0e-14
   begins at rest
-  largest stable  steps  tried         theory  difference  beyond       growth a step
-  200 ms          25     60 from 1 ms  0.2 s   +0.000 %    diverged                    Euler, implicit
-  250 ms          25     60 from 1 ms  0.2 s   +25.000 %   slow-growth  1.500000000    RK4
-  all to 10 s     25     60 from 1 ms  all                                             discrete
-  none from 1 ms  25                   none                diverged                    none
+  largest stable  steps  tried         theory  difference  beyond       growth
+  200 ms          25     60 from 1 ms  0.2 s   +0.000 %    diverged                  Euler, implicit
+  250 ms          25     60 from 1 ms  0.2 s   +25.000 %   slow-growth  1.500000000  RK4
+  all to 10 s     25     60 from 1 ms  all                                           discrete
+  none from 1 ms  25                   none                diverged                  none
   stable over 5 s; energy is not judged
   RK4 is not monotone: some are stable again, from 400 ms to 500 ms
   growth      exact  difference

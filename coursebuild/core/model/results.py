@@ -46,7 +46,7 @@ class ScriptJob(Struct, frozen=True):
     norun: bool
     perturbation: int = 0
     """From 1: its initial states are moved a little, in one of several directions; 0: they are
-    not."""
+    not; −1: each of its steps is made as two of half the timestep."""
     packages: tuple[str, ...] = ()
     """Folders of the project that it imports from, after its own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
@@ -111,7 +111,8 @@ class Trace(Struct, frozen=True):
     divergences: tuple[Divergence, ...] = ()
     """The simulations that were lost, in the order in which it was noticed, without repeats."""
     moved: bool = False
-    """Whether there was an initial state to be moved, of a run that was to do so."""
+    """Whether there was an initial state to be moved, or a step to be halved, of a run that was to
+    do so."""
     states: tuple[str, ...] = ()
     """Of such a run, for each `MjData` in words: its number in the order of their first use, the
     length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest since

@@ -1,4 +1,4 @@
-"""What became of the numbers that a script prints when its initial states were moved a little.
+"""What became of a script's numbers when initial states were moved, and timesteps halved.
 
 Entry point: `Sensitivity`.
 """
@@ -16,6 +16,8 @@ PERTURBATION = 1e-12
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
+HALVED = -1
+"""The number of the run whose timesteps are halved."""
 CHAOTIC = 1e8
 """A simulation is chaotic where its states at the end are more than this many times as far apart as
 they were at the beginning: of the sixteen digits of a number fewer than eight are left."""
@@ -38,19 +40,23 @@ class Standing(enum.Enum):
 
 
 class Doubt(Struct, frozen=True):
-    """A recorded number of which not all printed digits hold."""
+    """A recorded number of which not all printed digits repeat, or are converged."""
 
     span: Span
     printed: str
     digits: int
     """Significant digits printed."""
-    trusted: int
-    """How many of them hold."""
+    repeat: int
+    """How many of them are the same when initial states are moved."""
+    converged: int | None
+    """How many of them are those of ever smaller timesteps; `None` where that is not known."""
     least: str
     most: str
-    """The smallest and the largest value that was printed in its place."""
+    """The smallest and the largest value that was printed in its place, initial states moved."""
+    halved: str
+    """What was printed in its place with half the timestep; empty where that is not known."""
     instead: str
-    """The number with only the digits that hold; empty where none does, and of a count."""
+    """The number with only the digits that do both; empty where none does, and of a count."""
     compared: bool
     """Whether the verification would take the difference for drift."""
 
@@ -76,6 +82,8 @@ class Sensitivity(Struct, frozen=True):
     amplification: float | None = None
     """How many times as far apart states were at the end as at the beginning, at most; `None`
     where no state at the end is known."""
+    unhalved: str = ""
+    """Why nothing is known of half the timestep; empty where it is."""
     doubts: tuple[Doubt, ...] = ()
     flips: tuple[Flip, ...] = ()
 

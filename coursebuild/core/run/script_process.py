@@ -23,7 +23,12 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
-from coursebuild.core.run import initial_state_perturbation, mujoco_tracing, mujoco_watching
+from coursebuild.core.run import (
+    half_steps,
+    initial_state_perturbation,
+    mujoco_tracing,
+    mujoco_watching,
+)
 from coursebuild.core.run.tracing import Sink, Tracer, installed_folders, library_folders
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
@@ -56,7 +61,8 @@ class Job(TypedDict):
     figures: list[str]
     """Names of files that it draws, in its working directory."""
     perturbation: int
-    """The direction in which initial states are moved (`initial_state_perturbation`); 0: none."""
+    """The direction in which initial states are moved (`initial_state_perturbation`); 0: none;
+    −1: steps are halved (`half_steps`)."""
 
 
 class Preloaded:
@@ -194,7 +200,10 @@ class ScriptProcess:
         mujoco_tracing.tracer = tracer
         if job["perturbation"] and (mujoco := preloaded.module("mujoco")) is not None:
             numpy = preloaded.module("numpy")
-            initial_state_perturbation.install(mujoco, numpy, job["perturbation"])
+            if job["perturbation"] < 0:
+                half_steps.install(mujoco, numpy)
+            else:
+                initial_state_perturbation.install(mujoco, numpy, job["perturbation"])
         tracer.has_mujoco = preloaded.module("mujoco") is not None
         for name in [name for name in sys.modules if name.partition(".")[0] == "coursebuild"]:
             del sys.modules[name]

@@ -18,7 +18,7 @@ A record is a letter and what it is about, in bytes:
 - `n`, a folder, a tab and names: modules that were imported before the script began, and that it
   would have found in this folder first
 - `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
-- `p`: an initial state was moved; `s` and numbers: a state at its end (see
+- `p`: an initial state was moved, or a step halved; `s` and numbers: a state at its end (see
   `initial_state_perturbation`)
 - `o` and words: why there may be more
 

@@ -1,4 +1,4 @@
-"""Which printed digits hold when initial states are moved by a relative 1e-12.
+"""Which printed digits repeat when initial states are moved by 1e-12, and which are converged.
 
 Entry points: `sensitivity` (a script), `noise` (the warnings).
 
@@ -6,8 +6,11 @@ Entry points: `sensitivity` (a script), `noise` (the warnings).
    verifies it, but to the letter: so each number is found at its place in the lesson, in text and
    in tables, past ellipses and filters.
 2. The spread of a number is how far the values printed in its place are from the one that the
-   script prints unmoved. It holds to the first place of which the spread is no more than half a
-   unit. A number that is printed alike by all runs holds in all its digits.
+   script prints unmoved. It repeats to the first place of which the spread is no more than half a
+   unit. A number that is printed alike by all runs repeats in all its digits.
+   Likewise it is converged to the first place of which twice its change with half the timestep is
+   no more than half a unit: so large is the error of a method of first order, and that of others
+   smaller.
 3. States at the end of runs of a pair, which began in opposite directions, tell how fast they part:
    compared by the largest positions and velocities since the simulation began, not by those that
    it happens to end with.
@@ -57,21 +60,33 @@ def sensitivity(
     recordings: Iterable[Recording],
     base: ScriptRun,
     moved: Sequence[ScriptRun],
+    halved: ScriptRun | None = None,
 ) -> Sensitivity:
-    """What the runs of a script with moved states say of what it prints.
+    """What the runs of a script with moved states, and with halved steps, say of what it prints.
 
-    `base` is its run with states that were not moved; `moved` are none where there was no point in
-    them.
+    `base` is its run as it is; `moved` are none where there was no point in them.
     """
     compared = _compared(course, recordings)
     standing = _standing(course, compared, base, moved)
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
-    found = [one for each in compared for one in _doubtful(course, *each, base, moved)]
+    unhalved = _unhalved(halved)
+    half = None if unhalved else halved
+    found = [one for each in compared for one in _doubtful(course, *each, base, moved, half)]
     numbers = sum(len(line.numbers) for r, c in compared for line in printed_lines(r, c.filters))
     doubts = tuple(one for one in found if isinstance(one, Doubt))
     flips = tuple(one for one in found if isinstance(one, Flip))
-    return Sensitivity(path, owner, standing, numbers, amplification(moved), doubts, flips)
+    size = amplification(moved)
+    return Sensitivity(path, owner, standing, numbers, size, unhalved, doubts, flips)
+
+
+def _unhalved(run: ScriptRun | None) -> str:
+    """Why a run with halved steps says nothing."""
+    if run is None:
+        return "it was not run with half the timestep"
+    if run.outcome is not Outcome.OK:
+        return "it does not run to its end with half the timestep"
+    return "" if run.trace is not None and run.trace.moved else "no step of it can be halved"
 
 
 def worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
@@ -119,29 +134,38 @@ def _doubtful(
     comparison: Comparison,
     base: ScriptRun,
     moved: Sequence[ScriptRun],
+    halved: ScriptRun | None,
 ) -> Iterator[Doubt | Flip]:
-    """Numbers and texts of a recording that moved states change, in order."""
+    """Numbers and texts of a recording that moved states or halved steps change, in order."""
     exact = Comparison(Mode.EXACT, ellipsis=comparison.ellipsis)
 
-    def changes(stdout: str) -> dict[tuple[int, int], Change]:
-        found = compare(recording, exact, course.filters, stdout).changes
+    def changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
+        found = compare(recording, exact, course.filters, run.stdout).changes
         return {(change.span.start, change.span.end): change for change in found}
 
-    unmoved = changes(base.stdout)
-    others = [changes(run.stdout) for run in moved]
-    for place in sorted({place for other in others for place in other}):
-        known = unmoved.get(place)
-        first = next(other[place] for other in others if place in other)
+    unmoved, others = changes(base), [changes(run) for run in moved]
+    half = {} if halved is None else changes(halved)
+    for place in sorted({place for other in (*others, half) for place in other}):
+        first = next(other[place] for other in (*others, half) if place in other)
         recorded = first.recorded
-        printed = recorded if known is None else known.ran
-        values = [other[place].ran if place in other else recorded for other in others]
-        if all(value == printed for value in values):
-            continue
-        yield _judged(first.span, recorded, printed, values, comparison)
+        printed, *values = (
+            other[place].ran if place in other else recorded for other in (unmoved, *others)
+        )
+        after = half[place].ran if place in half else recorded
+        if any(value != printed for value in values):
+            known = None if halved is None else after
+            yield _judged(first.span, recorded, printed, values, known, comparison)
+        elif halved is not None and after != printed and (number := _number(printed)) is not None:
+            yield _unconverged(first.span, number, after)
 
 
 def _judged(
-    span: Span, recorded: str, printed: str, values: Sequence[str], comparison: Comparison
+    span: Span,
+    recorded: str,
+    printed: str,
+    values: Sequence[str],
+    halved: str | None,
+    comparison: Comparison,
 ) -> Doubt | Flip:
     number, held_against = _number(printed), _number(recorded)
     numbers = [each for value in values if (each := _number(value)) is not None]
@@ -150,16 +174,47 @@ def _judged(
         return Flip(span, printed, other, compared=True)
     compared = any(not same_number(held_against, each, comparison) for each in numbers)
     finite = sorted((each for each in (number, *numbers) if each.finite), key=lambda n: n.value)
-    digits = _digits(number)
-    if len(finite) <= len(numbers):
-        return Doubt(span, number.text, digits, 0, number.text, "no number", "", compared=compared)
-    spread = max(difference(number.value, each.value) for each in numbers)
-    if spread == 0:  # the same value in another form, such as -0.0
-        return Flip(span, printed, other, compared)
-    trusted = min(digits, _trusted(number, spread))
-    instead = "" if number.integer else rounded(number, trusted)  # a count is not rounded
-    ends = finite[0].text, finite[-1].text
-    return Doubt(span, number.text, digits, trusted, *ends, instead, compared=compared)
+    repeat, ends = 0, (number.text, "no number")
+    if len(finite) > len(numbers):
+        spread = max(difference(number.value, each.value) for each in numbers)
+        if spread == 0:  # the same value in another form, such as -0.0
+            return Flip(span, printed, other, compared)
+        repeat, ends = _holding(number, spread), (finite[0].text, finite[-1].text)
+    converged = None if halved is None else _converged(number, halved)
+    return Doubt(
+        span,
+        number.text,
+        _digits(number),
+        repeat,
+        converged,
+        *ends,
+        (halved or "").strip(),
+        shown(number, repeat if converged is None else min(repeat, converged)),
+        compared,
+    )
+
+
+def _unconverged(span: Span, number: Number, halved: str) -> Doubt:
+    """A number that only half the timestep changes."""
+    digits, converged, text = _digits(number), _converged(number, halved), number.text
+    instead = shown(number, converged)
+    return Doubt(
+        span, text, digits, digits, converged, text, text, halved.strip(), instead, compared=False
+    )
+
+
+def _converged(number: Number, halved: str) -> int:
+    """How many digits half the timestep bears out."""
+    other = _number(halved)
+    if other is None or not other.finite or not number.finite:
+        return 0
+    change = difference(number.value, other.value)
+    return _holding(number, 2 * change) if change else _digits(number)
+
+
+def shown(number: Number, digits: int) -> str:
+    """A number with so many digits; empty for a count, which is not rounded."""
+    return "" if number.integer else rounded(number, digits)
 
 
 def _number(text: str) -> Number | None:
@@ -177,14 +232,14 @@ def _digits(number: Number) -> int:
     return number.value.adjusted() - number.place + 1
 
 
-def _trusted(number: Number, spread: Decimal) -> int:
+def _holding(number: Number, spread: Decimal) -> int:
     """How many digits hold: the spread is at most half a unit of the last of them."""
     if number.value == 0:
         return 0
     place = (spread * 2).adjusted()
     if unit(place) < spread * 2:
         place += 1
-    return max(0, number.value.adjusted() - place + 1)
+    return min(_digits(number), max(0, number.value.adjusted() - place + 1))
 
 
 def rounded(number: Number, digits: int) -> str:
@@ -275,7 +330,7 @@ def noise(found: Sensitivity) -> Iterator[Diagnostic]:
 
 
 def _is_noise(doubt: Doubt) -> bool:
-    return doubt.trusted < _AS_MOVED or doubt.digits > _HELD
+    return doubt.repeat < _AS_MOVED or doubt.digits > _HELD
 
 
 def parting(found: Sensitivity) -> str:
@@ -288,11 +343,12 @@ def parting(found: Sensitivity) -> str:
 
 def _doubt(doubt: Doubt) -> str:
     between = f"printed from {doubt.least} to {doubt.most}"
-    if not doubt.trusted:
-        return f"no digit holds: {between}"
-    hold = "1 digit holds" if doubt.trusted == 1 else f"{doubt.trusted} digits hold"
-    instead = f", print {doubt.instead}" if doubt.instead else ""
-    return f"{hold}{instead}: {between}"
+    if not doubt.repeat:
+        return f"no digit repeats: {between}"
+    repeat = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
+    number = _number(doubt.printed)
+    instead = "" if number is None else shown(number, doubt.repeat)
+    return f"{repeat}{f', print {instead}' if instead else ''}: {between}"
 
 
 def _flip(flip: Flip) -> str:

@@ -39,21 +39,26 @@ def measured(
     comparison: Comparison = EXACT,
     base: str | None = None,
     filters: tuple[Filter, ...] = (),
+    halved: str | None = None,
 ) -> Sensitivity:
-    """What runs that printed this say of a recorded output; four runs, the last repeated."""
+    """What runs that printed this say of a recorded output; four runs, the last repeated.
+
+    `halved` was printed with half the timestep.
+    """
     one = recording(recorded) if isinstance(recorded, str) else recorded
     assert base is not None or isinstance(recorded, str)
     printed = base if base is not None else str(recorded)
     runs = [each if isinstance(each, ScriptRun) else run(each) for each in moved]
     runs += [runs[-1]] * (4 - len(runs))
     whole = course(document("", "content/lessons/1.1-a.md"), comparison=comparison, filters=filters)
-    return sensitivity(whole, "examples/a.py", "1.1", [one], run(printed), runs)
+    half = None if halved is None else run(halved)
+    return sensitivity(whole, "examples/a.py", "1.1", [one], run(printed), runs, half)
 
 
 def digits(found: Sensitivity) -> list[tuple[str, int, int, str]]:
     assert found.standing is Standing.MEASURED
     assert found.flips == ()
-    return [(d.printed, d.digits, d.trusted, d.instead) for d in found.doubts]
+    return [(d.printed, d.digits, d.repeat, d.instead) for d in found.doubts]
 
 
 def flips(found: Sensitivity) -> list[tuple[str, str]]:
@@ -127,6 +132,43 @@ def test_values_that_a_tolerance_took_are_held_against_those_of_the_run() -> Non
     assert digits(found) == [], "moving has changed nothing"
     found = measured("x 1.2345", "x 1.2348", comparison=comparison, base="x 1.2347")
     assert digits(found) == [("1.2347", 5, 4, "1.235")]
+
+
+@pytest.mark.parametrize(
+    ("recorded", "moved", "halved", "expected"),
+    [
+        # A pendulum at -3.0662266: its digits repeat, and the last two are not right.
+        ("-3.0662252", "-3.0662252", "-3.0662265", (8, 6, "-3.06623", 8)),
+        ("1.2345", "1.2346", "1.2345", (4, 5, "1.234", 5)),
+        ("1.2345", "1.2346", "1.25", (4, 2, "1.2", 5)),
+        ("1.2345", "1.2345", "1.2345", None),
+        ("1.2345", "1.2345", "7", (5, 0, "", 5)),
+        ("1.2345", "1.2345", "nan", (5, 0, "", 5)),
+        ("26", "26", "27", (2, 1, "", 2)),
+    ],
+)
+def test_digits_that_repeat_and_digits_that_are_converged(
+    recorded: str, moved: str, halved: str, expected: tuple[int, int, str, int] | None
+) -> None:
+    text = "value {} m"
+    found = measured(text.format(recorded), text.format(moved), halved=text.format(halved))
+    told = [(d.repeat, d.converged, d.instead, d.digits) for d in found.doubts]
+    assert told == ([] if expected is None else [expected])
+    assert found.unhalved == ""
+    assert warnings(found) == warnings(measured(text.format(recorded), text.format(moved)))
+
+
+def test_why_nothing_is_known_of_half_the_timestep() -> None:
+    whole, one = course(document("", "content/lessons/1.1-a.md")), recording("x 1.25")
+    for half, said in (
+        (None, "it was not run with half the timestep"),
+        (run("x 1.24", moved=False), "no step of it can be halved"),
+        (replace(run(""), outcome=Outcome.TIMEOUT), "it does not run to its end with half the"),
+    ):
+        runs = [run("x 1.26")] * 4
+        found = sensitivity(whole, "examples/a.py", "1.1", [one], run("x 1.25"), runs, half)
+        assert found.unhalved.startswith(said)
+        assert [(d.repeat, d.converged, d.halved) for d in found.doubts] == [(2, None, "")]
 
 
 # --- text

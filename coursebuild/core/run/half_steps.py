@@ -1,0 +1,130 @@
+"""A script run with each step of its simulations made as two of half the timestep.
+
+Entry point: `install`, in a process that is to run so.
+
+1. Both halves have the commands and forces that the script has set for the whole. The clock then
+   says what it would have said: a script that counts steps, or looks at the clock, makes as many
+   calls as ever.
+2. The model's timestep is half as long only meanwhile: the script reads and sets its own.
+3. Rollouts are made with each row of controls twice, and give every second state.
+
+What a script integrates itself, without a function of MuJoCo's that makes a step, stays as it is.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from types import ModuleType
+from typing import Any
+
+from coursebuild.core.run import mujoco_tracing
+
+_OWN = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
+"""Integrators, before which a script has computed accelerations itself."""
+
+
+def install(mujoco: ModuleType, numpy: ModuleType) -> None:
+    """Halve the steps of this process from now on."""
+    _HalfSteps(mujoco, numpy).install()
+
+
+class _HalfSteps:
+    def __init__(self, mujoco: Any, numpy: Any) -> None:
+        self._mujoco = mujoco
+        self._numpy = numpy
+        self._step, self._forward = mujoco.mj_step, mujoco.mj_forward
+        self._lock = threading.RLock()  # threads may share a model
+        self._rollout = self._has_halved = False
+
+    def install(self) -> None:
+        self._replace("mj_step", self._whole)
+        self._replace("mj_step1", lambda real, model, data: real(model, data))
+        self._replace("mj_step2", self._second)
+        for name in _OWN:
+            self._replace(name, self._own)
+        mujoco_tracing.wrap_functions(self._mujoco, ("mj_stateSize",), self._look_for)
+
+    def _replace(self, name: str, halved: Callable[..., None]) -> None:
+        """Put what makes two half steps in the place of a function that makes one."""
+        real = getattr(self._mujoco, name)
+
+        def function(m: Any, d: Any, *args: Any, **keywords: Any) -> None:
+            if not isinstance(m, self._mujoco.MjModel) or not isinstance(d, self._mujoco.MjData):
+                real(m, d, *args, **keywords)  # it says what is wrong
+                return
+            with self._half([m]):
+                halved(real, m, d, *args, **keywords)
+
+        new = mujoco_tracing.wrapped(function, like=real)
+        mujoco_tracing.replace_function(self._mujoco, name, new)
+
+    def _whole(self, real: Callable[..., None], model: Any, data: Any, nstep: int = 1) -> None:
+        with self._clock(model, data, nstep):
+            real(model, data, 2 * nstep)
+
+    def _second(self, real: Callable[..., None], model: Any, data: Any) -> None:
+        with self._clock(model, data, 1):
+            real(model, data)
+            self._step(model, data)
+
+    def _own(self, real: Callable[..., None], model: Any, data: Any, *stages: int) -> None:
+        with self._clock(model, data, 1):
+            real(model, data, *stages)
+            self._forward(model, data)
+            real(model, data, *stages)
+
+    @contextlib.contextmanager
+    def _half(self, models: Sequence[Any]) -> Iterator[None]:
+        with self._lock:
+            whole = [float(model.opt.timestep) for model in models]
+            for model, timestep in zip(models, whole, strict=True):
+                model.opt.timestep = timestep / 2
+            try:
+                yield
+            finally:
+                for model, timestep in zip(models, whole, strict=True):
+                    model.opt.timestep = timestep
+
+    @contextlib.contextmanager
+    def _clock(self, model: Any, data: Any, steps: int) -> Iterator[None]:
+        """The clock as whole steps move it, unless MuJoCo resets it."""
+        timestep, time = 2 * float(model.opt.timestep), float(data.time)
+        yield
+        for _ in range(steps):
+            time += timestep
+        if abs(data.time - time) < timestep / 4:
+            data.time = time
+        self._note()
+
+    def _note(self) -> None:
+        if not self._has_halved and mujoco_tracing.tracer is not None:
+            self._has_halved = True
+            mujoco_tracing.tracer.moved("p")
+
+    # --- rollouts
+
+    def _look_for(self, *_: object) -> None:
+        """Put another in the place of rollouts, which first ask for a size."""
+        module = None if self._rollout else sys.modules.get("mujoco._rollout")
+        owner: Any = getattr(module, "Rollout", None)
+        if owner is None:
+            return
+        self._rollout = True
+        real, numpy = owner.__dict__["rollout"].__get__(None, owner), self._numpy
+
+        def rollout(of: Any, models: Any, data: Any, nstep: int, spec: int, *rest: Any) -> None:
+            """As MuJoCo's, in half steps."""
+            begin, warm, control, *outputs = rest[:5]
+            made = [one if one is None else numpy.repeat(one, 2, axis=1) for one in outputs]
+            twice = control if control is None else numpy.repeat(control, 2, axis=1)
+            with self._half(list({id(one): one for one in models}.values())):
+                real(of, models, data, 2 * nstep, spec, begin, warm, twice, *made, *rest[5:])
+            for output, halves in zip(outputs, made, strict=True):
+                if output is not None and halves is not None:
+                    output[:] = halves[:, 1::2]
+            self._note()
+
+        owner.rollout = rollout
