@@ -25,6 +25,7 @@ from coursebuild.numerics.reports.points import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
 from coursebuild.numerics.stability import (
     DENSE,
+    MOST_STEPS,
     Density,
     StabilityTrial,
     attempted,
@@ -44,8 +45,6 @@ CONES = {
 _ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
 _SEARCH = (0.25, 64.0)
 """Between which multiples of the model's timestep the largest stable one is looked for."""
-_MOST_STEPS = 200_000
-"""Steps of one trial of a timestep."""
 
 
 def own_setting(model: Any, first: Pilot) -> MeasuredSetting:
@@ -105,7 +104,7 @@ def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow,
     """
     duration = first.scene.scenario.duration
     low, high = (part * first.scene.own for part in _SEARCH)
-    search = (max(low, duration / _MOST_STEPS), min(high, duration / FEWEST_STEPS))
+    search = (max(low, duration / MOST_STEPS), min(high, duration / FEWEST_STEPS))
     if search[1] <= search[0]:
         return ()
     one, thick = varied(model, Integrator.EULER, first.scene.own), thickness(model)

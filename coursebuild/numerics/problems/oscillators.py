@@ -176,7 +176,7 @@ def _spring(ratio: float) -> Problem:
         limit=lambda one: limit_of(ratio, rate, one, explicit),
         energy_conserved=ratio == 0,
         search=(1e-2 / rate, 1e2 / rate),
-        span=_SPAN * max(1.0, 0.4 * ratio) / rate,
+        span=_SPAN * max(1.0, 0.2 * ratio) / rate,
         room=BOUND**2,
     )
 
@@ -207,7 +207,7 @@ def _servo(ratio: float) -> Problem:
         timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e2 / rate),
-        span=_SPAN * max(1.0, 0.4 * ratio) / rate,
+        span=_SPAN * max(1.0, 0.2 * ratio) / rate,
         room=BOUND**2,
     )
 
