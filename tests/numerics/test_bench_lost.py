@@ -49,7 +49,8 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     )
     limits = {one.integrator: one.largest for one in report.stable}
     for name in ("Euler", "implicit", "implicitfast"):
-        assert limits[name] == pytest.approx(2 / 1e5**0.5, rel=0.02)
+        # Below 2/ω it swings within bounds, but just below with any multiple of its energy.
+        assert limits[name] == pytest.approx(2 * (10 / 11) ** 0.5 / 1e5**0.5, rel=0.05)
     assert limits["discrete"] is None
 
 
