@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -45,9 +44,7 @@ def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Callable[[s
     def build(name: str) -> Folder:
         if name not in made:
             folder = Folder(tmp_path_factory.mktemp("exports") / "course")
-            for top in ("content", "models", "docs"):
-                if (COURSES[name] / top).is_dir():
-                    shutil.copytree(COURSES[name] / top, folder.root / top)
+            folder.copy(COURSES[name])
             folder.borrow(stores)
             done = folder.main("build", "--quiet")
             assert done.status == 0, done.out

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -86,9 +85,7 @@ class Builds:
     def __call__(self, folder: Folder) -> dict[str, bytes] | None:
         """The published files, or nothing for a course with mistakes."""
         fresh = Folder(self.where / f"clean {next(self.numbers)}")
-        for top in ("content", "models", "docs"):
-            if (folder.root / top).is_dir():
-                shutil.copytree(folder.root / top, fresh.root / top)
+        fresh.copy(folder.root)
         fresh.borrow(self.stores)
         share(fresh, self.trials)
         done = fresh.main("build")

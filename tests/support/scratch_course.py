@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -68,6 +69,14 @@ class Folder:
         for store in stores.iterdir():
             (self.root / ".coursebuild" / store.name).symlink_to(store)
         self.tmp.mkdir(exist_ok=True)
+
+    def copy(self, course: Path) -> None:
+        """Copy what the author of a course wrote."""
+        for name in ("content", "models", "docs", "matplotlibrc"):
+            if (course / name).is_dir():
+                shutil.copytree(course / name, self.root / name)
+            elif (course / name).is_file():
+                shutil.copy(course / name, self.root / name)
 
     @property
     def tmp(self) -> Path:

@@ -152,9 +152,7 @@ def test_ebook_in_arabic_is_valid(make_course: Make) -> None:
 @pytest.mark.parametrize("name", COURSES)
 def test_ebook_of_course_is_valid(name: str, tmp_path: Path, stores: Path) -> None:
     folder = Folder(tmp_path / "course")
-    for top in ("content", "models", "docs"):
-        if (COURSES[name] / top).is_dir():
-            shutil.copytree(COURSES[name] / top, folder.root / top)
+    folder.copy(COURSES[name])
     folder.borrow(stores)
     assert told(exported(folder, "epub")) == []
 
