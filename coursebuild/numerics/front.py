@@ -14,12 +14,8 @@ from typing import TypeAlias
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.bench import (
-    Interval,
-    MeasuredSetting,
-    RowVerdict,
-    WorkPrecisionRow,
-)
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict, WorkPrecisionRow
 from coursebuild.numerics.reports.points import seconds_text
 
 COST_SLACK, ERROR_SLACK = 0.03, 0.05

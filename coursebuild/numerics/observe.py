@@ -160,16 +160,27 @@ def speeds_of(model: Any, scene: Scene, states: EngineStates) -> list[dict[Pair,
 
 def _speeds(model: Any, data: Any) -> dict[Pair, float]:
     least: dict[Pair, float] = {}
-    for contact in data.contact[: data.ncon]:
-        first, second = (int(geom) for geom in contact.geom)
-        if first < 0 or second < 0 or contact.dist > 0 or contact.dim < 3:
-            continue  # a flex, or not yet touching, or without friction
-        relative = _velocity(model, data, second, contact.pos)
-        relative = relative - _velocity(model, data, first, contact.pos)
-        normal = contact.frame[:3]
-        speed = float(np.linalg.norm(relative - normal * (normal @ relative)))
-        least[first, second] = min(speed, least.get((first, second), math.inf))
+    for contact in touching(data):
+        if contact.dim >= 3:  # with friction
+            pair = (int(contact.geom[0]), int(contact.geom[1]))
+            _, along = speeds(model, data, contact)
+            least[pair] = min(along, least.get(pair, math.inf))
     return least
+
+
+def touching(data: Any) -> list[Any]:
+    """Contacts of geoms that touch; not those of a flex, or where only the margins do."""
+    return [one for one in data.contact[: data.ncon] if min(one.geom) >= 0 and one.dist <= 0]
+
+
+def speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
+    """How fast two geoms part, and move along each other's surface, at a contact's place, m/s."""
+    first, second = (int(geom) for geom in contact.geom)
+    relative = _velocity(model, data, second, contact.pos)
+    relative = relative - _velocity(model, data, first, contact.pos)
+    normal = contact.frame[:3]
+    apart = float(normal @ relative)
+    return apart, float(np.linalg.norm(relative - normal * apart))
 
 
 def _velocity(model: Any, data: Any, geom: int, point: Array) -> Array:

@@ -27,7 +27,8 @@ from msgspec import Struct
 
 from coursebuild.numerics.engine import STATE, full_state, initial_data, silent
 from coursebuild.numerics.problem import Array, Scenario
-from coursebuild.numerics.reports.bench import Interval, MeasuredSetting
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import apply, with_setting
 

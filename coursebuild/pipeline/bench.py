@@ -27,6 +27,7 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
 from coursebuild.numerics.reports.records import BENCH, FOLDER, ReportFailure
+from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.reports import (
     MeasuringRun,
@@ -160,16 +161,40 @@ class SceneRun(MeasuringRun):
         )
 
     def _report(self, scene: CourseScene, parts: tuple[str, ...]) -> SceneReport:
-        scenarios = tuple(self._scenarios(scene, parts))
-        report = SceneReport(scene.name, scene.digest, self.quick, self.here, scenarios)
+        loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
+        scenarios = tuple(self._scenarios(scene, loaded, parts))
+        sweeps = tuple(self._sweeps(scene, loaded, parts))
+        report = SceneReport(
+            model=scene.name,
+            digest=scene.digest,
+            quick=self.quick,
+            machine=self.here,
+            scenarios=scenarios,
+            sweeps=sweeps,
+        )
         if self.cards and scenarios:
             self.progress.doing(scene.name, "what it is made of")
             report = self.measuring.with_card(self.options.root, scene, report)
         return report
 
-    def _scenarios(self, scene: CourseScene, parts: tuple[str, ...]) -> Iterator[ScenarioReport]:
+    def _sweeps(
+        self, scene: CourseScene, loaded: Any, parts: tuple[str, ...]
+    ) -> Iterator[SweepReport]:
+        """Each sweep, from what is kept or measured now."""
+        for sweep in () if scene.declared is None else scene.declared.sweeps:
+            own = (*parts, "sweep", sweep.name)
+            found = self.kept("bench-sweeps", own, SweepReport)
+            if found is None:
+                self.progress.doing(scene.name, sweep.name)
+                timed = not self.again
+                found = self.measuring.swept(loaded, sweep, quick=self.quick, timed=timed)
+                self.keep("bench-sweeps", own, found)
+            yield found
+
+    def _scenarios(
+        self, scene: CourseScene, loaded: Any, parts: tuple[str, ...]
+    ) -> Iterator[ScenarioReport]:
         """Each scenario, from what is kept or measured now."""
-        loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
         for number in range(len(loaded.scenarios)):
             own = (*parts, f"{number}")
             found = self.kept("bench-scenarios", own, ScenarioReport)

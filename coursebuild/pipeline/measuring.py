@@ -25,6 +25,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import ScriptJob
+from coursebuild.core.model.scenarios import DeclaredSweep
 from coursebuild.core.run.machine import one_processor
 from coursebuild.core.run.runner import run_scripts
 from coursebuild.core.text.diagnostics import diagnose
@@ -35,8 +36,10 @@ from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.pruning.compare import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
+from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
+from coursebuild.numerics.sweep import measure_sweep
 from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene, exact_path
 
@@ -51,6 +54,8 @@ class CompiledScene(Struct, frozen=True):
     model: Any
     """An `mjModel`."""
     scenarios: tuple[PhysicsScene, ...]
+    spec: Any = None
+    """An `mjSpec` of it, from which it can be compiled otherwise."""
 
 
 def scenarios_of(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
@@ -63,7 +68,9 @@ def scenarios_of(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScen
         model = _compiled(root, scene)
         known = _exact(root, scene)
         found = scenes(model, scene.declared, quick=quick)
-        return CompiledScene(scene, model, tuple(replace(one, exact=known) for one in found))
+        named = tuple(replace(one, exact=known) for one in found)
+        spec = mujoco.MjSpec.from_file(str(root / scene.model.source.path))
+        return CompiledScene(scene, model, named, spec)
 
 
 def measured(
@@ -78,6 +85,18 @@ def measured(
     with _told(loaded.scene), one_processor():
         chosen = loaded.scenarios[number]
         return measure_scenario(loaded.model, chosen, quick=quick, clock=clock, tell=tell)
+
+
+def swept(loaded: CompiledScene, sweep: DeclaredSweep, *, quick: bool, timed: bool) -> SweepReport:
+    """Measure a sweep that the course declares.
+
+    Raises:
+        CannotError: it cannot be.
+    """
+    clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
+    found = (one for one in loaded.scenarios if sweep.scenario in ("", one.name))
+    with _told(loaded.scene):
+        return measure_sweep(loaded.spec, next(found), sweep, clocks, quick=quick)
 
 
 @contextmanager

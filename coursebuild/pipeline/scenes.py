@@ -141,6 +141,9 @@ def _said(declared: Declarations | None) -> str:
                 *(one.conserved, one.timesteps),
             )
         )
+    for sweep in () if declared is None else declared.sweeps:
+        vary = [(one.parameter, one.values, one.relative) for one in sweep.vary]
+        parts.append((sweep.name, sweep.title, sweep.scenario, vary, sweep.show))
     return repr(parts)
 
 

@@ -28,6 +28,7 @@ from coursebuild.numerics.reports.points import (
     status_text,
     usual_setting,
 )
+from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, cell, shown_figures
 from coursebuild.report.bench_columns import BETTER, FRONT, OWN, VISIBLE, columns
 from coursebuild.report.stable import STABLE, stable_again, stable_cells, stable_meaning
 from coursebuild.report.terminal import (
@@ -62,6 +63,8 @@ def _scene(scene: SceneReport, style: Style) -> str:
         lines.append(f"{_INDENT}nothing can move in it, so that nothing was measured")
     for scenario in scene.scenarios:
         lines += ["", *_scenario(scenario, style)]
+    for sweep in scene.sweeps:
+        lines += ["", *_sweep(sweep, style)]
     return "\n".join(lines) + "\n"
 
 
@@ -85,6 +88,26 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
             lines += ["", *part]
     lines += _lost(report, style)
     return lines
+
+
+def _sweep(sweep: SweepReport, style: Style) -> list[str]:
+    columns = [
+        Column("", tuple(OWN if row.own else "" for row in sweep.rows), left=True),
+        Column("parameter", tuple(row.parameter for row in sweep.rows), left=True),
+        Column("value", tuple(row.value for row in sweep.rows)),
+    ]
+    shown = shown_figures(sweep)
+    columns += [
+        Column(text, tuple(cell(row, name) for row in sweep.rows), 0 if name in shown else 2)
+        for name, text in FIGURES.items()
+    ]
+    columns.append(
+        Column("status", tuple(status_text(row.status) for row in sweep.rows), left=True)
+    )
+    head, *lines = table(columns, max(style.width, 60) - 4)
+    title = _INDENT + style.paint(visible(sweep.name), BOLD) + f"  {visible(sweep.title)}"
+    lines = [style.paint(head, FAINT), *lines, style.paint(f"{OWN} as the model is", FAINT)]
+    return [title, "", *(f"{2 * _INDENT}{line}".rstrip() for line in lines)]
 
 
 def _times(report: ScenarioReport) -> str:

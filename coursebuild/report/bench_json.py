@@ -4,7 +4,7 @@ Entry point: `bench_values(scenes)`.
 
 `rows` has everything that was measured of each setting, with all that is needed to read it, so that
 it can be loaded as a table. `scenarios` has what is said of all rows together, `scenes` what the
-models are made of.
+models are made of; `sweeps` is a table again, of parameters at other values.
 """
 
 from __future__ import annotations
@@ -12,12 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from coursebuild.numerics.reports.bench import (
-    Interval,
-    ScenarioReport,
-    SceneReport,
-    WorkPrecisionRow,
-)
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.points import quantities
 from coursebuild.report.values import plain
 
@@ -40,6 +36,12 @@ def bench_values(scenes: Sequence[SceneReport]) -> dict[str, object]:
             for number, row in enumerate(scenario.rows)
         ],
         "scenarios": [_scenario(scene, scenario) for scene, scenario in scenarios],
+        "sweeps": [
+            {"scene": scene.model, "sweep": sweep.name, "scenario": sweep.scenario, **plain(row)}
+            for scene in scenes
+            for sweep in scene.sweeps
+            for row in sweep.rows
+        ],
         "scenes": [
             {"scene": one.model, "digest": one.digest, "quick": one.quick, "card": one.card}
             for one in scenes

@@ -39,6 +39,11 @@ def test_a_recorded_model_with_a_declared_scenario_is_good() -> None:
     assert findings("box scenario=swung", declared, files) == [
         "bench-scenario: swung; the model `box` has no scenario `swung` [did you mean `swing`?]"
     ]
+    declared += '[[sweep]]\nname = "soft"\nvary = { "option.timestep" = [0.001] }\n'
+    assert findings("box sweep=soft", declared, files) == []
+    assert findings("box sweep=sift", declared, files) == [
+        "bench-scenario: sift; the model `box` has no sweep `sift` [did you mean `soft`?]"
+    ]
     # Of a model that declares none, nobody knows before it is compiled.
     assert findings("box scenario=swung", files=files) == []
 

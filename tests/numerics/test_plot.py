@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.drawing.marks import text_width
-from coursebuild.numerics.reports.bench import Interval, ScenarioReport
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.plot import STYLE, plot_svg
 from coursebuild.numerics.reports.points import chart, quantities, telling
 from support.bench_reports import lost, row, scenario, swing

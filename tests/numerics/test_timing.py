@@ -10,7 +10,8 @@ import pytest
 
 from coursebuild.numerics.engine import full_state, initial_data
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.reports.bench import Interval, MeasuredSetting
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
 from coursebuild.numerics.timing import FEWEST, Job, costs, scenario_job, timed
 

@@ -14,7 +14,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports.bench import Interval, RowVerdict, SceneReport, WorkPrecisionRow
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import RowVerdict, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report import Style
@@ -164,7 +165,8 @@ def bench_json(scenes: Sequence[SceneReport]) -> str:
 def rows_of(text: str) -> list[dict[str, object]]:
     found = json.loads(text, parse_constant=lambda name: (_ for _ in ()).throw(ValueError(name)))
     assert list(found) == [
-        *("rows", "scenarios", "scenes", "diagnostics", "failures", "checked", "remarks")
+        *("rows", "scenarios", "sweeps", "scenes"),
+        *("diagnostics", "failures", "checked", "remarks"),
     ]
     for one in found["rows"]:
         assert list(one) == list(found["rows"][0])

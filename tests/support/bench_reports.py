@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from coursebuild.core.model.results import Machine
+from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import (
-    Interval,
     MeasuredSetting,
     OrderRow,
     RowVerdict,

@@ -7,7 +7,7 @@ Entry points: `Declarations`; `keyframe_scenarios`, where there is no such file.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -98,6 +98,34 @@ class DeclaredScenario(Struct, frozen=True):
         return dict(self.places).get(name, self.span)
 
 
+SweepValue: TypeAlias = float | str | tuple[float, ...]
+
+
+class Variation(Struct, frozen=True):
+    """A parameter, and the values that it is given."""
+
+    parameter: str
+    """As `geom.solref[0]`: a field of all elements of a kind, or of one, as in `geom:ball.mass`."""
+    values: tuple[SweepValue, ...]
+    relative: bool
+    """Whether values are factors of what the model has."""
+    span: Span
+
+
+class DeclaredSweep(Struct, frozen=True):
+    """Parameters to be varied, one at a time, as their author wrote it."""
+
+    span: Span
+    """Its table."""
+    name: str
+    title: str
+    scenario: str
+    """By name; empty: the first one."""
+    vary: tuple[Variation, ...]
+    show: tuple[str, ...]
+    """The figures that it is about; empty: those that differ."""
+
+
 class Keep(Struct, frozen=True):
     """A finding of the scene diet that is wanted as it is."""
 
@@ -119,3 +147,4 @@ class Declarations(Struct, frozen=True):
     visible: Visible
     keep: tuple[Keep, ...]
     bands: Bands = Bands()
+    sweeps: tuple[DeclaredSweep, ...] = ()

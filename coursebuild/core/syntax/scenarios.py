@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
@@ -25,8 +25,11 @@ from coursebuild.core.model.scenarios import (
     Bands,
     Declarations,
     DeclaredScenario,
+    DeclaredSweep,
     Keep,
     Measured,
+    SweepValue,
+    Variation,
     Visible,
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
@@ -43,7 +46,7 @@ from coursebuild.core.text.diagnostics import (
     did_you_mean,
     sort_diagnostics,
 )
-from coursebuild.core.text.source import Source
+from coursebuild.core.text.source import Source, Span
 
 MOST_SAMPLES = 100_000
 """Looks at the state in a scenario."""
@@ -134,6 +137,32 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ()
 
 
+SweepFigure: TypeAlias = Literal[
+    "change", "figure", "penetration", "slip", "restitution",
+    "residual", "iterations", "cost", "throughput",
+]  # fmt: skip
+_SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
+
+
+class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of the model at other values, one at a time."""
+
+    name: Annotated[Slug, Meta(description="by which reports call it")]
+    vary: Annotated[
+        dict[
+            str,
+            tuple[float | str | tuple[float, ...], ...]
+            | Annotated[str, Meta(pattern=_SHARE, extra={"expects": "values, or a share: `±1 %`"})],
+        ],
+        Meta(description="values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
+    ]
+    title: Annotated[Text | None, Meta(description="shown over its figures")] = None
+    scenario: Annotated[Slug | None, Meta(description="the first one where it is left out")] = None
+    show: Annotated[
+        tuple[SweepFigure, ...], Meta(description="figures; those that differ where none is named")
+    ] = ()
+
+
 class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A finding of the scene diet that is wanted as it is."""
 
@@ -146,6 +175,7 @@ class ModelFile(Struct, frozen=True, forbid_unknown_fields=True):
 
     bench: BenchTable | None = None
     scenario: tuple[ScenarioTable, ...] = ()
+    sweep: tuple[SweepTable, ...] = ()
     keep: tuple[KeepTable, ...] = ()
 
 
@@ -193,7 +223,32 @@ def _declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declar
             for node, table in keeps
         ),
         bands=Bands(bench.band, bench.order_band),
+        sweeps=tuple(
+            _sweep(node, table)
+            for node, table in zip(root.objects("sweep"), fields.sweep, strict=True)
+        ),
     )
+
+
+def _sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
+    vary = node.get("vary")
+    assert isinstance(vary, ObjectNode)
+    spans = {member.key.value: member.key.mark for member in vary.members}
+    return DeclaredSweep(
+        span=node.mark,
+        name=table.name,
+        title=table.title or "",
+        scenario=table.scenario or "",
+        vary=tuple(_variation(name, given, spans[name]) for name, given in table.vary.items()),
+        show=table.show,
+    )
+
+
+def _variation(name: str, given: tuple[SweepValue, ...] | str, span: Span) -> Variation:
+    if not isinstance(given, str):
+        return Variation(name, given, relative=False, span=span)
+    share = float(given.strip("± %")) / 100
+    return Variation(name, (1 - share, 1 + share), relative=True, span=span)
 
 
 def _scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
@@ -234,6 +289,15 @@ def _check_names(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Di
     scenarios = decoding.each(root.objects("scenario"), ScenarioTable)
     names = [(table.name, node.place("name")) for node, table in scenarios]
     yield from repeated(names, "field-value", "two scenarios have the name `{}`")
+    sweeps = list(decoding.each(root.objects("sweep"), SweepTable))
+    names = [(table.name, node.place("name")) for node, table in sweeps]
+    yield from repeated(names, "field-value", "two sweeps have the name `{}`")
+    known = [table.name for _, table in decoding.each(root.objects("scenario"), ScenarioTable)]
+    for node, table in sweeps:
+        if table.scenario is not None and table.scenario not in known:
+            message = f"no scenario is called `{table.scenario}`"
+            help = did_you_mean(table.scenario, known)
+            yield diagnose("field-value", node.place("scenario"), message, help=help)
     keeps = decoding.each(root.objects("keep"), KeepTable)
     findings = [(table.finding, node.place("finding")) for node, table in keeps]
     yield from repeated(findings, "field-value", "the finding `{}` is kept twice")

@@ -239,7 +239,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "A recorded report in content/reports/ is not of the course as it is, so no page shows it.",
     ),
     ("bench-model", "error", "A shown report names a model that is not in models/."),
-    ("bench-scenario", "error", "A shown report names a scenario that its model does not have."),
+    (
+        "bench-scenario",
+        "error",
+        "A shown report names a scenario or a sweep that its model does not have.",
+    ),
     ("bench-text", "error", "Text stands in a fence that shows a report."),
     (
         "bench-unrecorded",

@@ -43,6 +43,12 @@ def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
         message, help = f"no model `{bench.model}` in models/", did_you_mean(bench.model, models)
         yield diagnose("bench-model", bench.model_span, message, help=help)
         return
+    found = [one for one in course.declarations if one.model == bench.model]
+    sweeps = [sweep.name for one in found for sweep in one.sweeps]
+    if bench.sweep is not None and bench.sweep not in sweeps:
+        message = f"the model `{bench.model}` has no sweep `{bench.sweep}`"
+        help = did_you_mean(bench.sweep, sweeps)
+        yield diagnose("bench-scenario", bench.sweep_span or bench.span, message, help=help)
     declared = _declared(course, bench.model)
     if declared:
         yield from _check_scenario(bench, declared)

@@ -15,10 +15,18 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.tools import Tools
 from coursebuild.features.bench.figures import again, factor, power, sentence, size, where, whole
-from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
+from coursebuild.features.bench.scenarios import (
+    ScenarioView,
+    SweepView,
+    plots,
+    scenario_view,
+    sweep_plots,
+    sweep_view,
+)
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
 from coursebuild.numerics.reports.records import BENCH, DIET
+from coursebuild.numerics.reports.sweep import SweepReport
 
 
 class FindingView(Struct, frozen=True):
@@ -64,6 +72,9 @@ class MeasuredView(Struct, frozen=True):
     """The address of the hard cases; empty where there are none."""
     reports: tuple[ScenarioReport, ...]
     """Of the scenarios, for their plots."""
+    sweeps: tuple[SweepView, ...] = ()
+    swept: tuple[SweepReport, ...] = ()
+    """The same, for their plots."""
 
 
 def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasuredView:
@@ -71,6 +82,7 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
     words, name = library.words, model.name
     scene, diet = library.reports.scenes.get(name), library.reports.diets.get(name)
     scenarios = () if scene is None else scene.scenarios
+    sweeps = () if scene is None else scene.sweeps
     declared = _declared(library, name)
     anchors = {one: scenario_anchor(one) for one in declared}
     return MeasuredView(
@@ -90,13 +102,18 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
         diet_command=again("diet", name, "--record"),
         numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
         reports=scenarios,
+        sweeps=tuple(
+            sweep_view(words, one, scenario_anchor(f"sweep-{one.name}")) for one in sweeps
+        ),
+        swept=sweeps,
     )
 
 
 def draw_measured(tools: Tools, view: MeasuredView) -> Markup:
     """The part of the page."""
     drawn = tuple(plots(f"_plot-{n}", one) for n, one in enumerate(view.reports, 1))
-    return tools.render("bench/measured.html", measured=view, plots=drawn)
+    swept = tuple(sweep_plots(f"_sweep-{n}", one) for n, one in enumerate(view.swept, 1))
+    return tools.render("bench/measured.html", measured=view, plots=drawn, sweep_plots=swept)
 
 
 def _declared(library: Library, model: str) -> dict[str, str]:

@@ -21,6 +21,9 @@ class Bench(FeatureBlock, frozen=True):
     scenario: str | None
     """`None`: the first."""
     scenario_span: Span | None
+    sweep: str | None
+    """What is shown instead: parameters at other values."""
+    sweep_span: Span | None
     shows: tuple[BenchPart, ...]
     """In the order in which it is shown."""
 

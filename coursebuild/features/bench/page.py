@@ -9,6 +9,7 @@ so, with the command that makes one.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
@@ -20,7 +21,8 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escaped, guarded
 from coursebuild.features.bench.figures import Grid, again, where
 from coursebuild.features.bench.model import Bench
-from coursebuild.features.bench.scenarios import plots, scenario_view
+from coursebuild.features.bench.scenarios import plots, scenario_view, sweep_plots, sweep_view
+from coursebuild.numerics.reports.sweep import SweepReport
 
 if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter
@@ -35,7 +37,7 @@ class ShownBench(Struct, frozen=True):
 
     href: str
     """Where the model's page shows the same."""
-    report: ScenarioReport | None
+    report: ScenarioReport | SweepReport | None
     """`None` where none fits the course."""
     machine: Machine | None
     """Where it was measured."""
@@ -63,7 +65,10 @@ def shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench
     """What the reports have for a block on a page."""
     scene = library.reports.scenes.get(bench.model)
     scenarios = () if scene is None else scene.scenarios
+    named: Iterator[ScenarioReport | SweepReport]
     named = (one for one in scenarios if bench.scenario in (None, one.name))
+    if bench.sweep is not None:
+        named = (one for one in (() if scene is None else scene.sweeps) if one.name == bench.sweep)
     report = next(named, None)
     declared = {
         one.name
@@ -72,7 +77,9 @@ def shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench
         for one in each.scenarios
     }
     anchor = "measured"
-    if report is not None and report.name in declared:
+    if isinstance(report, SweepReport):
+        anchor = scenario_anchor(f"sweep-{report.name}")
+    elif report is not None and report.name in declared:
         anchor = scenario_anchor(report.name)
     href = place.href(urls.model_page_path(bench.model), anchor)
     machine = None if scene is None or report is None else scene.machine
@@ -89,6 +96,8 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     from coursebuild.numerics.reports.points import chart, described, telling
 
     page, report = writer.page, _shown(writer.page, block).report
+    if isinstance(report, SweepReport):
+        report = None  # all that its plot shows is in its table
     quantity = None if report is None or "plot" not in block.shows else telling(report)
     html = page.template("bench/bench.html", bench=_view(page, block), plots=())
     head, *rest = writer.html(html).split("\n\n")
@@ -118,6 +127,17 @@ def _view(page: PageContext, block: Bench) -> BenchView:
     command = again("bench", block.model, "--record")
     if shown.report is None or shown.machine is None:
         return BenchView(block.model, shown.href, command)
+    if isinstance(shown.report, SweepReport):
+        swept = sweep_view(words, shown.report)
+        return BenchView(
+            block.model,
+            shown.href,
+            command,
+            title=swept.title,
+            notes=swept.notes,
+            folded=swept.table,
+            where=where(words, shown.machine),
+        )
     view = scenario_view(words, shown.report, "")
     grids = {"stable": view.stable, "orders": view.orders}
     tables = [grid for name in block.shows if (grid := grids.get(name)) is not None]
@@ -143,4 +163,5 @@ def _plots(page: PageContext, block: Bench) -> tuple[Markup, ...]:
     if report is None or "plot" not in block.shows:
         return ()
     places = [b.span.start for b in document_blocks(page.document) if isinstance(b, Bench)]
-    return plots(f"_bench-{places.index(block.span.start) + 1}", report)
+    name = f"_bench-{places.index(block.span.start) + 1}"
+    return sweep_plots(name, report) if isinstance(report, SweepReport) else plots(name, report)

@@ -1,7 +1,8 @@
 """From a `bench` fence to a `Bench`.
 
 Entry point: `parse_bench`. The first word is the name of the model, as in a link (`%20` is a
-space). Keys: `scenario=swing` (the first one without it), `show="plot,table"` (see `PARTS`).
+space). Keys: `scenario=swing` (the first one without it), `show="plot,table"` (see `PARTS`), or
+`sweep=softness`.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _DEFAULT: tuple[BenchPart, ...] = ("plot", "table")
 
 def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
     """The block; none of a fence that says in a wrong way what to show."""
-    parsed = fence.keys(values=("scenario", "show"), named=True)
+    parsed = fence.keys(values=("scenario", "sweep", "show"), named=True)
     keys, wrong = parsed.value, list(parsed.diagnostics)
     if keys.name is None:
         message = "a bench needs the name of a model"
@@ -37,7 +38,8 @@ def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
         return Parsed(None, tuple(wrong))
     model, place = unquote(keys.name.key), keys.name.key_span
     scenario, scenario_place = keys.value("scenario"), keys.place("scenario")
-    return Parsed(Bench(fence.span, model, place, scenario, scenario_place, shows))
+    swept = keys.value("sweep"), keys.place("sweep")
+    return Parsed(Bench(fence.span, model, place, scenario, scenario_place, *swept, shows))
 
 
 def _parts(show: Word, wrong: list[Diagnostic]) -> tuple[BenchPart, ...]:

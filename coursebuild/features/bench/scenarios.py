@@ -42,6 +42,7 @@ from coursebuild.numerics.reports.points import (
     status_text,
     usual_setting,
 )
+from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, SweepRow, cell
 
 _QUANTITIES = {
     "seen": "measured.seen",
@@ -165,7 +166,7 @@ def _notes(words: Strings, report: ScenarioReport) -> list[str]:
     return notes
 
 
-def lost_runs(runs: Iterable[tuple[str, WorkPrecisionRow | ErrorLine]]) -> list[str]:
+def lost_runs(runs: Iterable[tuple[str, WorkPrecisionRow | ErrorLine | SweepRow]]) -> list[str]:
     """Why runs were lost, those with the same reasons together; each with its name."""
     together: dict[tuple[str, ...], list[str]] = {}
     for name, run in runs:
@@ -235,6 +236,38 @@ def stable_again(words: Strings, row: StableRow) -> str:
         return ""
     first, last = (seconds_text(float(f"{step:.3g}")) for step in row.islands)
     return words("measured.islands", first=first, last=last)
+
+
+class SweepView(Struct, frozen=True):
+    """Parameters at other values."""
+
+    anchor: str
+    title: str
+    table: Grid
+    notes: tuple[str, ...]
+
+
+def sweep_view(words: Strings, sweep: SweepReport, anchor: str = "") -> SweepView:
+    """What a page shows of a sweep."""
+    columns = [
+        (words("measured.parameter"), [row.parameter for row in sweep.rows]),
+        (words("measured.value"), [row.value for row in sweep.rows]),
+        *((name, [cell(row, key) for row in sweep.rows]) for key, name in FIGURES.items()),
+    ]
+    marked = tuple(n for n, row in enumerate(sweep.rows) if row.own)
+    notes = lost_runs((f"{row.parameter} {row.value}", row) for row in sweep.rows)
+    return SweepView(anchor, sweep.title, grid(sweep.title, columns, marked=marked), tuple(notes))
+
+
+def sweep_plots(name: str, sweep: SweepReport) -> tuple[Markup, ...]:
+    """The plot of a sweep for wide and narrow screens."""
+    from coursebuild.numerics.reports.sweep_plot import sweep_svg  # which few pages need
+
+    drawn = (
+        sweep_svg(sweep, name=f"{name}-{kind}", narrow=kind == "narrow")
+        for kind in ("wide", "narrow")
+    )
+    return tuple(Markup(svg) for svg in drawn if svg)
 
 
 def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:

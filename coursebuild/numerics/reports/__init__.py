@@ -1,13 +1,14 @@
 """What was measured, as values: it is kept, printed and drawn, and shown on pages.
 
 Entry points: `Reports`, those that a course's pages may show. `bench`: speed against error of a
-model; `cases`: the hard cases; `diet`: what a model can be without. `records`: reports as files;
-`departures`: how two differ; `points`, `layout`, `plot`: the work–precision plot. Nothing here
-measures.
+model; `sweep`: its parameters at other values; `cases`: the hard cases; `diet`: what a model can be
+without. `records`: reports as files; `departures`: how two differ; `points`, `layout`, `plot`: the
+work–precision plot. Nothing here measures.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,23 @@ class Record(Struct, frozen=True, forbid_unknown_fields=True):
     No number is infinite or missing by a code of its own: `None` stands for what is not there, and
     a field beside it says why.
     """
+
+
+class Interval(Record, frozen=True):
+    """A figure that comes out otherwise each time, and between what it lies in 95 % of cases."""
+
+    value: float
+    low: float
+    high: float
+
+    def scaled(self, factor: float) -> Interval:
+        """In another unit."""
+        return Interval(factor * self.value, factor * self.low, factor * self.high)
+
+    @property
+    def half_width(self) -> float:
+        """Relative to the value; infinite where that is 0."""
+        return (self.high - self.low) / (2 * self.value) if self.value else math.inf
 
 
 class Reports(Struct, frozen=True):

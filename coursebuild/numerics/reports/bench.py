@@ -5,27 +5,9 @@ Entry point: `SceneReport`.
 
 from __future__ import annotations
 
-import math
-
 from coursebuild.core.model.results import Machine
-from coursebuild.numerics.reports import Record
-
-
-class Interval(Record, frozen=True):
-    """A figure that comes out otherwise each time, and between what it lies in 95 % of cases."""
-
-    value: float
-    low: float
-    high: float
-
-    def scaled(self, factor: float) -> Interval:
-        """In another unit."""
-        return Interval(factor * self.value, factor * self.low, factor * self.high)
-
-    @property
-    def half_width(self) -> float:
-        """Relative to the value; infinite where that is 0."""
-        return (self.high - self.low) / (2 * self.value) if self.value else math.inf
+from coursebuild.numerics.reports import Interval, Record
+from coursebuild.numerics.reports.sweep import SweepReport
 
 
 class MeasuredSetting(Record, frozen=True):
@@ -222,3 +204,4 @@ class SceneReport(Record, frozen=True):
     scenarios: tuple[ScenarioReport, ...]
     card: SceneCard | None = None
     """`None` in a report that is about speed and error alone."""
+    sweeps: tuple[SweepReport, ...] = ()

@@ -28,6 +28,7 @@ from coursebuild.numerics.reports.bench import (
 )
 from coursebuild.numerics.reports.cases import CaseReport, ErrorLine, FigureLine
 from coursebuild.numerics.reports.points import FLOORS, seconds_text, setting_text, status_text
+from coursebuild.numerics.reports.sweep import SweepReport
 
 _STABLE = 0.01
 """Relative band of a largest stable timestep: a bisection ends where its bounds are near."""
@@ -81,6 +82,10 @@ def scene_departures(
         comparison = _Comparison(name, "", bands, found)
         for both in comparison.both("scenario", old, new):
             _scenario(comparison, *both)
+    for name, before, now in _pairs(recorded.sweeps, measured.sweeps, lambda one: one.name):
+        comparison = _Comparison(name, "", bands, found)
+        for sweeps in comparison.both("sweep", before, now):
+            _sweep(comparison, *sweeps)
     return tuple(found)
 
 
@@ -255,6 +260,17 @@ def _row(
     comparison.near("model error", old.model_error, new.model_error, place + _ROUNDING)
     if old.status == "ok" and known:
         comparison.near("slip", old.slip, new.slip, _ROUNDING)
+
+
+def _sweep(comparison: _Comparison, old: SweepReport, new: SweepReport) -> None:
+    for setting, before, after in _pairs(old.rows, new.rows, lambda r: (r.parameter, r.value)):
+        if setting[0] == "threads":
+            continue
+        one = comparison.of(" ".join(setting))
+        for rows in one.both("value", before, after):
+            one.same("status", *(status_text(row.status) for row in rows))
+            for name in ("change", "penetration", "slip", "restitution"):
+                one.near(name, getattr(rows[0], name), getattr(rows[1], name), _INVISIBLE)
 
 
 # --- hard cases

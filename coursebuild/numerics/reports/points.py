@@ -18,12 +18,8 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.numerics.reports.bench import (
-    Interval,
-    MeasuredSetting,
-    ScenarioReport,
-    WorkPrecisionRow,
-)
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import MeasuredSetting, ScenarioReport, WorkPrecisionRow
 
 KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are told, and keep their colour and mark."""

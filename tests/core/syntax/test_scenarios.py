@@ -43,6 +43,12 @@ name = "other"
 controls = [[1, 2]]
 reference = "self"
 
+[[sweep]]
+name = "soft"
+scenario = "rest"
+vary = { "geom:a b.solref" = [[0.1, 1]], "option.cone" = ["elliptic"], "body.mass" = "± 2.5 %" }
+show = ["penetration"]
+
 [[keep]]
 finding = "sensor-unread tip"
 reason = "lesson 5.2 reads it"
@@ -76,6 +82,14 @@ def test_everything_that_a_file_can_say() -> None:
     assert (rest.duration, rest.sample, rest.hold, rest.measure) == (None, None, None, None)
     assert (other.title, other.keyframe, other.reference) == ("", None, "self")
     assert other.conserved is None
+    (sweep,) = declared.sweeps
+    assert (sweep.name, sweep.scenario, sweep.show) == ("soft", "rest", ("penetration",))
+    assert [(one.parameter, one.values, one.relative) for one in sweep.vary] == [
+        ("geom:a b.solref", ((0.1, 1.0),), False),
+        ("option.cone", ("elliptic",), False),
+        ("body.mass", (0.975, 1.025), True),
+    ]
+    assert sweep.vary[0].span.text == '"geom:a b.solref"'
     (keep,) = declared.keep
     assert (keep.finding, keep.reason) == ("sensor-unread tip", "lesson 5.2 reads it")
     assert keep.finding_span.text == '"sensor-unread tip"'

@@ -1,0 +1,184 @@
+"""Sweeps: a model with its parameters at other values, against what mechanics says of it."""
+
+from __future__ import annotations
+
+import math
+from xml.etree import ElementTree
+
+import mujoco
+import pytest
+from msgspec.structs import replace
+
+from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.source import Source
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.departures import scene_departures
+from coursebuild.numerics.reports.sweep import SweepReport, SweepRow, shown_figures
+from coursebuild.numerics.reports.sweep_plot import sweep_svg
+from coursebuild.numerics.scene import SceneError, scenes
+from coursebuild.numerics.sweep import measure_sweep
+from support.bench_reports import scene
+
+BALL = """\
+<mujoco>
+  <option timestep="0.0005" gravity="0 0 0"><flag refsafe="disable"/></option>
+  <default><geom condim="1" solimp="0.9999 0.9999 0.001"/></default>
+  <worldbody>
+    <geom name="wall" type="plane" size="1 1 1" solref="-10000 0"/>
+    <body name="ball" pos="0 0 0.3">
+      <joint name="rail" type="slide" axis="0 0 1"/>
+      <geom name="ball" size="0.1" mass="1" solref="-10000 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+TOML = """\
+[[scenario]]
+name = "hit"
+qvel = [-1]
+duration = 0.4
+sample = 0.02
+measure = "body:ball"
+"""
+
+
+def swept(lines: str, mjcf: str = BALL, *, timed: bool = False) -> SweepReport:
+    text = f'{TOML}\n[[sweep]]\nname = "s"\n{lines}\n'
+    declared = parse_declarations(Source("models/m.toml", text)).value
+    assert declared is not None, parse_declarations(Source("models/m.toml", text)).diagnostics
+    (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), declared)
+    ticks = iter(range(0, 10**12, 2_000_000))
+    clocks = (lambda: next(ticks), lambda: next(ticks)) if timed else None
+    spec = mujoco.MjSpec.from_string(mjcf)
+    return measure_sweep(spec, scene, declared.sweeps[0], clocks, quick=True)
+
+
+def test_a_spring_gives_back_what_it_takes_and_a_damper_does_not() -> None:
+    """Depth v √(m/k), and restitution exp(-πζ/√(1-ζ²)), where ζ = b / (2 √k)."""
+    found = swept('vary = { "geom.solref" = [[-10000, 0], [-40000, 0], [-10000, -40]] }')
+    undamped, stiffer, damped = found.rows
+    assert [row.own for row in found.rows] == [True, False, False]
+    assert undamped.restitution == pytest.approx(1, rel=0.02)
+    assert undamped.penetration == pytest.approx(0.01, rel=0.03)
+    assert stiffer.penetration == pytest.approx(0.005, rel=0.05)
+    zeta = 40 / (2 * 100)
+    assert damped.restitution is not None
+    # A contact that cannot pull lets go a little before the spring is relaxed.
+    assert math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2)) < damped.restitution < 0.7
+    assert undamped.change == 0.0 and damped.change is not None and damped.change > 1
+
+
+def test_one_element_an_enumeration_and_a_share() -> None:
+    found = swept('vary = { "body:ball.pos[2]" = "±10 %", "option.cone" = ["elliptic"] }')
+    less, more, cone = found.rows
+    assert [row.value for row in found.rows] == ["-10 %", "+10 %", "elliptic"]
+    assert less.figure == pytest.approx(0.03, rel=0.05), "a tenth of 0.3 m"
+    assert more.figure is not None and cone.figure == pytest.approx(0, abs=1e-12)
+
+
+def test_a_solver_with_little_time_leaves_more() -> None:
+    """Boxes on each other: the residual falls with the iterations, and the tolerance stops it."""
+    boxes = "".join(
+        f'<body pos="0 0 {0.1 + 0.2 * n}"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>'
+        for n in range(3)
+    )
+    floor = '<option solver="CG"/><worldbody><geom type="plane" size="1 1 1"/>'
+    mjcf = f"<mujoco>{floor}{boxes}</worldbody></mujoco>"
+    text = TOML.replace("qvel = [-1]\n", "").replace('measure = "body:ball"\n', "")
+    lines = 'vary = { "option.iterations" = [1, 3, 100], "option.tolerance" = [1e-2, 1e-10] }'
+    declared = parse_declarations(
+        Source("models/m.toml", f'{text}\n[[sweep]]\nname = "s"\n{lines}\n')
+    ).value
+    assert declared is not None
+    (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), declared)
+    spec = mujoco.MjSpec.from_string(mjcf)
+    one, three, all_, rough, fine = measure_sweep(spec, scene, declared.sweeps[0], None).rows
+    assert one.residual and three.residual and all_.residual and rough.residual and fine.residual
+    assert one.residual > 10 * three.residual >= 10 * all_.residual
+    assert rough.residual > 1e3 * fine.residual
+    assert one.iterations == pytest.approx(1, abs=0.01) and one.slip is not None
+
+
+@pytest.mark.parametrize(
+    ("vary", "message"),
+    [
+        ('{ "geom:bell.solref" = [[1, 1]] }', "the model has no parameter `geom:bell.solref`"),
+        ('{ "geom.solrof" = [1] }', "the model has no parameter `geom.solrof`"),
+        ('{ "option.cone" = ["round"] }', "`option.cone` cannot be round"),
+        ('{ "geom.solref[7]" = [1] }', "`geom.solref[7]` cannot be 1"),
+        ('{ "geom:ball.size[0]" = [-1] }', "`geom:ball.size[0]` cannot be -1"),
+        ('{ "geom:wall.mass" = "±1 %" }', "`geom:wall.mass` is not given in the MJCF"),
+        ('{ "option.timestep" = [0.003] }', "the sampling interval (0.02 s) is no multiple of"),
+    ],
+)
+def test_what_is_no_parameter_is_told(vary: str, message: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        swept(f"vary = {vary}")
+    assert message in caught.value.message
+    assert caught.value.span is not None and caught.value.span.path == "models/m.toml"
+
+
+def test_costs_and_threads_have_intervals() -> None:
+    found = swept('vary = { "option.timestep" = [0.0005, 0.001], "threads" = [1, 2] }', timed=True)
+    short, long, *threads = found.rows
+    assert short.cost is not None and long.cost is not None
+    assert [row.value for row in threads] == ["1", "2"]
+    assert all(row.throughput is not None and row.change is None for row in threads)
+
+
+def test_a_lost_run_says_why() -> None:
+    (row,) = swept('vary = { "option.gravity[2]" = [-1e15] }').rows
+    assert row.status != "ok" and row.reasons and row.change is None
+
+
+# --- what is made of it
+
+
+def table(*rows: SweepRow, show: tuple[str, ...] = ()) -> SweepReport:
+    return SweepReport("soft", "How <soft>", "swing", show, rows)
+
+
+ROWS = (
+    SweepRow("geom.solref[0]", "0.01", own=True, status="ok", penetration=1e-4, slip=0.0),
+    SweepRow("geom.solref[0]", "0.1", own=False, status="ok", penetration=1e-2, slip=0.0),
+    SweepRow("option.cone", "elliptic", own=False, status="diverged", reasons=("lost",)),
+    SweepRow("threads", "2", own=False, status="ok", throughput=Interval(2e3, 1e3, 3e3)),
+)
+
+
+def test_figures_that_differ_are_shown_unless_others_are_named() -> None:
+    assert shown_figures(table(*ROWS)) == ("penetration",)
+    assert shown_figures(table(*ROWS, show=("slip",))) == ("slip",)
+    assert sweep_svg(table(), name="p") == ""
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_every_value_is_a_dot_in_the_plot(narrow: bool) -> None:
+    report = table(*ROWS, show=("penetration", "throughput"))
+    root = ElementTree.fromstring(sweep_svg(report, name="p", narrow=narrow))
+    titles = [one.text for path in root.iter("path") for one in path.iter("title")]
+    assert titles == [
+        "geom.solref[0] 0.01: 0.0001",
+        "geom.solref[0] 0.1: 0.01",
+        "threads 2: 2000 ± 50 %",
+    ]
+    texts = [one.text for one in root.iter("text")]
+    assert {"geom.solref[0]", "option.cone", "diverged", "as the model is", "depth (m)"} <= {*texts}
+    assert len(list(root.iter("circle"))) == 2, "around the own value, and in the key"
+    said = root.find("desc")
+    assert said is not None and "option.cone elliptic: depth (m) diverged" in (said.text or "")
+
+
+def test_a_figure_that_left_its_band_is_told() -> None:
+    old, new = table(*ROWS), table(replace(ROWS[0], penetration=2e-4), *ROWS[1:])
+
+    def departures(one: SweepReport, other: SweepReport) -> list[tuple[str, str, str]]:
+        pair = (replace(scene(), sweeps=(sweep,)) for sweep in (one, other))
+        found = scene_departures(*pair, Bands())
+        return [(each.setting, each.figure, each.measured) for each in found]
+
+    assert departures(old, old) == []
+    assert departures(old, new) == [("geom.solref[0] 0.01", "penetration", "0.0002")]
+    faster = replace(ROWS[3], throughput=None)
+    assert departures(old, table(*ROWS[:3], faster)) == []
