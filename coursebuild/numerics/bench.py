@@ -20,10 +20,10 @@ from msgspec.structs import replace
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import refsafe_from
 from coursebuild.numerics.front import front, verdict, words
-from coursebuild.numerics.measure import Errors, Sizes, fitted_orders
+from coursebuild.numerics.measure import Errors, fitted_orders
 from coursebuild.numerics.observe import quantity_name
 from coursebuild.numerics.pilot import pilot
-from coursebuild.numerics.problem import STANDARD
+from coursebuild.numerics.problem import STANDARD, Sizes
 from coursebuild.numerics.references import conserved, energy_beyond, references
 from coursebuild.numerics.reports.bench import (
     OrderRow,
@@ -36,9 +36,6 @@ from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import own_setting, settings, stable
 from coursebuild.numerics.timing import Clock, costs
 from mjcourse.spatial import angular_distance
-
-_STRAIGHT = 0.75
-"""The difference of slopes on the way from which on errors follow no one power of the timestep."""
 
 
 def measure_scenario(
@@ -169,7 +166,5 @@ def _orders(basis: Basis, found: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, 
             if replace(row.setting, timestep=own.timestep)
             == replace(own, integrator=integrator.value)
         ]
-        orders.append(
-            fitted_orders(integrator.value, runs, known.floor, extent=extent, bent=_STRAIGHT)
-        )
+        orders.append(fitted_orders(integrator.value, runs, known.floor, extent))
     return tuple(orders)

@@ -1,8 +1,8 @@
 """What is measured on a hard case: errors and orders, largest stable timesteps, known quantities.
 
-Entry points: `measure_case(problem)`; `measure(problem, integrator, timestep)`, one run of it;
-`agreement(problem)`, of its two references; `closed_motion(model, scene, …)`, a closed form as the
-motion of a model that begins like the hard case.
+Entry points: `measure_case(problem, machine, clock)`; `measure(problem, integrator, timestep)`, one
+run of it; `floor(problem)`, how well its motion is known; `closed_motion(model, scene, …)`, a
+closed form as the motion of a model that begins like the hard case.
 
 A run is judged first: the error of a run that was lost is not given.
 """
@@ -10,17 +10,20 @@ A run is judged first: the error of a run that was lost is not given.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import (
     EngineStates,
     compiled,
+    full_state,
     initial_data,
     motion_of,
     refsafe_active,
@@ -28,7 +31,6 @@ from coursebuild.numerics.engine import (
 )
 from coursebuild.numerics.measure import (
     Errors,
-    Sizes,
     energy_drift,
     errors,
     fitted_orders,
@@ -42,28 +44,47 @@ from coursebuild.numerics.problem import (
     Integrator,
     Motion,
     Problem,
-    Reference,
     ScalarCheck,
     Scenario,
+    Sizes,
 )
 from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.reports.bench import OrderRow
-from coursebuild.numerics.reports.cases import CaseReport, ErrorLine, FigureLine, ReferenceLine
+from coursebuild.numerics.reports.cases import (
+    CaseReport,
+    ErrorLine,
+    FigureLine,
+    ReferenceLine,
+    StepCost,
+)
 from coursebuild.numerics.scene import Scene, SceneError
 from coursebuild.numerics.stability import boundaries
+from coursebuild.numerics.timing import Clock, scenario_job, timed
 from mjcourse.spatial import quat_conj, quat_mul
 
+_ROUNDING = 1e-14
+"""No motion in double precision is known better, in rad and relative to sizes of 1."""
 
-def measure_case(problem: Problem) -> CaseReport:
-    """Everything that there is to measure on a problem."""
+
+class DisagreementError(ArithmeticError):
+    """One of the references of a hard case is wrong."""
+
+
+def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport:
+    """Everything that there is to measure on a problem.
+
+    Raises:
+        DisagreementError: its two references differ by more than they may.
+    """
+    reference = _reference(problem)
     runs = {one: [measure(problem, one, h) for h in problem.timesteps] for one in STANDARD}
     return CaseReport(
         name=problem.name,
         title=problem.title,
         case=problem.case,
-        engine=mujoco.__version__,
+        machine=machine,
         note=_note(problem),
-        reference=_reference(problem),
+        reference=reference,
         boundaries=boundaries(problem),
         figures=tuple(
             _checked(check, integrator)
@@ -72,6 +93,27 @@ def measure_case(problem: Problem) -> CaseReport:
         ),
         orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
         errors=tuple(line for lines in runs.values() for line in lines),
+        costs=_costs(problem, runs, clock),
+    )
+
+
+def _costs(
+    problem: Problem, runs: Mapping[Integrator, Sequence[ErrorLine]], clock: Clock
+) -> tuple[StepCost, ...]:
+    """What a step takes, at the longest timestep of which the run went well."""
+    jobs, names, counts = [], [], []
+    for integrator, lines in runs.items():
+        step = next((one.timestep for one in lines if one.status == "ok"), None)
+        if step is not None:
+            model = compiled(problem.mjcf, integrator, step)
+            state = full_state(model, initial_data(problem.scenario, model))
+            jobs.append(scenario_job(model, [(problem.scenario, state)], step))
+            names.append(integrator.value)
+            counts.append(round(problem.scenario.duration / step))
+    found = timed(jobs, 0, clock, quick=True) if jobs else ()
+    return tuple(
+        StepCost(name, one.nanoseconds.scaled(1e-9 / count))
+        for name, count, one in zip(names, counts, found, strict=True)
     )
 
 
@@ -90,10 +132,10 @@ def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorL
     """
     model = compiled(problem.mjcf, integrator, timestep)
     run = simulate(problem, model)
-    found, reference = Errors(None, None, None), problem.reference
-    if run.judgement.ok and reference is not None:
-        exact = reference_motion(reference, tuple(run.states.times.tolist()))
-        found = raised(errors(motion_of(model, run.states), exact), _floor(problem))
+    found = Errors(None, None, None)
+    if run.judgement.ok:
+        exact = reference_motion(problem.reference, tuple(run.states.times.tolist()))
+        found = raised(errors(motion_of(model, run.states), exact), floor(problem))
     return ErrorLine(
         integrator=integrator.value,
         timestep=timestep,
@@ -115,46 +157,55 @@ def orders(problem: Problem, lines: Sequence[ErrorLine]) -> OrderRow:
     None where the problem is not smooth: a slope would say nothing there.
     """
     integrator = lines[0].integrator
-    if problem.reference is None or not problem.smooth:
+    if not problem.smooth:
         return OrderRow(integrator, None, None, None)
     runs = [(one.timestep, Errors(one.position, one.attitude, one.velocity)) for one in lines]
-    return fitted_orders(integrator, runs, _floor(problem))
+    return fitted_orders(integrator, runs, floor(problem))
 
 
-def agreement(problem: Problem) -> float | None:
-    """The largest difference of the problem's two references over its duration.
+@lru_cache(maxsize=64)
+def floor(problem: Problem) -> Sizes:
+    """What the motion is not known better than: how far its two references are apart.
 
-    In m, rad, m/s or rad/s, whichever is larger; `None` where it has not two.
+    Raises:
+        DisagreementError: they differ by more than they may, so that one of them is wrong.
     """
-    if problem.reference is None or problem.second is None:
-        return None
+    gap = agreement(problem)
+    for part in ("position", "attitude", "velocity"):
+        found, most = getattr(gap, part), getattr(problem.precision, part)
+        if not found <= most:
+            message = f"the references of `{problem.name}` differ by {found:.2g} in {part}"
+            raise DisagreementError(f"{message}, where {most:.0e} is said")
+    return Sizes(*(max(_ROUNDING, one) for one in (gap.position, gap.attitude, gap.velocity)))
+
+
+def agreement(problem: Problem) -> Sizes:
+    """The largest differences of the problem's two references over its duration."""
     times = problem.scenario.times
     exact = reference_motion(problem.reference, tuple(times.tolist()))
-    return errors(exact, problem.second.motion(times)).largest.largest
+    return errors(problem.second.motion(problem.mjcf, problem.scenario, times), exact).largest
 
 
-def _floor(problem: Problem) -> Sizes:
-    floor = 0.0 if problem.reference is None else problem.reference.floor
-    return Sizes(floor, floor, floor)
-
-
-def _reference(problem: Problem) -> ReferenceLine | None:
-    first, second = problem.reference, problem.second
-    if first is None:
-        return None
-    name = "" if second is None else second.source
-    return ReferenceLine(first.kind, first.source, first.floor, name, agreement(problem))
+def _reference(problem: Problem) -> ReferenceLine:
+    known, first = floor(problem), problem.reference
+    sizes = known.position, known.attitude, known.velocity
+    return ReferenceLine(first.kind, first.source, problem.second.source, *sizes)
 
 
 def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
-    measured, exact = check.measure(integrator), check.expected(integrator)
+    found, exact = check.measure(integrator), check.expected(integrator)
+    spread = None
+    if not isinstance(found, float):
+        low, found, high = np.quantile(found, (0.1, 0.5, 0.9), method="nearest").tolist()
+        spread = (low, high) if math.isfinite(high) else None
     return FigureLine(
         check.name,
         check.unit,
         integrator.value,
-        measured if math.isfinite(measured) else None,
+        found if math.isfinite(found) else None,
         exact,
         check.source,
+        spread,
     )
 
 
@@ -163,14 +214,13 @@ def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
 
 def closed_motion(
     model: Any, scene: Scene, declared: DeclaredScenario, times: Array
-) -> tuple[Reference, Motion]:
-    """The reference that a scenario names, and its motion begun where the scene begins.
+) -> tuple[Problem, Motion]:
+    """The hard case that a scenario names, and its motion begun where the scene begins.
 
     Raises:
         SceneError: the scene begins otherwise than the hard case, but for the place of free bodies.
     """
     problem, place = problem_named(declared.closed), declared.place("reference")
-    assert problem.reference is not None
     there = compiled(problem.mjcf, Integrator.EULER, 1e-3)
     if (there.jnt_type.tolist(), there.nq) != (model.jnt_type.tolist(), model.nq):
         message = f"the model has other joints than the hard case `{declared.closed}`"
@@ -190,9 +240,9 @@ def closed_motion(
         message = f"the scenario begins otherwise than the hard case `{declared.closed}`"
         raise SceneError(message, place, "its closed form holds for its own beginning only")
     turn = quat_mul(here.attitude, quat_conj(start.attitude))
-    motion = problem.reference.motion(times)
+    motion = problem.reference.solution.motion(times)
     attitude = quat_mul(turn, motion.attitude)
-    return problem.reference, Motion(times, motion.position + shift, attitude, motion.velocity)
+    return problem, Motion(times, motion.position + shift, attitude, motion.velocity)
 
 
 def _start(model: Any, scenario: Scenario) -> Motion:

@@ -4,7 +4,7 @@ Entry points: `forward_motion(mjcf, scenario, times)`; `forward_states(model, se
 for any model and method; `tends_to`, whether the engine in small steps does the same.
 
 `mj_forward` gives the acceleration of a state; the state is then integrated in positions, plain
-quaternions, velocities and activations, by Bulirsch–Stoer or another method. It shares the engine's
+quaternions, velocities and activations, by scipy's DOP853 or another method. It shares the engine's
 model, and nothing of its integrators. Commands are held: the integration begins anew when one
 changes.
 """
@@ -31,7 +31,7 @@ from coursebuild.numerics.integrate import (
     NoConvergenceError,
     Rate,
     State,
-    bulirsch_stoer,
+    dop853,
     quaternion_rate,
 )
 from coursebuild.numerics.pilot import apart
@@ -49,9 +49,7 @@ Method: TypeAlias = Callable[[Rate, State, Array], State]
 """A rate, a first state (d,) and rising times (n,) → the states (n, d)."""
 
 
-def forward_motion(
-    mjcf: str, scenario: Scenario, times: Array, *, tolerance: float = 1e-13, order: int = 16
-) -> Motion:
+def forward_motion(mjcf: str, scenario: Scenario, times: Array) -> Motion:
     """The motion of a smooth scene at the rising times (n,) s.
 
     Raises:
@@ -59,11 +57,7 @@ def forward_motion(
         NoConvergenceError: the scene is not smooth.
     """
     model = compiled(mjcf, Integrator.EULER, 1e-3)
-
-    def method(rate: Rate, start: State, offsets: Array) -> State:
-        return bulirsch_stoer(rate, start, offsets, tolerance, columns=order // 2)
-
-    return motion_of(model, forward_states(model, scenario, times, method))
+    return motion_of(model, forward_states(model, scenario, times, dop853))
 
 
 def forward_states(

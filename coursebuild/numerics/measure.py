@@ -1,17 +1,17 @@
 """How far a motion is from its reference, what orders that shows, and what drifts.
 
-Entry points: `errors`, `raised`, `order`, `fitted_orders`; `energy_drift`, `momentum_drift`.
+Entry points: `errors`, `raised`, `fitted_orders`; `energy_drift`, `momentum_drift`.
 
 1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
    of fourth order in velocity and of second in attitude.
 2. No error is given below ten times what the reference itself may be wrong by.
 3. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
-   rounding is measured, beyond 0.1 the asymptotic law does not hold yet.
+   rounding is measured, beyond 0.1 the asymptotic law does not hold yet. It is told only where
+   those errors lie on a line, in a logarithmic plot.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from functools import lru_cache
@@ -21,38 +21,21 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.engine import Run
-from coursebuild.numerics.problem import Array, Motion, Reference
-from coursebuild.numerics.reports.bench import OrderRow
+from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
+from coursebuild.numerics.reports.bench import FittedOrder, OrderRow
 from mjcourse.spatial import angular_distance
 
 FLOORS = 10.0
 """No error below so many floors of the reference is given."""
 _LOWEST, _HIGHEST = 100.0, 0.1
 """Where an order is fitted: over so many floors, and under so much."""
+_FEWEST = 4
+"""Errors that an order needs."""
+_UNCERTAIN, _BENT = 0.25, 0.25
+"""The widest half interval of an order, and the largest bend, with which it is told."""
 
 Pair: TypeAlias = tuple[float, float]
 """An error at its largest over the whole duration, and at its end."""
-
-
-class Sizes(Struct, frozen=True):
-    """A size for each of the parts of a motion."""
-
-    position: float
-    """m or rad."""
-    attitude: float
-    """rad."""
-    velocity: float
-    """m/s or rad/s."""
-
-    @property
-    def place(self) -> float:
-        """Of positions and attitudes together."""
-        return max(self.position, self.attitude)
-
-    @property
-    def largest(self) -> float:
-        """Of all of them."""
-        return max(self.position, self.attitude, self.velocity)
 
 
 ONES = Sizes(1.0, 1.0, 1.0)
@@ -78,7 +61,7 @@ class Errors(Struct, frozen=True):
 @lru_cache(maxsize=64)
 def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
     """What a reference says at these times (s); computed once."""
-    return reference.motion(np.array(times))
+    return reference.solution.motion(np.array(times))
 
 
 def errors(motion: Motion, exact: Motion) -> Errors:
@@ -111,55 +94,61 @@ def raised(found: Errors, floor: Sizes) -> Errors:
 # ------------------------------------------------------------------------------------------ orders
 
 
-def order(
-    timesteps: Sequence[float], found: Sequence[float], floor: float, *, bent: float = math.inf
-) -> float | None:
-    """Fit the order to errors found at timesteps (s); `None` where too few of them are usable.
+def fitted_order(
+    timesteps: Sequence[float], found: Sequence[float], floor: float, extent: float = 1.0
+) -> FittedOrder | None:
+    """The order that errors found at timesteps (s) show.
 
     Args:
         timesteps: in any order.
         found: errors there.
         floor: what the reference may be wrong by, in the unit of the errors.
-        bent: how far slopes on the way may differ; beyond, errors follow no one power.
+        extent: how much the motion changes: an error as large is no small one.
+
+    Returns:
+        `None` where fewer than four errors are between a hundred floors and a tenth of 1 and of the
+        extent, or where they do not lie on a line: there is no order to be told then.
     """
     usable = [
         (math.log(h), math.log(error))
         for h, error in sorted(zip(timesteps, found, strict=True))
-        if max(_LOWEST * floor, 1e-300) < error < _HIGHEST
+        if max(_LOWEST * floor, 1e-300) < error < _HIGHEST * min(1.0, extent)
     ]
-    if len(usable) < 3:
-        return None
-    slopes = [(d - b) / (c - a) for (a, b), (c, d) in itertools.pairwise(usable)]
-    if max(slopes) - min(slopes) >= bent:
+    if len(usable) < _FEWEST:
         return None
     x, y = np.array(usable).T
-    return float(np.polyfit(x, y, 1)[0])
+    slopes = np.diff(y) / np.diff(x)
+    slope, shift = np.polyfit(x, y, 1)
+    freedom = len(x) - 2
+    deviation = math.sqrt(float(np.sum((y - slope * x - shift) ** 2)) / freedom)
+    error = deviation / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
+    fit = FittedOrder(float(slope), _student(freedom) * error, float(np.ptp(slopes)))
+    return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
+
+
+def _student(freedom: int) -> float:
+    """Student's factor of an interval of 95 %."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.975))
 
 
 def fitted_orders(
     integrator: str,
     runs: Sequence[tuple[float, Errors | None]],
     floor: Sizes,
-    *,
     extent: Sizes = ONES,
-    bent: float = math.inf,
 ) -> OrderRow:
     """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count.
 
-    Args:
-        integrator: its name.
-        runs: timesteps and errors.
-        floor: what the reference may be wrong by.
-        extent: how much the motion changes: an error as large is no small one.
-        bent: see `order`.
+    `floor` and `extent` as for `fitted_order`.
     """
 
-    def fitted(part: str) -> float | None:
-        most = _HIGHEST * min(1.0, getattr(extent, part))
+    def fitted(part: str) -> FittedOrder | None:
         pairs = [(h, getattr(one, part)) for h, one in runs if one is not None]
-        kept = [(h, pair[0]) for h, pair in pairs if pair is not None and pair[0] < most]
+        kept = [(h, pair[0]) for h, pair in pairs if pair is not None]
         steps, largest = [h for h, _ in kept], [error for _, error in kept]
-        return order(steps, largest, getattr(floor, part), bent=bent)
+        return fitted_order(steps, largest, getattr(floor, part), getattr(extent, part))
 
     return OrderRow(integrator, fitted("position"), fitted("attitude"), fitted("velocity"))
 

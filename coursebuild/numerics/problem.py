@@ -1,14 +1,17 @@
 """What a hard case is: a model, what happens in it, and what exactly would happen.
 
-Entry points: `Problem`, `Scenario`, `Reference`, `Motion`, `ScalarCheck`, `Integrator`; `Setup`,
-what a run needs beside the model.
+Entry points: `Problem`, `Scenario`, `Reference`, `SecondReference`, `Motion`, `ScalarCheck`,
+`Integrator`; `Setup`, what a run needs beside the model.
+
+A number that a motion depends on is written twice: in the MJCF and the scenario, and in the formula
+or the equations that the first reference goes by. Whoever changes one of them alone is told.
 """
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
-from typing import Literal, TypeAlias
+from collections.abc import Callable, Sequence
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 from msgspec import Struct
@@ -113,17 +116,53 @@ class Motion(Struct, frozen=True):
     """(n, v) m/s or rad/s, as `qvel`."""
 
 
-class Reference(Struct, frozen=True):
-    """What exactly happens, and how well that is known."""
+class Sizes(Struct, frozen=True):
+    """A size for each of the parts of a motion."""
 
-    kind: Literal["closed", "ode", "self"]
-    """A closed form, an independent integration, or the same engine with smaller timesteps."""
+    position: float
+    """m or rad."""
+    attitude: float
+    """rad."""
+    velocity: float
+    """m/s or rad/s."""
+
+    @property
+    def place(self) -> float:
+        """Of positions and attitudes together."""
+        return max(self.position, self.attitude)
+
+    @property
+    def largest(self) -> float:
+        """Of all of them."""
+        return max(self.position, self.attitude, self.velocity)
+
+
+class Solution(Protocol):
+    """A motion by a formula or by equations: a frozen struct of the numbers that it depends on."""
+
+    def motion(self, times: Array) -> Motion:
+        """The motion at rising times (n,) s."""
+
+
+class Reference(Struct, frozen=True):
+    """What exactly happens."""
+
+    kind: Literal["closed", "ode"]
+    """A closed form, or equations of motion that are integrated."""
     source: str
     """Where it comes from."""
-    motion: Callable[[Array], Motion]
-    """Times (n,), rising, in s → the motion."""
-    floor: float
-    """Errors of the reference itself: in m, rad, m/s and rad/s, over the problem's duration."""
+    solution: Solution
+
+
+class SecondReference(Struct, frozen=True):
+    """The same from the numbers of the model and the scenario, with none of the first one's code.
+
+    How far the two are apart is how well the motion is known.
+    """
+
+    source: str
+    motion: Callable[[str, Scenario, Array], Motion]
+    """MJCF, a scenario and rising times (n,) s → the motion."""
 
 
 class Limit(Struct, frozen=True):
@@ -141,7 +180,8 @@ class ScalarCheck(Struct, frozen=True):
     unit: str
     exact: float | Callable[[Integrator], float] | None
     """What it is in theory, perhaps for an integrator; `None` where theory does not say it."""
-    measure: Callable[[Integrator], float]
+    measure: Callable[[Integrator], float | Sequence[float]]
+    """Several numbers are those of an ensemble."""
     source: str
     integrators: tuple[Integrator, ...] = STANDARD
 
@@ -175,11 +215,10 @@ class Problem(Setup, frozen=True, kw_only=True):
     """Its number on the list of hard cases."""
     mjcf: str
     """Minimal, without timestep and integrator."""
-    reference: Reference | None = None
-    second: Reference | None = None
-    """Made in another way, to check the first."""
-    agreement: float = 1e-10
-    """How well both agree over the duration, in m, rad, m/s and rad/s."""
+    reference: Reference
+    second: SecondReference
+    precision: Sizes = Sizes(1e-10, 1e-10, 1e-10)
+    """What the two may differ by, at most: beyond it one of them is wrong."""
     timesteps: tuple[float, ...] = ()
     """The ladder of timesteps for work against precision, s, falling."""
     checks: tuple[ScalarCheck, ...] = ()

@@ -3,7 +3,7 @@
 Entry points: `know(model, first)`, the reference of a scene; `references(model, first)`, by cone
 where something touches; `conserved(…)`, `energy_beyond(…)`.
 
-1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; Gauss's collocation does it
+1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
    again. Their difference is what the reference may be wrong by. Both take the same accelerations,
    so the engine in ever smaller steps must tend to the same motion.
 2. A closed form that the scenario names, or that the course has, comes first, and that integration
@@ -30,7 +30,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.core.text.source import Span
-from coursebuild.numerics.cases import closed_motion
+from coursebuild.numerics.cases import closed_motion, floor
 from coursebuild.numerics.detector import RunJudgement, RunStatus
 from coursebuild.numerics.engine import (
     EngineStates,
@@ -48,11 +48,10 @@ from coursebuild.numerics.integrate import (
     Rate,
     State,
     bulirsch_stoer,
-    gauss_collocation,
+    dop853,
 )
 from coursebuild.numerics.measure import (
     FLOORS,
-    Sizes,
     energy_drift,
     energy_scale,
     errors,
@@ -60,7 +59,7 @@ from coursebuild.numerics.measure import (
 )
 from coursebuild.numerics.observe import Sticks, sticking, visible_error
 from coursebuild.numerics.pilot import Pilot, apart
-from coursebuild.numerics.problem import Array, Integrator, Motion, Setup
+from coursebuild.numerics.problem import Array, Integrator, Motion, Setup, Sizes
 from coursebuild.numerics.scene import ExactMotion, SceneError
 from coursebuild.numerics.settings import CONES
 
@@ -79,6 +78,7 @@ _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
 _ROUNDING = 1e-14
 """No reference in double precision is known better, in rad and relative to sizes of 1."""
+_EXACT = Sizes(_ROUNDING, _ROUNDING, _ROUNDING)
 _ELSEWHERE = "the engine in small steps tends elsewhere"
 
 
@@ -126,15 +126,16 @@ def know(model: Any, first: Pilot, *, quick: bool = False) -> Known:
     if found is None:
         found = replace(itself(model, first, quick=quick), note=note)
     if wanted and wanted.closed:
-        reference, motion = closed_motion(model, first.scene, wanted, found.states.times)
+        problem, motion = closed_motion(model, first.scene, wanted, found.states.times)
         what, place = f"the closed form of `{wanted.closed}`", wanted.place("reference")
-        return _closed(model, found, motion, reference.source, reference.floor, what, place)
+        source = problem.reference.source
+        return _closed(model, found, motion, source, floor(problem), what, place)
     exact = None if wanted and wanted.reference else first.scene.exact
     if exact is None:
         return found
     motion = _exact_motion(model, first, exact, found)
     return _closed(
-        model, found, motion, exact.span.path, _ROUNDING, f"`{exact.span.path}`", exact.span
+        model, found, motion, exact.span.path, _EXACT, f"`{exact.span.path}`", exact.span
     )
 
 
@@ -171,19 +172,12 @@ def _integrated(model: Any, first: Pilot, quick: bool) -> Known:
 
     states = run(_bulirsch_stoer)
     source = "Bulirsch–Stoer over mj_forward"
-    try:
-        other, second = run(gauss_collocation), "Gauss's collocation of order 12 over mj_forward"
-    except NoConvergenceError:
-        other, second = run(_lower), "Bulirsch–Stoer of order 12 over mj_forward"
+    other, second = run(dop853), "DOP853 over mj_forward"
     return _compared(model, "ode", source, states, second, other, first.horizon)
 
 
 def _bulirsch_stoer(rate: Rate, start: State, times: Array) -> State:
     return bulirsch_stoer(rate, start, times, 1e-13)
-
-
-def _lower(rate: Rate, start: State, times: Array) -> State:
-    return bulirsch_stoer(rate, start, times, 1e-12, columns=6, first=3e-3)
 
 
 def _tended(model: Any, first: Pilot, found: Known) -> bool:
@@ -233,21 +227,24 @@ def _compared(
 
 
 def _closed(
-    model: Any, second: Known, motion: Motion, source: str, floor: float, what: str, place: Span
+    model: Any, second: Known, motion: Motion, source: str, least: Sizes, what: str, place: Span
 ) -> Known:
     """A closed form, with what was integrated as the second reference."""
     gap = errors(motion, second.motion).largest
     states = states_of(model, motion, second.states)
     pairs = zip(states.qpos, second.states.qpos, strict=True)
     away = max((apart(model, a, b) for a, b in pairs), default=0.0)
-    known = Sizes(floor, floor, floor)
+    known = least
     if second.kind == "ode":
         if not away <= FOREIGN:
             message = f"{what} is not this scene's motion"
             help = f"the two are {away:.2g} apart (rad, or relative to the extent)"
             raise SceneError(message, place, help)
-        parts = (gap.position, gap.attitude, gap.velocity)
-        known = Sizes(*(max(floor, part) for part in parts))
+        known = Sizes(
+            max(least.position, gap.position),
+            max(least.attitude, gap.attitude),
+            max(least.velocity, gap.velocity),
+        )
     return replace(
         second,
         kind="closed",

@@ -56,7 +56,9 @@ class _Reader:
             name = path.removeprefix(_FOLDER)
             if path == STABILITY.path():
                 cases = self._decoded(STABILITY) or ()
-                if not self._is_of_this_engine(STABILITY, "", {one.engine for one in cases}):
+                if not self._is_of_this_engine(
+                    STABILITY, "", {one.machine.engine for one in cases}
+                ):
                     cases = ()
             elif name.endswith(BENCH.suffix):
                 scenes |= self._of_model(BENCH, name.removesuffix(BENCH.suffix))

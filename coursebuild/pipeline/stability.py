@@ -3,27 +3,30 @@
 Entry points: `stability(options, names)`, `check_stability`.
 
 1. Names mean problems, or families of them: `damped-spring` is all of its damping ratios.
-2. What was measured is kept under the engine's version, the kind of machine and the code that
-   measures; what is kept is not measured again, but where it is held against a record.
+2. What was measured is kept under the machine, its versions and the code that measures; what is
+   kept is not measured again, but where it is held against a record.
 3. All cases are recorded in one file. Where some are named, recording them leaves the others as
    they are, and checking them says nothing of the others.
+4. Where the two references of a case are further apart than they may be, it is an error, and
+   nothing is recorded.
 """
 
 from __future__ import annotations
 
-import platform
+import time
 
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.model.scenarios import Bands
-from coursebuild.core.run.versions import engine_version, package_version, python_version
+from coursebuild.core.run.machine import machine, one_processor
+from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.departures import Checked, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.reports import MeasuringRun, read_record, with_records
+from coursebuild.pipeline.reports import MeasuringRun, machine_parts, read_record, with_records
 from coursebuild.report.measuring import Measurement
 
 _CODE = ("coursebuild/numerics", "mjcourse/spatial")
@@ -41,7 +44,7 @@ def stability(
         UsageError: no problem is called so.
     """
     found = _CaseRun(options).all(names)
-    if not record:
+    if not record or found.failures:
         return found
     others: list[CaseReport] = []
     if names and (options.root / STABILITY.path()).exists():
@@ -70,7 +73,7 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     new = {case.name for case in found.reports}
     old = [case for case in recorded if not names or case.name in new]
     here = engine_version()
-    others = sorted({case.engine for case in old} - {here})
+    others = sorted({case.machine.engine for case in old} - {here})
     remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in others)
     departures = case_departures(old, found.reports, Bands())
     return replace(found, checked=(Checked("stability", STABILITY.path(), departures, remarks),))
@@ -79,22 +82,26 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
 class _CaseRun(MeasuringRun):
     """Measures hard cases one after the other."""
 
-    local = False
-
     def all(self, names: tuple[str, ...]) -> Measurement[CaseReport]:
         """Those that the names mean."""
-        versions = (engine_version(), package_version("numpy"), python_version())
-        state = (*versions, platform.system(), platform.machine(), code_digest(*_CODE))
-        return self.each(_chosen(names), lambda name: self._one(name, state))
+        self.here, self.code = machine(pinned=True), code_digest(*_CODE)
+        with one_processor():
+            return self.each(_chosen(names), self._one)
 
-    def _one(self, name: str, state: tuple[str, ...]) -> CaseReport | None:
-        from coursebuild.numerics.cases import measure_case
+    def _one(self, name: str) -> CaseReport | None:
+        parts = (name, self.code, *machine_parts(self.here))
+        return self.once(name, "stability", parts, CaseReport, lambda: self._measured(name))
+
+    def _measured(self, name: str) -> CaseReport | None:
+        from coursebuild.numerics.cases import DisagreementError, measure_case
         from coursebuild.numerics.problems import problem_named
 
-        parts = (name, *state)
-        return self.once(
-            name, "stability", parts, CaseReport, lambda: measure_case(problem_named(name))
-        )
+        try:
+            return measure_case(problem_named(name), self.here, time.thread_time_ns)
+        except DisagreementError as error:
+            why = "neither can be told to be right: no error against them means anything"
+            self.failures.append(ReportFailure(str(error), why))
+            return None
 
 
 def _known() -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports.bench import (
+    FittedOrder,
     MeasuredSetting,
     OrderRow,
     ScenarioReport,
@@ -163,13 +164,13 @@ def _rows(report: ScenarioReport, style: Style) -> list[str]:
 
 
 def _orders(orders: Sequence[OrderRow]) -> list[str]:
-    shown = [o for o in orders if (o.position, o.attitude, o.velocity) != (None, None, None)]
+    shown = [one for one in orders if one.there]
     if not shown:
         return []
 
     def cells(name: str) -> tuple[str, ...]:
-        found: list[float | None] = [getattr(one, name) for one in shown]
-        return tuple("" if value is None else f"{value:.2f}" for value in found)
+        found: list[FittedOrder | None] = [getattr(one, name) for one in shown]
+        return tuple("" if fit is None else fit.text for fit in found)
 
     parts = ("position", "attitude", "velocity")
     columns = [Column("order of", tuple(one.integrator for one in shown), left=True)]

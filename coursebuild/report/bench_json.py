@@ -86,10 +86,11 @@ def _row(scenario: ScenarioReport, row: WorkPrecisionRow) -> dict[str, object]:
             value[key] = None if interval is None else getattr(interval, part or "value")
     integrator = row.setting.integrator
     order = next((one for one in scenario.orders if one.integrator == integrator), None)
+    fits = {name: getattr(order, name, None) for name in _QUANTITIES}
     stable = next((one for one in scenario.stable if one.integrator == integrator), None)
     return {
         **value,
-        **{f"order_{name}": getattr(order, name, None) for name in _QUANTITIES},
+        **{f"order_{name}": getattr(fit, "value", None) for name, fit in fits.items()},
         **{name: getattr(row, name) for name in _OF_ROW},
         **{name: getattr(row, field) for name, field in _RENAMED.items()},
         "largest_stable_timestep": None if stable is None else stable.largest,

@@ -12,6 +12,7 @@ from typing import Generic, TypeVar
 from msgspec import Struct
 
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.numerics.reports.bench import FittedOrder
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
@@ -127,8 +128,7 @@ def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
 def _case(report: CaseReport, style: Style) -> str:
     head = style.paint(f"{report.name}", BOLD) + f"  case {report.case}: {report.title}"
     lines = [head]
-    if report.reference is not None:
-        lines += [f"  {line}" for line in _reference(report.reference)]
+    lines += [f"  {line}" for line in _reference(report.reference)]
     if report.note:
         lines.append(f"  {report.note}")
     if report.boundaries:
@@ -143,7 +143,7 @@ def _case(report: CaseReport, style: Style) -> str:
     fitted: list[tuple[str, Cells]] = [
         (o.integrator, (_order(o.position), _order(o.attitude), _order(o.velocity)))
         for o in report.orders
-        if (o.position, o.attitude, o.velocity) != (None, None, None)
+        if o.there
     ]
     if fitted:
         lines += _table(_ORDERS, fitted)
@@ -160,11 +160,11 @@ def _case(report: CaseReport, style: Style) -> str:
 
 
 def _reference(line: ReferenceLine) -> list[str]:
-    said = [f"reference ({line.kind}, known to {line.floor:.0e}): {line.source}"]
-    if line.second:
-        off = "" if line.agreement is None else f", which differs by {line.agreement:.1e}"
-        said.append(f"second: {line.second}{off}")
-    return said
+    sizes = f"{max(line.position, line.attitude):.0e}, velocities to {line.velocity:.0e}"
+    return [
+        f"reference ({line.kind}, known to {sizes}): {line.source}",
+        f"second: {line.second}",
+    ]
 
 
 def _boundary(line: BoundaryLine) -> Cells:
@@ -179,6 +179,8 @@ def _boundary(line: BoundaryLine) -> Cells:
 def _figure(line: FigureLine) -> Cells:
     unit = f" {line.unit}" if line.unit else ""
     measured = "not finite" if line.measured is None else f"{line.measured:.10g}{unit}"
+    if line.spread is not None:
+        measured = f"{line.measured:.3g}{unit} ({line.spread[0]:.3g} to {line.spread[1]:.3g})"
     exact = "" if line.exact is None else f"{line.exact:.10g}{unit}"
     difference = ""
     if line.exact is not None and line.measured is not None:
@@ -186,8 +188,8 @@ def _figure(line: FigureLine) -> Cells:
     return measured, exact, difference
 
 
-def _order(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}"
+def _order(fit: FittedOrder | None) -> str:
+    return "" if fit is None else fit.text
 
 
 def _seconds(value: float) -> str:

@@ -10,10 +10,16 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import Bands
-from coursebuild.numerics.reports.bench import OrderRow, ScenarioReport, StableRow, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import (
+    FittedOrder,
+    OrderRow,
+    ScenarioReport,
+    StableRow,
+    WorkPrecisionRow,
+)
 from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
 from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
-from support.bench_reports import CASE, MACHINE, interval, lost, row, scenario, scene, swing
+from support.bench_reports import CASE, FIRST, MACHINE, interval, lost, row, scenario, scene, swing
 
 BANDS = Bands()
 
@@ -179,10 +185,10 @@ def test_largest_stable_timesteps(
 
 
 def test_orders_that_can_be_fitted_no_more() -> None:
-    old = scenario([], orders=(OrderRow("RK4", 4.0, None, 3.9),))
-    new = scenario([], orders=(OrderRow("RK4", None, None, 3.94),))
+    old = scenario([], orders=(OrderRow("RK4", FIRST, None, FittedOrder(3.9, 0.1, 0.1)),))
+    new = scenario([], orders=(OrderRow("RK4", None, None, FittedOrder(3.94, 0.1, 0.1)),))
     (found,) = between(old, new)
-    assert found == Departure("swing", "RK4", "order of position", "4", "nothing", "± 0.05")
+    assert found == Departure("swing", "RK4", "order of position", "1", "nothing", "± 0.05")
 
 
 @given(share=st.floats(-1, 1))

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.numerics.cases import measure, orders
+from coursebuild.numerics.cases import floor, measure, orders
 from coursebuild.numerics.measure import (
     FLOORS,
     Errors,
     Sizes,
     errors,
-    order,
+    fitted_order,
     raised,
 )
 from coursebuild.numerics.problem import STANDARD, Integrator, Motion
@@ -47,7 +47,7 @@ def slopes(name: str, integrator: Integrator) -> dict[str, float]:
     """The orders that could be fitted, by what they are of."""
     found = orders(problem_named(name), measured(name, integrator))
     parts = {"position": found.position, "attitude": found.attitude, "velocity": found.velocity}
-    return {part: one for part, one in parts.items() if one is not None}
+    return {part: one.value for part, one in parts.items() if one is not None}
 
 
 # --- orders
@@ -60,7 +60,8 @@ def test_the_euler_family_is_of_first_order() -> None:
         found = slopes(name, integrator)
         if name != "tumbling-box":
             found.pop("velocity", None)
-        assert found
+        # A spring that `discrete` damps has errors that follow no one power.
+        assert found or (name, integrator) == ("damped-spring-0", Integrator.DISCRETE)
         assert found == pytest.approx(dict.fromkeys(found, 1.0), abs=0.05), (name, integrator)
     assert set(slopes("tumbling-box", Integrator.EULER)) == {"attitude", "velocity"}
 
@@ -90,15 +91,23 @@ def test_rk4_is_nearly_of_fourth_order_on_a_pendulum_from_90_degrees() -> None:
     assert slopes("pendulum-ball-90", Integrator.RK4)["attitude"] >= 3.8
 
 
-def test_an_order_is_fitted_only_where_it_shows() -> None:
+def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     steps = [2.0**-n for n in range(12)]
     clean = [h**3 for h in steps]
     spoilt = [max(e, 1e-7) if e < 0.1 else 5.0 for e in clean]
-    assert order(steps, spoilt, 1e-9) == order(steps[2:8], clean[2:8], 0.0)
-    assert order(steps[:2], clean[:2], 0.0) is None
-    assert order(steps[2:5], clean[2:5], 0.0) == pytest.approx(3.0)
-    assert order(steps[:6], [*clean[:5], 0.09], 0.0, bent=0.5) is None
-    assert order(steps, [1e-12] * 12, 1e-12) is None
+    found = fitted_order(steps, spoilt, 1e-9)
+    assert found == fitted_order(steps[2:8], clean[2:8], 0.0)
+    assert found is not None and found.value == pytest.approx(3.0, abs=1e-12)
+    assert max(found.uncertainty, found.bend) < 1e-9
+    assert fitted_order(steps[2:5], clean[2:5], 0.0) is None  # three are often on one
+    assert fitted_order(steps, [1e-12] * 12, 1e-12) is None
+    bent = [h**2 + 50 * h**4 for h in steps]
+    assert fitted_order(steps, bent, 0.0) is None
+    wavy = [h**2 * (1.3 if n % 2 else 1) for n, h in enumerate(steps)]
+    assert fitted_order(steps, wavy, 0.0) is None
+    shaken = [h**2 * (1.05 if n % 2 else 1) for n, h in enumerate(steps)]
+    told = fitted_order(steps, shaken, 0.0)
+    assert told is not None and abs(told.value - 2) < told.uncertainty < 0.05
 
 
 # --- errors and floors
@@ -107,11 +116,11 @@ def test_an_order_is_fitted_only_where_it_shows() -> None:
 @pytest.mark.site
 def test_no_error_lies_below_ten_floors() -> None:
     for name in ("projectile", "millimetre-cube", "damped-spring-10"):
-        problem = problem_named(name)
-        assert problem.reference is not None
+        known = floor(problem_named(name))
         for one in measured(name, Integrator.RK4):
-            for part in (one.position, one.attitude, one.velocity):
-                assert part is None or min(part) >= FLOORS * problem.reference.floor
+            for part in ("position", "attitude", "velocity"):
+                pair = getattr(one, part)
+                assert pair is None or min(pair) >= FLOORS * getattr(known, part)
 
 
 def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
@@ -141,7 +150,7 @@ def test_a_timestep_that_misses_the_end_is_refused() -> None:
 def test_commands_are_held_on_a_grid_that_all_timesteps_share() -> None:
     found = orders(problem_named("stiff-servo-1"), measured("stiff-servo-1", Integrator.RK4))
     assert found.velocity is not None
-    assert found.velocity > 3.9  # a command taken anew at every step would make it 1
+    assert found.velocity.value > 3.9  # a command taken anew at every step would make it 1
 
 
 # --- invariants
@@ -178,13 +187,13 @@ def test_the_box_drifts_to_four_digits() -> None:
 def test_rk4_hits_the_first_crossing() -> None:
     errors = {}
     for nudge in tumbling_box.NUDGES:
-        exact = tumbling_box.Tumbling(nudge, tumbling_box.SPIN).first_crossing
+        exact = tumbling_box.Tumbling(nudge).first_crossing
         errors[nudge] = abs(tumbling_box.measured_crossing(Integrator.RK4, nudge) - exact)
     assert max(errors.values()) < 1e-8, errors
 
 
 def test_the_flip_interval_grows_by_a_constant_for_each_decade() -> None:
-    forms = [tumbling_box.Tumbling(nudge, tumbling_box.SPIN) for nudge in tumbling_box.NUDGES]
+    forms = [tumbling_box.Tumbling(nudge) for nudge in tumbling_box.NUDGES]
     for smaller, larger in itertools.pairwise(forms[:-1]):
         grown = smaller.flip_interval - larger.flip_interval
         assert grown == pytest.approx(2 * math.log(10) / smaller.rate, rel=2e-5)
@@ -218,7 +227,7 @@ def test_restitution_comes_to_one_with_more_steps_in_a_contact() -> None:
 
 @pytest.mark.site
 def test_a_cradle_that_touches_is_another_problem() -> None:
-    exact = impact.touching_cradle(np.array([0.06])).velocity[0]
+    exact = impact.TouchingCradle().motion(np.array([0.06])).velocity[0]
     assert np.sum(exact) == pytest.approx(1.0, rel=1e-12)  # momentum
     # The contact that opens first still pushed: its part of the energy is lost.
     assert np.sum(exact**2) == pytest.approx(0.998656, abs=1e-6)
@@ -229,16 +238,17 @@ def test_a_cradle_that_touches_is_another_problem() -> None:
 
 
 def test_a_pyramid_has_less_friction_between_its_axes() -> None:
-    gravity, half = incline.GRAVITY, math.sqrt(0.5)
-    coulomb = gravity * half * (1 - incline.FRICTION)
-    blunted = gravity * half * (1 - incline.FRICTION * half)
+    gravity, half = 9.81, math.sqrt(0.5)
+    coulomb = gravity * half * (1 - 0.5)
+    blunted = gravity * half * (1 - 0.5 * half)
     for cone, across, exact in (
         ("elliptic", False, coulomb),
         ("elliptic", True, coulomb),
         ("pyramidal", False, coulomb),
         ("pyramidal", True, blunted),
     ):
-        text = incline.mjcf("box", incline.SLIDING, across, cone, incline.FRICTION)  # type: ignore[arg-type]
+        slope = incline.ACROSS if across else incline.SLIDING
+        text = incline.mjcf("box", slope, cone, "0.5")  # type: ignore[arg-type]
         found = incline.acceleration(text, Integrator.EULER)
         # The block chatters: its contacts act only part of the time.
         assert found == pytest.approx(exact, rel=0.04), (cone, across)
@@ -246,7 +256,7 @@ def test_a_pyramid_has_less_friction_between_its_axes() -> None:
 
 def test_what_should_stick_creeps() -> None:
     for cone in ("elliptic", "pyramidal"):
-        text = incline.mjcf("box", incline.STICKING, False, cone, incline.FRICTION)  # type: ignore[arg-type]
+        text = incline.mjcf("box", incline.STICKING, cone, "0.5")  # type: ignore[arg-type]
         assert 1e-5 < incline.creep(text, Integrator.EULER) < 2e-3
 
 
@@ -260,9 +270,9 @@ def test_a_stack_comes_to_rest_at_the_depth_of_its_soft_contacts() -> None:
 
 @pytest.mark.site
 def test_the_horizon_of_the_double_pendulum() -> None:
-    euler, rk4 = (double_pendulum.horizon(one) for one in (Integrator.EULER, Integrator.RK4))
-    assert 1.5 < euler < 3.5
-    assert 9.0 < rk4 < 13.0
+    euler, rk4 = (double_pendulum.horizons(one) for one in (Integrator.EULER, Integrator.RK4))
+    assert 1.5 < min(euler) <= max(euler) < 3.5
+    assert 8.0 < min(rk4) < max(rk4) < 14.0
 
 
 def test_bodies_that_are_tiny_far_away_or_thin() -> None:
@@ -270,5 +280,5 @@ def test_bodies_that_are_tiny_far_away_or_thin() -> None:
     assert scales.crawled(Integrator.EULER, 1e-2) == pytest.approx(1e-3, rel=0.5)
     assert scales.sunk(Integrator.EULER) > 0.05
     with pytest.raises(ValueError, match=r"A \+ B >= C"):
-        mujoco.MjModel.from_xml_string(scales.plate(scales.PLATE_MOMENTS))
+        mujoco.MjModel.from_xml_string(scales.ROUNDED_PLATE)
     assert scales.problems()[2].checks[0].measure(Integrator.EULER) == pytest.approx(0.1111)

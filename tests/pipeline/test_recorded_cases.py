@@ -9,6 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
+from coursebuild.numerics.problems import all_problems, projectile
 from coursebuild.numerics.reports.records import STABILITY
 
 pytestmark = pytest.mark.site
@@ -40,6 +41,23 @@ def test_recorded_then_checked(course: Path, capsys: pytest.CaptureFixture[str])
     assert capsys.readouterr().out.endswith(f"\n{STABILITY.path()} is as it was\n")
 
 
+def test_references_that_differ_are_an_error_and_nothing_is_recorded(
+    course: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a constant that somebody mistyped: here the stone is thrown 1e-6 too fast."""
+    thrown = replace(projectile.PARABOLA, launch=(3.000003, 0.0, 4.0))
+    monkeypatch.setattr(projectile, "PARABOLA", thrown)
+    all_problems.cache_clear()
+    try:
+        for arguments in (["--record"], ["--format", "json"]):
+            assert run(course, "projectile", *arguments) == 1
+            out = capsys.readouterr().out
+            assert "the references of `projectile` differ by 3e-06 in position" in out
+    finally:
+        all_problems.cache_clear()
+    assert not (course / STABILITY.path()).exists()
+
+
 def test_recording_some_cases_leaves_the_others(course: Path) -> None:
     run(course, "stack-1", "--record")
     before = (course / STABILITY.path()).read_bytes()
@@ -60,7 +78,8 @@ def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture
         replace(line, measured=-0.06) if line.integrator == "Euler" else line
         for line in case.figures
     )
-    path.write_bytes(STABILITY.encode((replace(case, engine="3.7.0", figures=wrong),)))
+    other = replace(case, machine=replace(case.machine, engine="3.7.0"), figures=wrong)
+    path.write_bytes(STABILITY.encode((other,)))
     capsys.readouterr()
     assert run(course, "projectile", "--check") == 1
     head, remark, _, name, _, figure = capsys.readouterr().out.splitlines()

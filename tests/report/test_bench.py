@@ -64,9 +64,9 @@ def test_orders_and_limits_and_the_verdict() -> None:
     assert "         1  Euler          50 ms                                  diverged\n" in text
     assert (
         "    RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate.\n\n"
-        "    order of  position  velocity\n"
-        "    Euler         1.00      0.99\n"
-        "    RK4           4.00\n\n"
+        "    order of                position                velocity\n"
+        "    Euler     1.00 ± 0.01, bend 0.02  0.99 ± 0.01, bend 0.02\n"
+        "    RK4       4.00 ± 0.01, bend 0.02\n\n"
         "    integrator  largest stable  steps  tried\n"
         "    Euler       40 ms           250    60 from 1 ms\n"
         "    implicit    all to 100 ms   100    49 from 1 ms\n"

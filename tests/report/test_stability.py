@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 
-from coursebuild.numerics.reports.bench import OrderRow
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import FittedOrder, OrderRow
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
     FigureLine,
     ReferenceLine,
+    StepCost,
 )
 from coursebuild.report import Style
 from coursebuild.report.measuring import stability_text
 from coursebuild.report.values import json_text
+from support.bench_reports import FIRST, MACHINE
 
 TRIED = (1e-3, 10.0)
 
@@ -40,9 +43,9 @@ REPORT = CaseReport(
     name="spring",
     title="A spring",
     case=5,
-    engine="3.14.0",
+    machine=MACHINE,
     note="begins at rest",
-    reference=ReferenceLine("closed", "a textbook", 1e-13, "another", 2e-14),
+    reference=ReferenceLine("closed", "a textbook", "another", 1e-13, 2e-14, 1e-12),
     boundaries=(
         boundary("Euler", 0.2),
         boundary("implicit", 0.2),
@@ -54,7 +57,11 @@ REPORT = CaseReport(
         FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),
         FigureLine("growth", "m", "RK4", None, None, "a law"),
     ),
-    orders=(OrderRow("Euler", 1.0, None, 0.998), OrderRow("RK4", None, None, None)),
+    orders=(
+        OrderRow("Euler", FIRST, None, FittedOrder(0.998, 0.02, 0.1)),
+        OrderRow("RK4", None, None, None),
+    ),
+    costs=(StepCost("Euler", Interval(1e-6, 0.9e-6, 1.1e-6)),),
     errors=(
         ErrorLine("RK4", 0.5, "diverged", ("one", "two"), None, None, None, None, None, 0.0, True),
         ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),
@@ -62,8 +69,8 @@ REPORT = CaseReport(
 )
 TEXT = """\
 spring  case 5: A spring
-  reference (closed, known to 1e-13): a textbook
-  second: another, which differs by 2.0e-14
+  reference (closed, known to 1e-13, velocities to 1e-12): a textbook
+  second: another
   begins at rest
   largest stable  steps  tried         theory  difference  beyond       growth
   200 ms          25     60 from 1 ms  0.2 s   +0.000 %    diverged                  Euler, implicit
@@ -75,8 +82,8 @@ spring  case 5: A spring
   growth      exact  difference
   1.25 m      1 m    +2.5e-01    Euler
   not finite                     RK4
-  order of position  order of velocity
-  1.000              0.998              Euler
+  order of position       order of velocity
+  1.00 ± 0.01, bend 0.02  1.00 ± 0.02, bend 0.10  Euler
   refsafe softens constraints at 0.5 s: that is another model
   RK4 at 0.5 s: diverged: one; two
 """
@@ -91,5 +98,5 @@ def test_json_has_every_column_and_no_number_that_is_none() -> None:
     assert found["boundaries"][3]["largest"] is None
     assert found["boundaries"][2]["islands"] == [0.4, 0.5]
     assert found["errors"][1]["position"] == [0.1, 0.01]
-    assert found["reference"]["agreement"] == 2e-14
-    assert found["engine"] == "3.14.0"
+    assert found["reference"]["attitude"] == 2e-14
+    assert found["machine"]["engine"] == "3.14.0"

@@ -8,6 +8,7 @@ from typing import Any
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import (
+    FittedOrder,
     MeasuredSetting,
     OrderRow,
     RowVerdict,
@@ -22,25 +23,28 @@ from coursebuild.numerics.reports.cases import (
     ErrorLine,
     FigureLine,
     ReferenceLine,
+    StepCost,
 )
 
 MACHINE = Machine("3.14.0", "3.11.7", "2.3.0", "Linux x86_64", "A Processor @ 2 GHz")
 VERDICT = RowVerdict(True, None, None, None, False, "The scene’s own setting is on the front.")
+FIRST = FittedOrder(1.0, 0.01, 0.02)
 CASE = CaseReport(
     name="spring",
     title="A spring",
     case=5,
-    engine="3.14.0",
+    machine=MACHINE,
     note="",
-    reference=ReferenceLine("closed", "a textbook", 1e-13, "", None),
+    reference=ReferenceLine("closed", "a textbook", "another", 1e-13, 0.0, 1e-12),
     boundaries=(
         BoundaryLine(
             "Euler", 0.2, (1e-3, 1.0), None, 9.0, 45, 9, None, 0.2, "hω = 2", 0.0, "", None
         ),
     ),
     figures=(FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),),
-    orders=(OrderRow("Euler", 1.0, None, None),),
+    orders=(OrderRow("Euler", FIRST, None, None),),
     errors=(ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),),
+    costs=(StepCost("Euler", Interval(1e-6, 0.9e-6, 1.1e-6)),),
 )
 _KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
 
@@ -139,7 +143,10 @@ def swing() -> ScenarioReport:
     text = "RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate."
     return scenario(
         rows,
-        orders=(OrderRow("Euler", 1.0, None, 0.99), OrderRow("RK4", 4.0, None, None)),
+        orders=(
+            OrderRow("Euler", FIRST, None, FittedOrder(0.99, 0.01, 0.02)),
+            OrderRow("RK4", FittedOrder(4.0, 0.01, 0.02), None, None),
+        ),
         stable=(
             StableRow("Euler", 0.04, (1e-3, 0.1), None, 10.0, 250, 60, 2.5),
             StableRow("implicit", None, (1e-3, 0.1), None, 10.0, 100, 49, 2.5),

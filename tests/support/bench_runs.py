@@ -54,4 +54,4 @@ def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisi
 
 def orders(report: ScenarioReport, part: str) -> dict[str, float]:
     found = {one.integrator: getattr(one, part) for one in report.orders}
-    return {name: value for name, value in found.items() if value is not None}
+    return {name: fit.value for name, fit in found.items() if fit is not None}

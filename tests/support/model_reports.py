@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports import Reports
+from coursebuild.numerics.reports import Interval, Reports
 from coursebuild.numerics.reports.bench import OrderRow, SceneCard, SceneReport
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
@@ -12,6 +12,7 @@ from coursebuild.numerics.reports.cases import (
     ErrorLine,
     FigureLine,
     ReferenceLine,
+    StepCost,
 )
 from coursebuild.numerics.reports.diet import (
     DietReport,
@@ -20,7 +21,7 @@ from coursebuild.numerics.reports.diet import (
     ModelPlace,
     Saving,
 )
-from support.bench_reports import MACHINE, awkward, swing
+from support.bench_reports import FIRST, MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario
 from support.bench_reports import scene as scene
@@ -77,9 +78,11 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
         "name": name,
         "title": f"A <{name}>",
         "case": number,
-        "engine": "3.14.0",
+        "machine": MACHINE,
         "note": "it swings",
-        "reference": ReferenceLine("closed", "the oscillator", 1e-13, "Bulirsch–Stoer", 3.9e-13),
+        "reference": ReferenceLine(
+            "closed", "the oscillator", "Bulirsch–Stoer", 1e-13, 0.0, 3.9e-13
+        ),
         "boundaries": (
             BoundaryLine("Euler", 0.2, *tried, 0.2001, "2/ω", -5e-4, "diverged", 1.5),
             replace(
@@ -95,7 +98,7 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
             FigureLine("energy", "", "RK4", -4.1e-10, 0.0, ""),
             FigureLine("energy", "", "Euler", None, None, ""),
         ),
-        "orders": (OrderRow("Euler", 1.0, None, None), OrderRow("discrete", None, None, None)),
+        "orders": (OrderRow("Euler", FIRST, None, None), OrderRow("discrete", None, None, None)),
         "errors": (
             ErrorLine(
                 "Euler", 0.01, "ok", (), (1.5e-3, 1e-3), None, (2e-3, 1e-3), None, None, 0.0, False
@@ -104,6 +107,7 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
                 "Euler", 0.5, "diverged", ("1e9 rad/s",), None, None, None, None, None, 0.0, True
             ),
         ),
+        "costs": (StepCost("Euler", Interval(1e-6, 0.9e-6, 1.1e-6)),),
         **other,
     }
     return CaseReport(**fields)  # type: ignore[arg-type]
@@ -116,5 +120,5 @@ def reports() -> Reports:
     return Reports(
         {"box": box()},
         {"box": diet(finding(), kept, doubted)},
-        (case("spring", 5), case("other", 5, reference=None, note=""), case("top", 3, errors=())),
+        (case("spring", 5), case("other", 5, note=""), case("top", 3, errors=())),
     )

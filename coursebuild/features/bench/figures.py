@@ -16,7 +16,6 @@ from msgspec import Struct
 from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.strings import Strings
 from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.numerics.reports.cases import ReferenceLine
 
 _MINUS = "\u2212"
 _THIN = "\u2009"
@@ -172,13 +171,11 @@ def again(command: str, *names: str) -> str:
     return " ".join(["coursebuild", command, *map(shlex.quote, names)])
 
 
-def about_reference(
-    words: Strings, kind: str, reference: ScenarioReport | ReferenceLine
-) -> Iterator[str]:
-    """What errors were measured against, in sentences; `kind` is `closed`, `ode` or `self`."""
-    floor = power(reference.floor, 1)
-    yield said(words, f"measured.reference_{kind}", source=reference.source, floor=floor)
-    if reference.second:
-        yield words("measured.second", source=reference.second)
-    if reference.agreement is not None:
-        yield said(words, "measured.agreement", difference=power(reference.agreement, 2))
+def about_reference(words: Strings, report: ScenarioReport) -> Iterator[str]:
+    """What errors were measured against, in sentences."""
+    floor = power(report.floor, 1)
+    yield said(words, f"measured.reference_{report.reference}", source=report.source, floor=floor)
+    if report.second:
+        yield words("measured.second", source=report.second)
+    if report.agreement is not None:
+        yield said(words, "measured.agreement", difference=power(report.agreement, 2))

@@ -24,6 +24,7 @@ from coursebuild.features.bench.figures import (
     sentence,
 )
 from coursebuild.numerics.reports.bench import (
+    FittedOrder,
     OrderRow,
     ScenarioReport,
     StableRow,
@@ -102,7 +103,7 @@ def _about(words: Strings, report: ScenarioReport) -> list[str]:
     parts = [] if usual is None else solving_parts(usual)
     if parts:
         told.append(words("measured.usual", setting=", ".join(parts)))
-    return [*told, *about_reference(words, report.reference, report)]
+    return [*told, *about_reference(words, report)]
 
 
 def _settings(words: Strings, report: ScenarioReport) -> Grid:
@@ -176,13 +177,13 @@ def lost_runs(runs: Iterable[tuple[str, WorkPrecisionRow | ErrorLine | SweepRow]
 
 
 def _orders(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
-    shown = [o for o in orders if (o.position, o.attitude, o.velocity) != (None, None, None)]
+    shown = [one for one in orders if one.there]
     if not shown:
         return None
     columns = [(words("measured.integrator"), [one.integrator for one in shown])]
     for name, key in ORDERS:
-        found: list[float | None] = [getattr(one, name) for one in shown]
-        cells = ["" if value is None else f"{value:.2f}" for value in found]
+        found: list[FittedOrder | None] = [getattr(one, name) for one in shown]
+        cells = ["" if fit is None else fit.text for fit in found]
         columns.append((words(key), cells))
     return grid(words("measured.orders"), columns)
 

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         return stability(options, names, record=arguments.record)
 
     found = measured(arguments, measure)
-    if arguments.format == "json" and not (arguments.record or arguments.check):
+    if arguments.format == "json" and found.ok and not (arguments.record or arguments.check):
         return write(json_text(found.reports), CLEAN)
     shown = () if arguments.check else found.reports
     values = {"cases": found.reports}

@@ -5,8 +5,9 @@ Entry point: `numerics_values(library)`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
+from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.pages import urls
@@ -15,14 +16,13 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import (
     FigurePart,
     Grid,
-    about_reference,
     again,
-    bounded,
-    exact,
     grid,
     percent,
     power,
+    said,
     sentence,
+    where,
 )
 from coursebuild.features.bench.scenarios import (
     ORDERS,
@@ -32,22 +32,20 @@ from coursebuild.features.bench.scenarios import (
     stable_cells,
     stable_title,
 )
+from coursebuild.numerics.reports.case_plot import CaseQuantity, case_quantities, case_svg
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     Cells,
-    ErrorLine,
     FigureLine,
     merged,
 )
-from coursebuild.numerics.reports.points import FLOORS, integrator_rank, seconds_text, status_text
+from coursebuild.numerics.reports.points import KNOWN, seconds_text, status_text
 from coursebuild.numerics.reports.records import STABILITY
 
-_QUANTITIES = (
-    ("position", "measured.position"),
-    ("attitude", "measured.attitude"),
-    ("velocity", "measured.velocity"),
-)
+_RIGHT = 1e-3
+"""m or rad: the error that costs are compared at."""
+_DIGITS = 3
 _BOUNDARY = (
     *STABLE,
     "measured.theory",
@@ -56,9 +54,18 @@ _BOUNDARY = (
     "measured.growth",
     "measured.remark",
 )
-_FIGURE = ("numerics.measured", "numerics.exact", "measured.difference")
+_FIGURE = ("numerics.measured", "numerics.spread", "numerics.exact", "measured.difference")
 _Rows = list[tuple[str, Cells]]
 """Integrators, and what is said of each."""
+
+
+class MatrixRow(Struct, frozen=True):
+    """A case, in the table of all of them."""
+
+    name: str
+    title: str
+    cells: tuple[tuple[str, ...], ...]
+    """Orders, largest stable timesteps, and costs, by integrator."""
 
 
 class CaseView(Struct, frozen=True):
@@ -67,10 +74,9 @@ class CaseView(Struct, frozen=True):
     name: str
     title: str
     about: tuple[str, ...]
-    """What it is and what it was held against, a sentence each."""
+    """What the plots say, and what the case is, a sentence each."""
+    plots: tuple[Markup, ...]
     grids: tuple[Grid, ...]
-    errors: tuple[Grid, ...]
-    """Errors by timestep, which are many."""
     notes: tuple[str, ...]
     command: str
 
@@ -80,6 +86,7 @@ class CaseGroup(Struct, frozen=True):
 
     number: int
     title: str
+    rows: tuple[MatrixRow, ...]
     cases: tuple[CaseView, ...]
 
 
@@ -91,7 +98,8 @@ def numerics_values(library: Library) -> dict[str, object]:
     groups = tuple(_group(words, n, [one for one in cases if one.case == n]) for n in numbers)
     return {
         "groups": groups,
-        "engine": ", ".join(sorted({one.engine for one in cases})),
+        "integrators": KNOWN,
+        "where": dict.fromkeys(where(words, one.machine) for one in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
         "command": again("stability", "--record"),
     }
@@ -101,26 +109,65 @@ def _group(words: Strings, number: int, cases: Sequence[CaseReport]) -> CaseGrou
     first = cases[0].title
     key = f"numerics.case_{number}"
     title = words(key) if len(cases) > 1 and words.has(key) else first
-    return CaseGroup(number, title, tuple(_case(words, one) for one in cases))
+    rows = tuple(_matrix_row(words, one) for one in cases)
+    return CaseGroup(number, title, rows, tuple(_case(words, one) for one in cases))
+
+
+def _matrix_row(words: Strings, report: CaseReport) -> MatrixRow:
+    shown = next(iter(case_quantities(report)), None)
+    part = None if shown is None or shown.name == "energy_drift" else shown.name
+    fits = {one.integrator: getattr(one, part) for one in report.orders} if part else {}
+    limits = {one.integrator: one for one in report.boundaries}
+    orders = (fits.get(one) for one in KNOWN)
+    costs = (report.cost_to(one, _RIGHT) for one in KNOWN)
+    return MatrixRow(
+        report.name,
+        report.title,
+        (
+            tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
+            tuple(_limit(words, limits.get(one)) for one in KNOWN),
+            tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
+        ),
+    )
+
+
+def _limit(words: Strings, line: BoundaryLine | None) -> str:
+    if line is None:
+        return ""
+    if not line.largest:
+        return words("numerics.all" if line.largest is None else "numerics.none")
+    return seconds_text(line.largest, _DIGITS)
+
+
+# ------------------------------------------------------------------------------------------ a case
 
 
 def _case(words: Strings, report: CaseReport) -> CaseView:
     grids = (_boundaries(words, report), _figures(words, report), _orders(words, report))
+    shown = case_quantities(report)
     return CaseView(
         report.name,
         report.title,
-        tuple(_about(words, report)),
+        tuple(_about(words, report, shown)),
+        tuple(Markup(case_svg(report, one, f"{report.name}-{one.name}")) for one in shown),
         tuple(one for one in grids if one is not None),
-        tuple(_errors(words, report)),
         tuple(_notes(words, report)),
         again("stability", report.name),
     )
 
 
-def _about(words: Strings, report: CaseReport) -> list[str]:
-    told = [sentence(report.note)] if report.note else []
-    found = report.reference
-    return told if found is None else [*told, *about_reference(words, found.kind, found)]
+def _about(words: Strings, report: CaseReport, shown: Sequence[CaseQuantity]) -> Iterator[str]:
+    costs = [(cost, one) for one in KNOWN if (cost := report.cost_to(one, _RIGHT)) is not None]
+    if costs:
+        (least, best), (most, worst) = min(costs), max(costs)
+        key = "cheapest" if most > 1.05 * least else "alike"
+        key = f"numerics.{key if len(costs) > 1 else 'only'}"
+        told, ratio = seconds_text(least, _DIGITS), f"{most / least:.3g}"
+        yield words(key, best=best, cost=told, worst=worst, factor=ratio)
+    elif shown:
+        yield words("numerics.out_of_reach")
+    if report.note:
+        yield sentence(report.note)
 
 
 def _grid(
@@ -142,7 +189,7 @@ def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
 
 
 def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
-    theory = seconds_text(line.theory) if line.theory else ""
+    theory = seconds_text(line.theory, _DIGITS) if line.theory else ""
     if line.formula and not line.theory:
         theory = words("numerics.all" if line.theory is None else "numerics.none")
     return (
@@ -150,7 +197,7 @@ def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
         theory,
         percent(line.difference),
         status_text(line.beyond) if line.beyond else "",
-        "" if line.growth is None else f"{line.growth:.9f}",
+        power(line.growth),
         stable_again(words, line),
     )
 
@@ -178,53 +225,31 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
 
 
 def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
-    measured = words("numerics.infinite") if line.measured is None else exact(line.measured)
+    measured = words("numerics.infinite") if line.measured is None else power(line.measured)
     difference: str = ""
     if line.exact is not None and line.measured is not None:
         difference = power(line.measured - line.exact, 2)
-    return measured, exact(line.exact), difference
+    spread = "" if line.spread is None else " … ".join(map(power, line.spread))
+    return measured, spread, power(line.exact), difference
 
 
 def _orders(words: Strings, report: CaseReport) -> Grid | None:
-    shown = [o for o in report.orders if (o.position, o.attitude, o.velocity) != (None, None, None)]
     rows: _Rows = []
-    for one in shown:
-        values = (one.position, one.attitude, one.velocity)
-        rows.append((one.integrator, tuple("" if v is None else f"{v:.3f}" for v in values)))
+    for one in report.orders:
+        fits = (one.position, one.attitude, one.velocity)
+        if one.there:
+            rows.append((one.integrator, tuple("" if fit is None else fit.text for fit in fits)))
     titles = [words(key) for _, key in ORDERS]
     return _grid(words, words("numerics.orders", title=report.title), titles, rows)
 
 
-def _errors(words: Strings, report: CaseReport) -> list[Grid]:
-    """Errors by timestep and integrator, a table for each quantity."""
-    found = []
-    least = 0.0 if report.reference is None else FLOORS * report.reference.floor
-    lines = {(one.timestep, one.integrator): one for one in report.errors}
-    steps = sorted({one.timestep for one in report.errors}, reverse=True)
-    names = sorted({one.integrator for one in report.errors}, key=integrator_rank)
-    for quantity, key in _QUANTITIES:
-        if all(getattr(one, quantity) is None for one in report.errors):
-            continue
-        columns = [(words("measured.timestep"), [seconds_text(step) for step in steps])]
-        for name in names:
-            cells = [_error(lines.get((step, name)), quantity, least) for step in steps]
-            columns.append((name, cells))
-        label = words("numerics.errors", quantity=words(key))
-        found.append(grid(label, columns))
-    return found
-
-
-def _error(line: ErrorLine | None, quantity: str, least: float) -> str:
-    if line is None:
-        return ""
-    if line.status != "ok":
-        return status_text(line.status)
-    pair: tuple[float, float] | None = getattr(line, quantity)
-    return bounded(None if pair is None else pair[0], least)
-
-
 def _notes(words: Strings, report: CaseReport) -> list[str]:
-    notes = []
+    known = report.reference
+    place, speed = (power(one, 1) for one in (max(known.position, known.attitude), known.velocity))
+    notes: list[str] = [
+        words("numerics.references", first=known.source, second=known.second),
+        said(words, "numerics.known", place=place, speed=speed),
+    ]
     formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
     if formulas:
         notes.append(words("numerics.theory", sources="; ".join(formulas)))

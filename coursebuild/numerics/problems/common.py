@@ -1,7 +1,7 @@
 """What the hard cases share: their models' text, simulating for a while, a second reference.
 
 Entry points: `model_text`, `simulated`, `divisions`; `motion_without_attitude`, `turning_at_rest`;
-`engine_reference`.
+`ENGINE`, the second reference of most cases.
 """
 
 from __future__ import annotations
@@ -12,7 +12,13 @@ import numpy as np
 
 from coursebuild.numerics.engine import advance, compiled, initial_data
 from coursebuild.numerics.forward import forward_motion
-from coursebuild.numerics.problem import Array, Integrator, Motion, Reference, Scenario
+from coursebuild.numerics.problem import (
+    Array,
+    Integrator,
+    Motion,
+    Scenario,
+    SecondReference,
+)
 
 NO_CONTACT = '<flag contact="disable"/>'
 NO_GRAVITY = 'gravity="0 0 0"'
@@ -55,16 +61,5 @@ def turning_at_rest(times: Array, attitude: Array, omega: Array) -> Motion:
     return Motion(times, still, attitude[:, None], np.concatenate([still, omega], axis=1))
 
 
-def engine_reference(
-    mjcf: str, scenario: Scenario, tolerance: float = 1e-13, order: int = 16
-) -> Reference:
-    """MuJoCo's own accelerations, integrated: the second reference of most cases.
-
-    It shares nothing with a closed form but the model, and nothing with MuJoCo's integrators.
-    """
-    return Reference(
-        "ode",
-        "MuJoCo's accelerations, Bulirsch–Stoer" + ("" if order == 16 else f" of order {order}"),
-        lambda times: forward_motion(mjcf, scenario, times, tolerance=tolerance, order=order),
-        floor=1e-11,
-    )
+ENGINE = SecondReference("MuJoCo’s accelerations over the MJCF, DOP853", forward_motion)
+"""Shares nothing with MuJoCo's integrators."""

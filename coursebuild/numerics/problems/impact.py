@@ -22,6 +22,7 @@ import math
 from functools import partial
 
 import numpy as np
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.numerics.integrate import State, bulirsch_stoer
@@ -33,138 +34,137 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
+    Sizes,
 )
 from coursebuild.numerics.problems.common import (
+    ENGINE,
     NO_GRAVITY,
     divisions,
-    engine_reference,
     model_text,
     motion_without_attitude,
     simulated,
 )
 
-RATE = 1000.0
-"""√stiffness, rad/s."""
-CONTACT = math.pi / RATE
-"""How long a contact lasts, s."""
-RADIUS, SPEED, GAP = 0.1, 1.0, 0.05
-"""m, m/s, m."""
-IMPEDANCE = 0.9
+GAP, SPEED, CONTACT = 0.05, 1.0, math.pi / 1000
+"""m, m/s, and how long a contact lasts, s."""
 _PHASES = 16
 """Of a step, in which a contact can begin."""
 _LENGTHS = 4
 """Of a contact, from a whole number of steps on: at whole numbers errors cancel that elsewhere do
 not."""
 
-_GEOM = f'condim="1" solref="{-(RATE**2)!r} 0" solimp="{IMPEDANCE} {IMPEDANCE} 0.001 0.5 2"'
+_GEOM = 'condim="1" solref="-1000000 0" solimp="0.9 0.9 0.001 0.5 2"'
 _OPTION = f'{NO_GRAVITY} tolerance="0"'
 
 
-def _ball(at: float) -> str:
-    joint, geom = '<joint type="slide" axis="1 0 0"/>', f'<geom size="{RADIUS}" mass="1" {_GEOM}/>'
-    return f'    <body pos="{at!r} 0 0">{joint}{geom}</body>'
+def _ball(at: str) -> str:
+    joint, geom = '<joint type="slide" axis="1 0 0"/>', f'<geom size="0.1" mass="1" {_GEOM}/>'
+    return f'    <body pos="{at} 0 0">{joint}{geom}</body>'
 
 
 BOUNCE = model_text(
-    f'    <geom type="plane" size="1 1 1" pos="{RADIUS + GAP!r} 0 0" zaxis="-1 0 0" {_GEOM}/>\n'
-    + _ball(0.0),
+    f'    <geom type="plane" size="1 1 1" pos="0.15 0 0" zaxis="-1 0 0" {_GEOM}/>\n' + _ball("0"),
     _OPTION,
 )
+CRADLE = model_text("\n".join(map(_ball, ("0", "0.25", "0.5"))), _OPTION)
+TOUCHING = model_text("\n".join(map(_ball, ("0", "0.25", "0.45"))), _OPTION)
+_MEETING = Scenario(0.1, 0.01, (0.0,), (1.0,))
+_PASSING = Scenario(0.13, 0.01, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+_SHARED = Scenario(0.06, 0.002, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
-def cradle_mjcf(gaps: tuple[float, ...]) -> str:
-    """Balls on one line, with these gaps (m) between them."""
-    starts = [sum(gaps[:index]) + 2 * RADIUS * index for index in range(len(gaps) + 1)]
-    return model_text("\n".join(_ball(at) for at in starts), _OPTION)
+class Bounce(Struct, frozen=True):
+    """A ball that meets a wall and comes back."""
+
+    gap: float = GAP
+    """m."""
+    speed: float = SPEED
+    """m/s."""
+    rate: float = 1000.0
+    """√stiffness, rad/s."""
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        gap, speed, rate, contact = self.gap, self.speed, self.rate, math.pi / self.rate
+        t = times - gap / speed
+        touching = [t < 0, t < contact]
+        away = gap - speed * (t - contact)
+        place = np.select(touching, [speed * times, gap + speed / rate * np.sin(rate * t)], away)
+        velocity = np.select(touching, [np.full_like(t, speed), speed * np.cos(rate * t)], -speed)
+        return motion_without_attitude(times, place[:, None], velocity[:, None])
 
 
-CRADLE, TOUCHING = cradle_mjcf((GAP, GAP)), cradle_mjcf((GAP, 0.0))
-_MEETING = Scenario(0.1, 0.01, (0.0,), (SPEED,))
-_PASSING = Scenario(0.13, 0.01, (0.0, 0.0, 0.0), (SPEED, 0.0, 0.0))
-_SHARED = Scenario(0.06, 0.002, (0.0, 0.0, 0.0), (SPEED, 0.0, 0.0))
-
-
-def bounce(times: Array) -> Motion:
-    """A ball that meets a wall `GAP` away at `SPEED` and comes back, at the times (n,) s."""
-    begin = GAP / SPEED
-    in_touch = times - begin
-    depth = SPEED / RATE * np.sin(RATE * in_touch)
-    place = np.where(
-        in_touch < 0,
-        SPEED * times,
-        np.where(in_touch < CONTACT, GAP + depth, GAP - SPEED * (in_touch - CONTACT)),
-    )
-    speed = np.where(
-        in_touch < 0,
-        SPEED,
-        np.where(in_touch < CONTACT, SPEED * np.cos(RATE * in_touch), -SPEED),
-    )
-    return motion_without_attitude(times, place[:, None], speed[:, None])
-
-
-def cradle(times: Array) -> Motion:
-    """Three balls with gaps, (n, 3): each takes over the velocity of the one before.
+class Cradle(Bounce, frozen=True):
+    """Three balls with gaps: each takes over the velocity of the one before.
 
     In a contact the centre of two balls goes on at half the velocity, and their distance is half an
     oscillation; each ball is pushed, flies, and pushes the next one.
     """
-    place, speed = np.zeros((len(times), 3)), np.zeros((len(times), 3))
-    free, flown_from = 0.0, 0.0  # when the ball begins to fly, and from where
-    for ball in range(3):
-        last = ball == 2
-        meets = math.inf if last else free + (GAP - flown_from) / SPEED
-        flies = (times >= free) & (times < meets)
-        place[flies, ball] = flown_from + SPEED * (times[flies] - free)
-        speed[flies, ball] = SPEED
-        if last:
-            break
-        t = times - meets
-        pushes, done = (t >= 0) & (t < CONTACT), t >= CONTACT
-        sine, cosine = np.sin(RATE * t[pushes]), np.cos(RATE * t[pushes])
-        place[pushes, ball] = GAP + SPEED * (t[pushes] + sine / RATE) / 2
-        place[pushes, ball + 1] = SPEED * (t[pushes] - sine / RATE) / 2
-        speed[pushes, ball] = SPEED * (1 + cosine) / 2
-        speed[pushes, ball + 1] = SPEED * (1 - cosine) / 2
-        place[done, ball] = GAP + SPEED * CONTACT / 2
-        free, flown_from = meets + CONTACT, SPEED * CONTACT / 2
-    return motion_without_attitude(times, place, speed)
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        gap, full, rate, contact = self.gap, self.speed, self.rate, math.pi / self.rate
+        place, speed = np.zeros((len(times), 3)), np.zeros((len(times), 3))
+        free, flown_from = 0.0, 0.0  # when the ball begins to fly, and from where
+        for ball in range(3):
+            meets = math.inf if ball == 2 else free + (gap - flown_from) / full
+            flies = (times >= free) & (times < meets)
+            place[flies, ball] = flown_from + full * (times[flies] - free)
+            speed[flies, ball] = full
+            if ball == 2:
+                break
+            t = times - meets
+            pushes, done = (t >= 0) & (t < contact), t >= contact
+            sine, cosine = np.sin(rate * t[pushes]), np.cos(rate * t[pushes])
+            place[pushes, ball] = gap + full * (t[pushes] + sine / rate) / 2
+            place[pushes, ball + 1] = full * (t[pushes] - sine / rate) / 2
+            speed[pushes, ball] = full * (1 + cosine) / 2
+            speed[pushes, ball + 1] = full * (1 - cosine) / 2
+            place[done, ball] = gap + full * contact / 2
+            free, flown_from = meets + contact, full * contact / 2
+        return motion_without_attitude(times, place, speed)
 
 
 _J = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])
 """Velocities → how fast each pair comes nearer."""
 
 
-def _forces(depth: Array) -> Array:
-    """What the contacts push with, (2,) N per kg: depths (2,) m, those below 0 do not touch.
+class TouchingCradle(Bounce, frozen=True):
+    """Three balls of 1 kg, two of which touch: integrated in small steps from the first touch."""
 
-    A + R has no positive number beside its diagonal, so that no force comes out negative.
-    """
-    found = np.zeros(2)
-    touching = depth > 0
-    if touching.any():
-        a = _J[touching] @ _J[touching].T
-        r = np.diag(np.diag(a)) * (1 - IMPEDANCE) / IMPEDANCE
-        found[touching] = np.linalg.solve(a + r, RATE**2 / IMPEDANCE * depth[touching])
-    return found
+    impedance: float = 0.9
 
+    def _forces(self, depth: Array) -> Array:
+        """What the contacts push with, (2,) N: depths (2,) m, those below 0 do not touch.
 
-def touching_cradle(times: Array) -> Motion:
-    """Three balls, two of which touch, (n, 3): integrated in small steps from the first touch."""
+        A + R has no positive number beside its diagonal, so that no force comes out negative.
+        """
+        found = np.zeros(2)
+        touching = depth > 0
+        if touching.any():
+            a = _J[touching] @ _J[touching].T
+            r = np.diag(np.diag(a)) * (1 - self.impedance) / self.impedance
+            push = self.rate**2 / self.impedance * depth[touching]
+            found[touching] = np.linalg.solve(a + r, push)
+        return found
 
-    def rate(state: State) -> State:
-        depth = _J @ state[:3] - np.array([GAP, 0.0])
-        return np.concatenate([state[3:], -_J.T @ _forces(depth)])
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
 
-    begin = GAP / SPEED
-    place, speed = np.zeros((len(times), 3)), np.zeros((len(times), 3))
-    flying = times <= begin
-    place[flying, 0], speed[flying, 0] = SPEED * times[flying], SPEED
-    if not flying.all():
-        start = np.array([GAP, 0.0, 0.0, SPEED, 0.0, 0.0])
-        later = times[~flying] - begin
-        states = bulirsch_stoer(rate, start, later, 1e-14, columns=4, first=1e-6)
-        place[~flying], speed[~flying] = states[:, :3], states[:, 3:]
-    return motion_without_attitude(times, place, speed)
+        def rate(state: State) -> State:
+            depth = _J @ state[:3] - np.array([self.gap, 0.0])
+            return np.concatenate([state[3:], -_J.T @ self._forces(depth)])
+
+        begin = self.gap / self.speed
+        place, speed = np.zeros((len(times), 3)), np.zeros((len(times), 3))
+        flying = times <= begin
+        place[flying, 0], speed[flying, 0] = self.speed * times[flying], self.speed
+        if not flying.all():
+            start = np.array([self.gap, 0.0, 0.0, self.speed, 0.0, 0.0])
+            later = times[~flying] - begin
+            states = bulirsch_stoer(rate, start, later, 1e-14, columns=4, first=1e-6)
+            place[~flying], speed[~flying] = states[:, :3], states[:, 3:]
+        return motion_without_attitude(times, place, speed)
 
 
 def restitution(integrator: Integrator, steps: int) -> float:
@@ -205,8 +205,8 @@ def problems() -> tuple[Problem, ...]:
         scenario=_MEETING,
         position_bound=1.0,
         velocity_bound=2 * SPEED,
-        reference=Reference("closed", "half an oscillation without damping", bounce, floor=1e-13),
-        second=engine_reference(BOUNCE, _MEETING),
+        reference=Reference("closed", "half an oscillation without damping", Bounce()),
+        second=ENGINE,
         timesteps=divisions(0.01, 16, 32, 64, 128, 256, 512),
         checks=tuple(_restitution(steps) for steps in (5, 10, 20, 40, 80)),
         smooth=False,
@@ -219,8 +219,7 @@ def problems() -> tuple[Problem, ...]:
         title="Newton's cradle with gaps",
         mjcf=CRADLE,
         scenario=_PASSING,
-        reference=Reference("closed", exchanged, cradle, floor=1e-13),
-        second=engine_reference(CRADLE, _PASSING),
+        reference=Reference("closed", exchanged, Cradle()),
         checks=(
             ScalarCheck(
                 "velocity of the last ball, 20 steps in a contact",
@@ -239,9 +238,8 @@ def problems() -> tuple[Problem, ...]:
         title="Newton's cradle, two balls of which touch",
         mjcf=TOUCHING,
         scenario=_SHARED,
-        reference=Reference("ode", source, touching_cradle, floor=1e-11),
-        second=engine_reference(TOUCHING, _SHARED),
-        agreement=1e-9,
+        reference=Reference("ode", source, TouchingCradle()),
+        precision=Sizes(1e-10, 0.0, 1e-8),
         timesteps=divisions(0.002, 16, 32, 64, 128),
         checks=tuple(_shared(ball, name) for ball, name in enumerate(("first", "middle", "last"))),
         note="all contacts act at once: the last ball does not take over the whole velocity",
@@ -259,7 +257,7 @@ def _shared(ball: int, name: str) -> ScalarCheck:
     return ScalarCheck(
         f"velocity of the {name} ball, 80 steps in a contact",
         "m/s",
-        lambda _: float(touching_cradle(np.array([_SHARED.duration])).velocity[0, ball]),
+        lambda _: float(TouchingCradle().motion(np.array([0.06])).velocity[0, ball]),
         lambda integrator: last_velocity(TOUCHING, _SHARED, integrator, ball, 80),
         "the soft contacts of MuJoCo, integrated",
     )

@@ -14,10 +14,12 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+import mujoco
 import numpy as np
+from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.integrate import bulirsch_stoer
+from coursebuild.numerics.engine import compiled
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -26,32 +28,88 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
+    SecondReference,
 )
 from coursebuild.numerics.problems.common import model_text, simulated
+from mjcourse.spatial import axis_angle_to_quat
 
-GRAVITY = 9.81
-SLIDING, STICKING, ROLLING = math.radians(45), math.radians(15), math.radians(20)
-FRICTION = 0.5
 Cone = Literal["pyramidal", "elliptic"]
 _CONES: tuple[Cone, ...] = ("elliptic", "pyramidal")
-_HALF, _WIDE = 0.05, 0.2
-"""m; a block as high as it is wide would rock."""
+SLIDING, ACROSS = "6.936717523440031 0 -6.936717523440032", "4.905 4.905 -6.936717523440032"
+STICKING = "2.5390148324557287 0 -9.47573235589576"
+ROLLING = "3.3552176060248105 0 -9.218384609909762"
+"""Gravity on slopes of 45°, 15° and 20°, m/s²; in the second half-way between the axes."""
 _STEP = 1e-3
 _SCENARIO = Scenario(1.0, 0.1)
 
 
-def mjcf(shape: str, slope: float, across: bool, cone: Cone, friction: float) -> str:
-    """A block or a ball on a floor, with gravity tilted by `slope` (rad) towards x, or x and y."""
-    pull = GRAVITY * math.sin(slope)
-    x, y = (pull / math.sqrt(2), pull / math.sqrt(2)) if across else (pull, 0.0)
-    z = -GRAVITY * math.cos(slope)
-    size = f"{_WIDE} {_WIDE} {_HALF}" if shape == "box" else f"{_HALF}"
+def mjcf(shape: str, gravity: str, cone: Cone, friction: str) -> str:
+    """A block or a ball on a floor, under a tilted gravity."""
+    # A block as high as it is wide would rock.
+    size = "0.2 0.2 0.05" if shape == "box" else "0.05"
     contact = f'condim="3" friction="{friction} 0.005 0.0001"'
-    option = f'gravity="{x!r} {y!r} {z!r}" cone="{cone}" tolerance="0" iterations="100"'
+    option = f'gravity="{gravity}" cone="{cone}" tolerance="0" iterations="100"'
     plane = f'    <geom type="plane" size="10 10 1" {contact}/>'
     geom = f'<geom type="{shape}" size="{size}" mass="1" {contact}/>'
-    body = f'    <body pos="0 0 {_HALF}"><freejoint/>{geom}</body>'
+    body = f'    <body pos="0 0 0.05"><freejoint/>{geom}</body>'
     return model_text(f"{plane}\n{body}", option)
+
+
+class Incline(Struct, frozen=True):
+    """A steady acceleration from rest, down a slope."""
+
+    slope: float
+    """rad."""
+    friction: float | None
+    """Of a block; `None`: it is a ball, and rolls."""
+    across: bool = False
+    """Whether it goes half-way between the axes."""
+    gravity: float = 9.81
+    """m/s²."""
+    height: float = 0.05
+    """Of the centre, m."""
+
+    @property
+    def acceleration(self) -> float:
+        """Along the slope, m/s²."""
+        fall, press = self.gravity * math.sin(self.slope), self.gravity * math.cos(self.slope)
+        return 5 / 7 * fall if self.friction is None else max(0.0, fall - self.friction * press)
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        speed = self.acceleration * times
+        way, turn = speed * times / 2, 0.0 if self.friction else 1 / self.height
+        along = np.array([1.0, 1.0, 0.0]) / math.sqrt(2) if self.across else np.array([1.0, 0, 0])
+        axis = np.array([-along[1], along[0], 0.0])
+        place = way[:, None] * along + np.array([0.0, 0.0, self.height])
+        half = way * turn / 2
+        attitude = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * axis], axis=1)
+        # Turning about an axis that does not move: the same in the body's frame and in the world's.
+        velocity = np.concatenate([speed[:, None] * along, speed[:, None] * turn * axis], axis=1)
+        return Motion(times, place, attitude[:, None], velocity)
+
+
+def _rigid(text: str, _: Scenario, times: Array) -> Motion:
+    """What rigid contacts would do with a model's numbers."""
+    model = compiled(text, Integrator.EULER, _STEP)
+    pull, normal = model.opt.gravity[:2], -float(model.opt.gravity[2])
+    size, spin = float(np.hypot(*pull)), np.zeros(3)
+    rolls = model.geom_type[1] == mujoco.mjtGeom.mjGEOM_SPHERE
+    if rolls:
+        radius = float(model.geom_size[1, 0])
+        lag = float(model.body_inertia[1, 1] / model.body_mass[1]) / radius**2
+        push = pull / (1 + lag)
+        spin = np.cross([0.0, 0.0, 1.0], [*push, 0.0]) / radius
+    else:
+        grip = float(model.geom_friction[:, 0].max()) * normal
+        push = pull * max(0.0, 1 - grip / size)
+    place = model.body_pos[1] + np.outer(times**2 / 2, [*push, 0.0])
+    axis = np.cross([0.0, 0.0, 1.0], [*pull, 0.0])
+    turned = axis_angle_to_quat(axis, float(np.linalg.norm(spin)) * times**2 / 2)
+    return Motion(times, place, turned[:, None], np.outer(times, [*push, 0.0, *spin]))
+
+
+RIGID = SecondReference("Newton’s and Coulomb’s laws for the numbers of the MJCF", _rigid)
 
 
 def acceleration(text: str, integrator: Integrator) -> float:
@@ -71,17 +129,6 @@ def _speed(text: str, integrator: Integrator, seconds: float) -> float:
     return math.hypot(data.qvel[0], data.qvel[1])
 
 
-def _as_motion(times: Array, way: Array, speed: Array, turn: float, across: bool) -> Motion:
-    along = np.array([1.0, 1.0, 0.0]) / math.sqrt(2) if across else np.array([1.0, 0.0, 0.0])
-    axis = np.array([-along[1], along[0], 0.0])
-    place = way[:, None] * along + np.array([0.0, 0.0, _HALF])
-    half = way * turn / 2
-    attitude = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * axis], axis=1)
-    # Turning about an axis that does not move: the same in the body's frame and in the world's.
-    velocity = np.concatenate([speed[:, None] * along, speed[:, None] * turn * axis], axis=1)
-    return Motion(times, place, attitude[:, None], velocity)
-
-
 def problems() -> tuple[Problem, ...]:
     """Sliding along an axis and between two, rolling, sticking; with both cones."""
     return (
@@ -92,51 +139,53 @@ def problems() -> tuple[Problem, ...]:
 
 
 def _sliding(cone: Cone, across: bool) -> Problem:
-    fall, press = GRAVITY * math.sin(SLIDING), GRAVITY * math.cos(SLIDING)
-    text = mjcf("box", SLIDING, across, cone, FRICTION)
-    name, pull = "acceleration when sliding, from 0.5 s to 1 s at 1 ms", fall - FRICTION * press
-    checks = [_acceleration(name, text, pull, "Coulomb's law")]
+    slide = Incline(math.radians(45), 0.5, across)
+    text = mjcf("box", ACROSS if across else SLIDING, cone, "0.5")
+    name = "acceleration when sliding, from 0.5 s to 1 s at 1 ms"
+    checks = [_acceleration(name, text, slide.acceleration, "Coulomb's law")]
     if cone == "pyramidal" and across:  # |f₁| + |f₂| ≤ μ f leaves μ/√2 half-way between the axes
-        name, blunted = "the same, against a pyramid's friction", FRICTION / math.sqrt(2)
-        checks.append(_acceleration(name, text, fall - blunted * press, "|f₁| + |f₂| ≤ μ f"))
+        blunted = replace(slide, friction=0.5 / math.sqrt(2)).acceleration
+        name = "the same, against a pyramid's friction"
+        checks.append(_acceleration(name, text, blunted, "|f₁| + |f₂| ≤ μ f"))
     where = "between the axes" if across else "along an axis"
     article = "an" if cone == "elliptic" else "a"
     return _problem(
         f"sliding-block-{cone}-{'across' if across else 'along'}",
         f"Block sliding {where} of {article} {cone} cone",
         text,
-        _references("Coulomb's law, a = g (sin α − μ cos α)", pull, across=across, floor=1e-14),
+        Reference("closed", "Coulomb's law, a = g (sin α − μ cos α)", slide),
         tuple(checks),
         "the error is the model's: soft contacts, and the cone; no order is to be expected",
     )
 
 
 def _rolling(cone: Cone) -> Problem:
-    pull = 5 / 7 * GRAVITY * math.sin(ROLLING)
-    text = mjcf("sphere", ROLLING, False, cone, 1.0)
+    roll = Incline(math.radians(20), None)
+    text = mjcf("sphere", ROLLING, cone, "1")
     name, law = "acceleration when rolling, from 0.5 s to 1 s at 1 ms", "a = 5/7 g sin α"
     found = _problem(
         f"rolling-ball-{cone}",
         f"Ball rolling, {cone} cone",
         text,
-        _references(f"rolling without slipping, {law}", pull, turn=1 / _HALF, floor=1e-13),
-        (_acceleration(name, text, pull, law),),
+        Reference("closed", f"rolling without slipping, {law}", roll),
+        (_acceleration(name, text, roll.acceleration, law),),
         "the ball sinks in, and so rolls on a shorter arm: the error is the model's",
     )
     return replace(found, velocity_bound=200.0)
 
 
 def _sticking(cone: Cone) -> Problem:
-    text = mjcf("box", STICKING, False, cone, FRICTION)
+    text = mjcf("box", STICKING, cone, "0.5")
 
     def slipped(integrator: Integrator) -> float:
         return creep(text, integrator)
 
+    law = "Coulomb's law: tan α < μ, so that it rests"
     found = _problem(
         f"sticking-block-{cone}",
         f"Block that should stick, {cone} cone",
         text,
-        _references("Coulomb's law: tan α < μ, so that it rests", 0.0, floor=1e-15),
+        Reference("closed", law, Incline(math.radians(15), 0.5)),
         (ScalarCheck("creep after 2 s at 1 ms", "m/s", 0.0, slipped, "Coulomb's law"),),
         "soft friction gives way at a steady velocity",
     )
@@ -151,7 +200,7 @@ def _problem(
     name: str,
     title: str,
     text: str,
-    references: tuple[Reference, Reference],
+    reference: Reference,
     checks: tuple[ScalarCheck, ...],
     note: str,
 ) -> Problem:
@@ -163,32 +212,11 @@ def _problem(
         scenario=_SCENARIO,
         position_bound=20.0,
         velocity_bound=20.0,
-        penetration_bound=_HALF / 2,
-        reference=references[0],
-        second=references[1],
+        penetration_bound=0.025,
+        reference=reference,
+        second=RIGID,
         timesteps=(2e-3, 1e-3, 5e-4),
         checks=checks,
         smooth=False,
         note=note,
-    )
-
-
-def _references(
-    law: str, pull: float, *, turn: float = 0.0, across: bool = False, floor: float
-) -> tuple[Reference, Reference]:
-    """A steady acceleration `pull` (m/s²) from rest, by its formula and integrated.
-
-    A ball turns with it, `turn` rad for each metre.
-    """
-
-    def closed(times: Array) -> Motion:
-        return _as_motion(times, pull * times**2 / 2, pull * times, turn, across)
-
-    def integrated(times: Array) -> Motion:
-        states = bulirsch_stoer(lambda s: np.array([s[1], pull]), np.zeros(2), times)
-        return _as_motion(times, states[:, 0], states[:, 1], turn, across)
-
-    return (
-        Reference("closed", law, closed, floor=floor),
-        Reference("ode", "the law of motion, Bulirsch–Stoer", integrated, floor=10 * floor),
     )

@@ -22,6 +22,7 @@ import cmath
 import math
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.numerics.problem import (
     Array,
@@ -33,15 +34,15 @@ from coursebuild.numerics.problem import (
     Scenario,
 )
 from coursebuild.numerics.problems.common import (
+    ENGINE,
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
-    engine_reference,
     model_text,
     motion_without_attitude,
 )
 
-START = (1.0, 5.0)
+START = (1.0,), (5.0,)
 """m and m/s: from rest the semi-implicit method would seem to be of second order in velocity."""
 BOUND = 1e4
 """m: with a double root a stable state may grow a few hundred times before it decays."""
@@ -49,68 +50,81 @@ _SPAN = 5000.0
 """Radians over which stability is judged: just beyond its boundary an oscillator grows slowly."""
 SPRING_RATE, SERVO_RATE, EQUALITY_RATE = 10.0, 100.0, 50.0
 """√(k/m), √(kp/m) and 1/(timeconst · dampratio), rad/s."""
-TARGETS, HOLD = (0.1, -0.05), 0.05
-"""Commands of the servo, m, and how long each holds, s."""
+_DAMPING = {0.0: "0", 0.1: "2", 1.0: "20", 10.0: "200"}
+_KV = {0.1: "20", 1.0: "200", 10.0: "2000"}
+_SOLREF = {0.1: "0.2 0.1", 1.0: "0.02 1"}
+"""What makes the damping ratio in the models, by that ratio."""
 
 
 def problems() -> tuple[Problem, ...]:
     """Each oscillator with some damping ratios."""
     return (
-        *(_spring(ratio) for ratio in (0.0, 0.1, 1.0, 10.0)),
-        *(_servo(ratio) for ratio in (0.1, 1.0, 10.0)),
-        *(_equality(ratio) for ratio in (0.1, 1.0)),
+        *map(_spring, _DAMPING),
+        *map(_servo, _KV),
+        *map(_equality, _SOLREF),
     )
 
 
 # --------------------------------------------------------------------------------------- solutions
 
 
-def oscillation(ratio: float, rate: float, x0: float, v0: float, times: Array) -> Motion:
-    """x″ + 2ζωx′ + ω²x = 0 from x0 (m) and v0 (m/s), at the times (n,) s."""
-    decay = ratio * rate
-    if ratio == 1.0:
-        fall, b = np.exp(-decay * times), v0 + decay * x0
-        place = fall * (x0 + b * times)
-        speed = fall * (b - decay * (x0 + b * times))
-    elif ratio < 1.0:
-        turn = rate * math.sqrt(1 - ratio**2)
-        fall, sine, cosine = np.exp(-decay * times), np.sin(turn * times), np.cos(turn * times)
-        place = fall * (x0 * cosine + (v0 + decay * x0) / turn * sine)
-        speed = fall * (v0 * cosine - (decay * v0 + rate**2 * x0) / turn * sine)
-    else:  # the slow root without the difference of large numbers
-        fast = -rate * (ratio + math.sqrt(ratio**2 - 1))
-        slow = rate**2 / fast
-        a, b = (fast * x0 - v0) / (fast - slow), (v0 - slow * x0) / (fast - slow)
-        place = a * np.exp(slow * times) + b * np.exp(fast * times)
-        speed = slow * a * np.exp(slow * times) + fast * b * np.exp(fast * times)
-    return motion_without_attitude(times, place[:, None], speed[:, None])
+class Oscillation(Struct, frozen=True):
+    """x″ + 2ζωx′ + ω²x = 0."""
+
+    ratio: float
+    """ζ."""
+    rate: float
+    """ω, rad/s."""
+    x0: float = 1.0
+    """m."""
+    v0: float = 5.0
+    """m/s."""
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        ratio, rate, x0, v0 = self.ratio, self.rate, self.x0, self.v0
+        decay = ratio * rate
+        if ratio == 1.0:
+            fall, b = np.exp(-decay * times), v0 + decay * x0
+            place = fall * (x0 + b * times)
+            speed = fall * (b - decay * (x0 + b * times))
+        elif ratio < 1.0:
+            turn = rate * math.sqrt(1 - ratio**2)
+            fall, sine, cosine = np.exp(-decay * times), np.sin(turn * times), np.cos(turn * times)
+            place = fall * (x0 * cosine + (v0 + decay * x0) / turn * sine)
+            speed = fall * (v0 * cosine - (decay * v0 + rate**2 * x0) / turn * sine)
+        else:  # the slow root without the difference of large numbers
+            fast = -rate * (ratio + math.sqrt(ratio**2 - 1))
+            slow = rate**2 / fast
+            a, b = (fast * x0 - v0) / (fast - slow), (v0 - slow * x0) / (fast - slow)
+            place = a * np.exp(slow * times) + b * np.exp(fast * times)
+            speed = slow * a * np.exp(slow * times) + fast * b * np.exp(fast * times)
+        return motion_without_attitude(times, place[:, None], speed[:, None])
 
 
-def commanded(ratio: float, times: Array) -> Motion:
-    """The servo following its commands from rest at 0, at the times (n,) s.
+class Pursuit(Struct, frozen=True):
+    """The servo from rest at 0: in each hold it is an oscillator about its target."""
 
-    In each hold it is an oscillator about its target.
-    """
-    x, v, begin = 0.0, 0.0, 0.0
-    place, speed = np.empty((len(times), 1)), np.empty((len(times), 1))
-    for target in TARGETS:
-        here = times > begin + 1e-12  # what is after the hold is written again in the next one
-        at = np.append(times[here] - begin, HOLD)
-        part = oscillation(ratio, SERVO_RATE, x - target, v, at)
-        place[here], speed[here] = part.position[:-1] + target, part.velocity[:-1]
-        x, v = float(part.position[-1, 0]) + target, float(part.velocity[-1, 0])
-        begin += HOLD
-    return motion_without_attitude(times, place, speed)
+    ratio: float
+    rate: float
+    """rad/s."""
+    targets: tuple[float, ...] = (0.1, -0.05)
+    """m."""
+    hold: float = 0.05
+    """s."""
 
-
-def _begun(ratio: float, rate: float, source: str, *, floor: float) -> Reference:
-    """The oscillator begun at `START`.
-
-    `floor` is for a rate of 1 rad/s: velocities are known worse by the rate.
-    """
-    return Reference(
-        "closed", source, lambda times: oscillation(ratio, rate, *START, times), floor * rate
-    )
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        x, v, begin = 0.0, 0.0, 0.0
+        place, speed = np.empty((len(times), 1)), np.empty((len(times), 1))
+        for target in self.targets:
+            here = times > begin + 1e-12  # what is after the hold is written again in the next one
+            at = np.append(times[here] - begin, self.hold)
+            part = Oscillation(self.ratio, self.rate, x - target, v).motion(at)
+            place[here], speed[here] = part.position[:-1] + target, part.velocity[:-1]
+            x, v = float(part.position[-1, 0]) + target, float(part.velocity[-1, 0])
+            begin += self.hold
+        return motion_without_attitude(times, place, speed)
 
 
 # ------------------------------------------------------------------------------------------ limits
@@ -158,20 +172,18 @@ def rk4_factor(z: complex) -> complex:
 
 def _spring(ratio: float) -> Problem:
     rate, explicit = SPRING_RATE, Integrator.EULER_EXPLICIT
-    damper = f'stiffness="{rate**2!r}" damping="{2 * ratio * rate!r}"'
+    damper = f'stiffness="100" damping="{_DAMPING[ratio]}"'
     joint = f'<joint type="slide" axis="1 0 0" {damper}/>'
-    mjcf = model_text(_ball(joint), NO_GRAVITY, NO_CONTACT)
-    scenario = Scenario(1.0, 0.1, START[:1], START[1:])
     return Problem(
         name=f"damped-spring-{ratio:g}",
         title=f"Damped spring, ζ = {ratio:g}",
         case=5,
-        mjcf=mjcf,
-        scenario=scenario,
+        mjcf=model_text(_ball(joint), NO_GRAVITY, NO_CONTACT),
+        scenario=Scenario(1.0, 0.1, *START),
         position_bound=BOUND,
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
-        reference=_begun(ratio, rate, "the linear oscillator", floor=1e-14),
-        second=engine_reference(mjcf, scenario),
+        reference=Reference("closed", "the linear oscillator", Oscillation(ratio, rate)),
+        second=ENGINE,
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
         limit=lambda one: limit_of(ratio, rate, one, explicit),
         energy_conserved=ratio == 0,
@@ -183,27 +195,20 @@ def _spring(ratio: float) -> Problem:
 
 def _servo(ratio: float) -> Problem:
     rate, explicit = SERVO_RATE, (Integrator.EULER, Integrator.EULER_EXPLICIT)
-    gains = f'kp="{rate**2!r}" kv="{2 * ratio * rate!r}"'
+    gains = f'kp="10000" kv="{_KV[ratio]}"'
     motor = f'  <actuator><position joint="slide" {gains}/></actuator>\n'
-    mjcf = model_text(_ball(_SLIDE), NO_GRAVITY, NO_CONTACT, motor)
-    commands = tuple((target,) for target in TARGETS)
-    scenario = Scenario(2 * HOLD, 0.01, controls=commands, hold=HOLD)
+    source = "the linear oscillator about each target"
     bound = BOUND / 10
     return Problem(
         name=f"stiff-servo-{ratio:g}",
         title=f"Stiff servo, ζ = {ratio:g}",
         case=6,
-        mjcf=mjcf,
-        scenario=scenario,
+        mjcf=model_text(_ball(_SLIDE), NO_GRAVITY, NO_CONTACT, motor),
+        scenario=Scenario(0.1, 0.01, controls=((0.1,), (-0.05,)), hold=0.05),
         position_bound=bound,
         velocity_bound=bound * rate * (1 + 4 * ratio),
-        reference=Reference(
-            "closed",
-            "the linear oscillator about each target",
-            lambda times: commanded(ratio, times),
-            floor=1e-14 * rate,
-        ),
-        second=engine_reference(mjcf, scenario),
+        reference=Reference("closed", source, Pursuit(ratio, rate)),
+        second=ENGINE,
         timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e2 / rate),
@@ -215,22 +220,20 @@ def _servo(ratio: float) -> Problem:
 def _equality(ratio: float) -> Problem:
     rate, implicit = EQUALITY_RATE, (Integrator.RK4, Integrator.DISCRETE)
     explicit = [one for one in Integrator if one not in implicit]
-    soft = f'solref="{1 / (rate * ratio)!r} {ratio!r}" solimp="0.9 0.9 0.001 0.5 2"'
+    soft = f'solref="{_SOLREF[ratio]}" solimp="0.9 0.9 0.001 0.5 2"'
     equality = f'  <equality><joint joint1="slide" {soft}/></equality>\n'
     flags = '<flag refsafe="disable" contact="disable"/>'
     source = "the linear oscillator of the constraint"
-    mjcf = model_text(_ball(_SLIDE), f'{NO_GRAVITY} tolerance="0"', flags, equality)
-    scenario = Scenario(0.2, 0.02, START[:1], START[1:])
     return Problem(
         name=f"soft-equality-{ratio:g}",
         title=f"Soft equality as an oscillator, ζ = {ratio:g}, refsafe off",
         case=12,
-        mjcf=mjcf,
-        scenario=scenario,
+        mjcf=model_text(_ball(_SLIDE), f'{NO_GRAVITY} tolerance="0"', flags, equality),
+        scenario=Scenario(0.2, 0.02, *START),
         position_bound=BOUND,
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
-        reference=_begun(ratio, rate, source, floor=1e-13),
-        second=engine_reference(mjcf, scenario),
+        reference=Reference("closed", source, Oscillation(ratio, rate)),
+        second=ENGINE,
         timesteps=divisions(0.02, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e1 / rate),

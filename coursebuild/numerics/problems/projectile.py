@@ -8,6 +8,7 @@ Source: with v ← v + gh before x ← x + vh, x after n steps is x₀ + v₀nh 
 from __future__ import annotations
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.numerics.problem import (
     Array,
@@ -19,42 +20,49 @@ from coursebuild.numerics.problem import (
     Scenario,
 )
 from coursebuild.numerics.problems.common import (
+    ENGINE,
     NO_CONTACT,
     divisions,
-    engine_reference,
     model_text,
     simulated,
 )
 
-GRAVITY = 9.81
-"""m/s²."""
-LAUNCH = (3.0, 0.0, 4.0)
-"""m/s."""
 _STEP = 0.01
-_SCENARIO = Scenario(1.0, 0.1, qvel=(*LAUNCH, 0, 0, 0))
+_SCENARIO = Scenario(1.0, 0.1, qvel=(3.0, 0.0, 4.0, 0.0, 0.0, 0.0))
 
 _STONE = '    <body><freejoint/><geom size="0.05" mass="1"/></body>'
-MJCF = model_text(_STONE, f'gravity="0 0 -{GRAVITY}"', NO_CONTACT)
+MJCF = model_text(_STONE, 'gravity="0 0 -9.81"', NO_CONTACT)
 
 
-def parabola(times: Array) -> Motion:
-    """Launched at the origin, at the times (n,) s: x = v₀t + gt²/2."""
-    t = times[:, None]
-    launch, fall = np.array(LAUNCH), np.array([0.0, 0.0, -GRAVITY])
-    upright = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (len(times), 1, 4))
-    velocity = np.concatenate([launch + fall * t, np.zeros((len(times), 3))], axis=1)
-    return Motion(times, launch * t + fall * t**2 / 2, upright, velocity)
+class Parabola(Struct, frozen=True):
+    """x = v₀t + gt²/2, thrown from the origin."""
+
+    launch: tuple[float, float, float]
+    """m/s."""
+    gravity: float
+    """m/s²."""
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        t = times[:, None]
+        launch, fall = np.array(self.launch), np.array([0.0, 0.0, -self.gravity])
+        upright = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (len(times), 1, 4))
+        velocity = np.concatenate([launch + fall * t, np.zeros((len(times), 3))], axis=1)
+        return Motion(times, launch * t + fall * t**2 / 2, upright, velocity)
+
+
+PARABOLA = Parabola((3.0, 0.0, 4.0), 9.81)
 
 
 def fall_error(integrator: Integrator) -> float:
     """Error of the height after a second at 10 ms, m: simulated less exact."""
     data = simulated(MJCF, _SCENARIO, integrator, _STEP, round(1.0 / _STEP))
-    return float(data.qpos[2] - parabola(np.ones(1)).position[0, 2])
+    return float(data.qpos[2] - PARABOLA.motion(np.ones(1)).position[0, 2])
 
 
 def exact_error(integrator: Integrator) -> float:
     """What it should be: −gTh/2 where velocities are stepped first, nothing with RK4."""
-    return 0.0 if integrator is Integrator.RK4 else -GRAVITY * 1.0 * _STEP / 2
+    return 0.0 if integrator is Integrator.RK4 else -PARABOLA.gravity * 1.0 * _STEP / 2
 
 
 def problem() -> Problem:
@@ -67,8 +75,8 @@ def problem() -> Problem:
         scenario=_SCENARIO,
         position_bound=100.0,
         velocity_bound=100.0,
-        reference=Reference("closed", "x = v₀t + gt²/2", parabola, floor=1e-15),
-        second=engine_reference(MJCF, _SCENARIO),
+        reference=Reference("closed", "x = v₀t + gt²/2", PARABOLA),
+        second=ENGINE,
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
         energy_conserved=True,
         checks=(

@@ -9,6 +9,7 @@ import math
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.numerics.problem import (
     Array,
@@ -18,35 +19,30 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
+    Sizes,
 )
 from coursebuild.numerics.problems.common import (
+    ENGINE,
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
-    engine_reference,
     model_text,
     motion_without_attitude,
     simulated,
     turning_at_rest,
 )
-from coursebuild.numerics.problems.tops import FreeTop
+from coursebuild.numerics.problems.tops import FreeTop, free_body, known_turn, turning
 from mjcourse.spatial import axis_angle_to_quat
 
-EDGE, DENSITY = 1e-3, 1000.0
-"""m and kg/m³."""
 FAR, CRAWL = 1e9, 1e-3
 """m and m/s."""
-_TURN = (3.0, 4.0, 12.0)
-"""rad/s."""
-_GRAVITY = 9.81
-_FAR_AWAY = Scenario(1.0, 0.1, (FAR,), (CRAWL,))
+_FAR_AWAY = Scenario(1.0, 0.1, (1e9,), (1e-3,))
 
-_CUBE = f'<geom type="box" size="{EDGE / 2!r} {EDGE / 2!r} {EDGE / 2!r}" density="{DENSITY!r}"/>'
+_CUBE = '<geom type="box" size="0.0005 0.0005 0.0005" density="1000"/>'
 CUBE = model_text(f"    <body><freejoint/>{_CUBE}</body>", NO_GRAVITY, NO_CONTACT)
 RESTING = model_text(
-    '    <geom type="plane" size="1 1 1"/>\n'
-    f'    <body pos="0 0 {EDGE / 2!r}"><freejoint/>{_CUBE}</body>',
-    f'gravity="0 0 -{_GRAVITY}"',
+    f'    <geom type="plane" size="1 1 1"/>\n    <body pos="0 0 0.0005"><freejoint/>{_CUBE}</body>',
+    'gravity="0 0 -9.81"',
 )
 DISTANT = model_text(
     '    <body><joint type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body>',
@@ -57,31 +53,31 @@ PLATE_MOMENTS = (0.0833, 0.0833, 0.1667)
 """A square plate of 1 kg and 1 m: 1/12, 1/12, 1/6, with four digits; A + B is less than C."""
 
 
-def plate(moments: tuple[float, float, float], *, balance: bool = False) -> str:
-    """A plate of 1 kg with these moments, kg m²."""
-    a, b, c = moments
-    inertial = f'<inertial pos="0 0 0" mass="1" diaginertia="{a!r} {b!r} {c!r}"/>'
-    compiler = '  <compiler balanceinertia="true"/>\n' if balance else ""
-    world = f"    <body><freejoint/>{inertial}</body>"
-    return model_text(world, NO_GRAVITY, NO_CONTACT, compiler)
+ROUNDED_PLATE = free_body("0.0833 0.0833 0.1667")
 
 
 def _axial_moment(_: Integrator) -> float:
-    model = mujoco.MjModel.from_xml_string(plate(PLATE_MOMENTS, balance=True))
-    return float(model.body_inertia[1, 2])
+    balanced = ROUNDED_PLATE.replace("<option", '<compiler balanceinertia="true"/>\n  <option')
+    return float(mujoco.MjModel.from_xml_string(balanced).body_inertia[1, 2])
 
 
-def steady(times: Array) -> Motion:
+class SteadyTurn(Struct, frozen=True):
     """A cube turns about any axis at a constant rate."""
-    omega = np.array(_TURN)
-    attitude = axis_angle_to_quat(omega, float(np.linalg.norm(omega)) * times)
-    return turning_at_rest(times, attitude, np.tile(omega, (len(times), 1)))
+
+    omega: tuple[float, float, float]
+    """rad/s."""
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        omega = np.array(self.omega)
+        attitude = axis_angle_to_quat(omega, float(np.linalg.norm(omega)) * times)
+        return turning_at_rest(times, attitude, np.tile(omega, (len(times), 1)))
 
 
 def sunk(integrator: Integrator) -> float:
     """How deep the resting cube lies in the floor, relative to its edge, after 1 s at 1 ms."""
     data = simulated(RESTING, Scenario(1.0, 0.1), integrator, 1e-3, 1000)
-    return float((EDGE / 2 - data.qpos[2]) / EDGE)
+    return float((0.0005 - data.qpos[2]) / 0.001)
 
 
 def crawled(integrator: Integrator, timestep: float) -> float:
@@ -90,10 +86,18 @@ def crawled(integrator: Integrator, timestep: float) -> float:
     return float(data.qpos[0] - FAR)
 
 
-def _line(times: Array) -> Motion:
-    return motion_without_attitude(
-        times, (FAR + CRAWL * times)[:, None], np.full((len(times), 1), CRAWL)
-    )
+class UniformMotion(Struct, frozen=True):
+    """Of a slide."""
+
+    begin: float
+    """m."""
+    speed: float
+    """m/s."""
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        place = self.begin + self.speed * times[:, None]
+        return motion_without_attitude(times, place, np.full((len(times), 1), self.speed))
 
 
 def problems() -> tuple[Problem, ...]:
@@ -102,17 +106,16 @@ def problems() -> tuple[Problem, ...]:
 
 
 def _cube() -> Problem:
-    scenario = Scenario(1.0, 0.05, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *_TURN))
     return Problem(
         name="millimetre-cube",
         title="Cube of 1 mm",
         case=13,
         mjcf=CUBE,
-        scenario=scenario,
+        scenario=turning(3.0, 4.0, 12.0),
         position_bound=1.5,
         velocity_bound=100.0,
-        reference=Reference("closed", "a steady turn", steady, floor=1e-14),
-        second=engine_reference(CUBE, scenario),
+        reference=Reference("closed", "a steady turn", SteadyTurn((3.0, 4.0, 12.0))),
+        second=ENGINE,
         timesteps=divisions(0.05, 10, 20, 40, 80),
         checks=(
             ScalarCheck(
@@ -139,9 +142,9 @@ def _distant() -> Problem:
         scenario=_FAR_AWAY,
         position_bound=2 * FAR,
         velocity_bound=1.0,
-        reference=Reference("closed", "a uniform motion", _line, floor=spacing),
-        second=engine_reference(DISTANT, _FAR_AWAY),
-        agreement=10 * spacing,
+        reference=Reference("closed", "a uniform motion", UniformMotion(FAR, CRAWL)),
+        second=ENGINE,
+        precision=Sizes(10 * spacing, 0.0, 1e-12),
         timesteps=divisions(0.1, 10, 100, 1000),
         checks=tuple(
             ScalarCheck(
@@ -160,19 +163,17 @@ def _distant() -> Problem:
 
 
 def _plate() -> Problem:
-    exact = FreeTop(1 / 12, 1 / 6, (1.0, 2.0, 3.0))
-    mjcf = plate((1 / 12, 1 / 12, 1 / 6))
     return Problem(
         name="flat-plate",
         title="Flat plate, A + B = C",
         case=13,
-        mjcf=mjcf,
-        scenario=exact.scenario(),
+        mjcf=free_body("0.08333333333333333 0.08333333333333333 0.16666666666666666"),
+        scenario=turning(1.0, 2.0, 3.0),
         position_bound=1.5,
         velocity_bound=100.0,
-        reference=exact.reference,
-        second=engine_reference(mjcf, exact.scenario()),
-        timesteps=divisions(0.05, 10, 20, 40, 80),
+        reference=known_turn(FreeTop(1 / 12, 1 / 6, (1.0, 2.0, 3.0))),
+        second=ENGINE,
+        timesteps=divisions(0.05, 5, 10, 20, 40, 80),
         checks=(
             ScalarCheck(
                 "axial moment of the plate with four digits, after balanceinertia",

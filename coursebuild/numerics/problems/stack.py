@@ -1,6 +1,6 @@
 """Case 9: a heavy body on a light one; how deep soft contacts give way.
 
-Entry point: `problems()`; `depths` is the closed form.
+Entry point: `problems()`; `RestingStack` is the closed form.
 
 At rest a contact's force f gives way by r = f (1 − d) Â/(k d²), with the impedance d, the stiffness
 k = 1/(d² timeconst² dampratio²) and Â, the sum of the inverse masses that it connects: whatever the
@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from coursebuild.numerics.problem import (
     Array,
@@ -23,46 +24,66 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
+    Sizes,
 )
 from coursebuild.numerics.problems.common import (
-    engine_reference,
+    ENGINE,
     model_text,
     motion_without_attitude,
     simulated,
 )
 
-GRAVITY, RADIUS = 9.81, 0.1
-IMPEDANCE, TIMECONST = 0.99, 0.004
 RATIOS = (1.0, 1e1, 1e2, 1e3, 1e4)
 """Mass of the upper body in kg; the lower one has 1 kg."""
+_RESTS = {
+    1.0: (-3.1392e-06, -6.2784e-06),
+    1e1: (-1.726560e-05, -3.453120e-05),
+    1e2: (-1.585296e-04, -3.170592e-04),
+    1e3: (-1.5711696e-03, -3.1423392e-03),
+    1e4: (-1.56975696e-02, -3.13951392e-02),
+}
+"""Where the balls rest by that mass, m: the scenarios begin there."""
 _SETTLED = 3.0
 
 
 def mjcf(ratio: float) -> str:
     """Two balls that slide up and down over a floor."""
-    contact = f'condim="1" solref="{TIMECONST} 1" solimp="{IMPEDANCE} {IMPEDANCE} 0.001 0.5 2"'
+    contact = 'condim="1" solref="0.004 1" solimp="0.99 0.99 0.001 0.5 2"'
     plane = f'    <geom type="plane" size="1 1 1" {contact}/>'
     balls = [
-        f'    <body pos="0 0 {(2 * index + 1) * RADIUS!r}"><joint type="slide" axis="0 0 1"/>'
-        f'<geom size="{RADIUS}" mass="{mass!r}" {contact}/></body>'
-        for index, mass in enumerate((1.0, ratio))
+        f'    <body pos="0 0 {height}"><joint type="slide" axis="0 0 1"/>'
+        f'<geom size="0.1" mass="{mass:g}" {contact}/></body>'
+        for height, mass in (("0.1", 1.0), ("0.3", ratio))
     ]
-    option = f'gravity="0 0 -{GRAVITY}" tolerance="0" iterations="200"'
+    option = 'gravity="0 0 -9.81" tolerance="0" iterations="200"'
     return model_text("\n".join((plane, *balls)), option)
 
 
-def depths(ratio: float) -> Array:
-    """How deep the lower and the upper contact give way at rest, (2,) m."""
-    compliance = (1 - IMPEDANCE) * TIMECONST**2
-    forces = GRAVITY * np.array([1.0 + ratio, ratio])
-    found: Array = forces * np.array([1.0, 1.0 + 1.0 / ratio]) * compliance
-    return found
+class RestingStack(Struct, frozen=True):
+    """As deep as its contacts give way."""
 
+    upper: float
+    """kg."""
+    lower: float = 1.0
+    """kg."""
+    gravity: float = 9.81
+    """m/s²."""
+    impedance: float = 0.99
+    timeconst: float = 0.004
+    """s."""
 
-def _resting(found: Array, times: Array) -> Motion:
-    place = -np.array([found[0], found[0] + found[1]])
-    still = np.zeros((len(times), 2))
-    return motion_without_attitude(times, still + place, still)
+    @property
+    def depths(self) -> Array:
+        """Of the lower and the upper contact, (2,) m."""
+        forces = self.gravity * np.array([self.lower + self.upper, self.upper])
+        inverse = np.array([1 / self.lower, 1 / self.lower + 1 / self.upper])
+        found: Array = forces * inverse * (1 - self.impedance) * self.timeconst**2
+        return found
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        still = np.zeros((len(times), 2))
+        return motion_without_attitude(times, still - np.cumsum(self.depths), still)
 
 
 def _settled(integrator: Integrator, ratio: float) -> Any:
@@ -86,29 +107,29 @@ def problems() -> tuple[Problem, ...]:
 
 
 def _problem(ratio: float) -> Problem:
-    rest = depths(ratio)
-    scenario = Scenario(1.0, 0.1, (-float(rest[0]), -float(rest.sum())))
+    known = RestingStack(ratio)
+    depth = known.depths.sum()
     return Problem(
         name=f"stack-{ratio:g}",
         title=f"Stack of 1 kg under {ratio:g} kg",
         case=9,
         mjcf=mjcf(ratio),
-        scenario=scenario,
+        scenario=Scenario(0.2, 0.002, _RESTS[ratio]),
         position_bound=1.0,
         velocity_bound=10.0,
         reference=Reference(
             "closed",
             "r = f (1 − d) Â/(k d²)",
-            lambda times: _resting(depths(ratio), times),
-            floor=1e-15,
+            known,
         ),
-        second=engine_reference(mjcf(ratio), scenario),
+        second=ENGINE,
+        precision=Sizes(1e-13, 0.0, 1e-11),
         timesteps=(2e-3, 1e-3, 5e-4),
         checks=(
             ScalarCheck(
                 f"how far the upper body sinks, let go without overlap, {_SETTLED:g} s at 1 ms",
                 "m",
-                float(rest.sum()),
+                float(depth),
                 lambda integrator: _sunk(integrator, ratio),
                 "r = f (1 − d) Â/(k d²), both contacts",
             ),
@@ -121,6 +142,6 @@ def _problem(ratio: float) -> Problem:
             ),
         ),
         smooth=False,
-        penetration_bound=RADIUS / 2,
+        penetration_bound=0.05,
         note="rigid bodies would not sink at all: the depth is the error of the soft model",
     )

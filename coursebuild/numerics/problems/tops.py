@@ -1,7 +1,7 @@
 """Case 3: a symmetric top, a thin rod and a coin that turn freely, and Lagrange's heavy top.
 
 Entry point: `problems()`; `FreeTop` is a closed form, `transverse_growth` what a step multiplies
-the transverse velocity by, `heavy_motion` the closed form of the heavy top.
+the transverse velocity by, `HeavyTop` that of the heavy one.
 
 1. A step of the explicit update ω + h ω̇ multiplies the transverse part by 1 + iz, z = hΩ; one of
    the linearly implicit update by 1/(1 − iz); the Runge–Kutta method by its stability polynomial.
@@ -19,7 +19,6 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.elliptic import jacobi
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
     Array,
@@ -32,10 +31,10 @@ from coursebuild.numerics.problem import (
     Scenario,
 )
 from coursebuild.numerics.problems.common import (
+    ENGINE,
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
-    engine_reference,
     model_text,
     simulated,
     turning_at_rest,
@@ -76,16 +75,6 @@ class FreeTop(Struct, frozen=True):
         """Ω, at which ω turns about the axis in the body's frame, rad/s."""
         return (self.axial - self.transverse) / self.transverse * self.omega[2]
 
-    def mjcf(self) -> str:
-        """1 kg with these moments."""
-        t, a = self.transverse, self.axial
-        inertial = f'<inertial pos="0 0 0" mass="1" diaginertia="{t!r} {t!r} {a!r}"/>'
-        return model_text(f"    <body><freejoint/>{inertial}</body>", NO_GRAVITY, NO_CONTACT)
-
-    def scenario(self) -> Scenario:
-        """A second, with these velocities."""
-        return Scenario(1.0, 0.05, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, *self.omega))
-
     def motion(self, times: Array) -> Motion:
         """ω turns at Ω; the body at −Ω about its axis and at |L|/Iₜ about the angular momentum."""
         turn = self.rate * times
@@ -97,10 +86,21 @@ class FreeTop(Struct, frozen=True):
         about = axis_angle_to_quat(momentum, size / self.transverse * times)
         return turning_at_rest(times, quat_mul(about, axis_angle_to_quat(_Z, -turn)), omega)
 
-    @property
-    def reference(self) -> Reference:
-        """The closed form."""
-        return Reference("closed", "Goldstein, 5.6", self.motion, floor=1e-13)
+
+def free_body(moments: str) -> str:
+    """1 kg with these moments, kg m²."""
+    inertial = f'<inertial pos="0 0 0" mass="1" diaginertia="{moments}"/>'
+    return model_text(f"    <body><freejoint/>{inertial}</body>", NO_GRAVITY, NO_CONTACT)
+
+
+def turning(x: float, y: float, z: float) -> Scenario:
+    """A second of a free body with this angular velocity, rad/s."""
+    return Scenario(1.0, 0.05, qvel=(0.0, 0.0, 0.0, x, y, z))
+
+
+def known_turn(top: FreeTop) -> Reference:
+    """The closed form as a reference."""
+    return Reference("closed", "Goldstein, 5.6", top)
 
 
 TOPS = {
@@ -108,7 +108,12 @@ TOPS = {
     "thin-rod": FreeTop(0.01, 1e-6, (1.0, 0.0, 20.0)),
     "coin": FreeTop(1.0e-6, 1.999e-6, (1.0, 0.0, 20.0)),
 }
-_TITLES = {"free-top": "Symmetric top, free", "thin-rod": "Thin rod, free", "coin": "Coin, free"}
+_FREE = {
+    "free-top": ("Symmetric top, free", free_body("0.02 0.02 0.03"), turning(1.0, 0.0, 40.0)),
+    "thin-rod": ("Thin rod, free", free_body("0.01 0.01 1e-6"), turning(1.0, 0.0, 20.0)),
+    "coin": ("Coin, free", free_body("1e-6 1e-6 1.999e-6"), turning(1.0, 0.0, 20.0)),
+}
+"""Titles, models and scenarios."""
 
 
 def transverse_growth(integrator: Integrator, z: float) -> float:
@@ -135,7 +140,8 @@ def _limit(top: FreeTop, integrator: Integrator) -> Limit:
 def measured_growth(name: str, integrator: Integrator, z: float) -> float:
     """The mean growth over some steps, by which the first and the last velocity differ."""
     top = TOPS[name]
-    data = simulated(top.mjcf(), top.scenario(), integrator, z / abs(top.rate), _STEPS)
+    _, mjcf, scenario = _FREE[name]
+    data = simulated(mjcf, scenario, integrator, z / abs(top.rate), _STEPS)
     first = math.hypot(*top.omega[:2])
     return float((math.hypot(data.qvel[3], data.qvel[4]) / first) ** (1 / _STEPS))
 
@@ -152,17 +158,18 @@ def _growth(name: str, z: float) -> ScalarCheck:
 
 def _free(name: str) -> Problem:
     top = TOPS[name]
+    title, mjcf, scenario = _FREE[name]
     return Problem(
         name=name,
-        title=_TITLES[name],
+        title=title,
         case=3,
-        mjcf=top.mjcf(),
-        scenario=top.scenario(),
+        mjcf=mjcf,
+        scenario=scenario,
         position_bound=1.5,
         velocity_bound=10 * abs(top.omega[2]),
-        reference=top.reference,
-        second=engine_reference(top.mjcf(), top.scenario()),
-        timesteps=divisions(0.05, 40, 80, 160, 320, 640, 1280),
+        reference=known_turn(top),
+        second=ENGINE,
+        timesteps=divisions(0.05, 10, 20, 40, 80, 160, 320, 640),
         checks=tuple(_growth(name, z) for z in (0.03, 0.1, 0.3)),
         limit=lambda integrator: _limit(top, integrator),
         search=(1e-2 / abs(top.rate), 1e1 / abs(top.rate)),
@@ -175,85 +182,96 @@ def _free(name: str) -> Problem:
 
 # ------------------------------------------------------------------------------------------ heavy
 
-GRAVITY, MASS, HEIGHT = 9.81, 0.5, 0.06
-"""m/s², kg, and m from the pivot to the centre of mass."""
-AXIAL, CENTRAL = 4e-4, 3e-4
-"""Moments about the axis and across it through the centre of mass, kg m²."""
-TRANSVERSE = CENTRAL + MASS * HEIGHT**2
-SPIN, TILT = 250.0, 0.5
-"""rad/s and rad."""
-_A = AXIAL * SPIN / TRANSVERSE
-_BETA = 2 * MASS * GRAVITY * HEIGHT / TRANSVERSE
-_U0 = math.cos(TILT)
-_ROOT = math.sqrt(_A**4 - 4 * _BETA * (_A**2 * _U0 - _BETA))
-_LOW = 2 * (_A**2 * _U0 - _BETA) / (_A**2 + _ROOT)
-_HIGH = (_A**2 + _ROOT) / (2 * _BETA)
-_RATE = math.sqrt(_BETA * (_HIGH - _LOW)) / 2
-_DEPTH = _BETA * (1 - _LOW**2) / _A**2
-"""u₀ − the lower root, without the difference of near numbers."""
+
+class HeavyTop(Struct, frozen=True):
+    """Lagrange's top, let go with spin only."""
+
+    gravity: float
+    """m/s²."""
+    mass: float
+    """kg."""
+    height: float
+    """m, from the pivot to the centre of mass."""
+    axial: float
+    """Moment about the axis, kg m²."""
+    central: float
+    """Moment across it through the centre of mass, kg m²."""
+    spin: float
+    """rad/s."""
+    tilt: float
+    """From the vertical, rad."""
+
+    def _terms(self) -> tuple[float, float, float, float, float]:
+        """a, u₀, how deep u falls, the rate and the parameter of the elliptic functions."""
+        transverse = self.central + self.mass * self.height**2
+        a, u0 = self.axial * self.spin / transverse, math.cos(self.tilt)
+        beta = 2 * self.mass * self.gravity * self.height / transverse
+        root = math.sqrt(a**4 - 4 * beta * (a**2 * u0 - beta))
+        low, high = 2 * (a**2 * u0 - beta) / (a**2 + root), (a**2 + root) / (2 * beta)
+        depth = beta * (1 - low**2) / a**2  # u₀ − low, without a difference of near numbers
+        return a, u0, depth, math.sqrt(beta * (high - low)) / 2, (u0 - low) / (high - low)
+
+    def _fall(self, times: Array) -> tuple[Array, Array]:
+        """u₀ − u (n,) and its rate (n,) 1/s."""
+        from scipy.special import ellipj
+
+        _, _, depth, rate, m = self._terms()
+        sn, cn, dn, _ = ellipj(rate * times, m)
+        # 1 − cd² = (1 − m) sd²
+        fallen = depth * (1 - m) * (sn / dn) ** 2
+        return fallen, depth * (1 - m) * 2 * sn * cn / dn**3 * rate
+
+    def _precession_rate(self, times: Array) -> Array:
+        a, u0, *_ = self._terms()
+        fallen, _ = self._fall(times)
+        rate: Array = a * fallen / (1 - (u0 - fallen) ** 2)
+        return rate
+
+    def motion(self, times: Array) -> Motion:
+        """At the times (n,) s."""
+        _, u0, _, rate, _ = self._terms()
+        fallen, sinking = self._fall(times)
+        u = u0 - fallen
+        sine = np.sqrt(1 - u * u)
+        around = self._precession_rate(times)
+        precession = cumulative_integral(self._precession_rate, times, 0.3 / rate)
+        own = self.spin * times - cumulative_integral(
+            lambda at: self._precession_rate(at) * (u0 - self._fall(at)[0]), times, 0.3 / rate
+        )
+        tilted = quat_mul(
+            axis_angle_to_quat(_Z, precession), axis_angle_to_quat(_Y, np.arctan2(sine, u))
+        )
+        attitude = quat_mul(tilted, axis_angle_to_quat(_Z, own))
+        nod = sinking / sine
+        omega = np.stack(
+            [
+                -around * sine * np.cos(own) + nod * np.sin(own),
+                around * sine * np.sin(own) + nod * np.cos(own),
+                np.full_like(times, self.spin),
+            ],
+            axis=1,
+        )
+        return Motion(times, np.empty((len(times), 0)), attitude[:, None], omega)
 
 
-def _fall(times: Array) -> tuple[Array, Array]:
-    """u₀ − u (n,) and its rate (n,) 1/s."""
-    m1 = (_HIGH - _U0) / (_HIGH - _LOW)
-    sn, cn, dn = jacobi(_RATE * times, m1)
-    # 1 − cd² = (1 − m) sd²
-    fallen = _DEPTH * m1 * (sn / dn) ** 2
-    return fallen, _DEPTH * m1 * 2 * sn * cn / dn**3 * _RATE
-
-
-def _precession_rate(times: Array) -> Array:
-    fallen, _ = _fall(times)
-    u = _U0 - fallen
-    rate: Array = _A * fallen / (1 - u * u)
-    return rate
-
-
-def heavy_motion(times: Array) -> Motion:
-    """Attitude and angular velocity in the body's frame at the times (n,) s."""
-    fallen, sinking = _fall(times)
-    u = _U0 - fallen
-    sine = np.sqrt(1 - u * u)
-    tilt = np.arctan2(sine, u)
-    around = _precession_rate(times)
-    precession = cumulative_integral(_precession_rate, times, 0.3 / _RATE)
-    own = SPIN * times - cumulative_integral(
-        lambda at: _precession_rate(at) * (_U0 - _fall(at)[0]), times, 0.3 / _RATE
-    )
-    tilted = quat_mul(axis_angle_to_quat(_Z, precession), axis_angle_to_quat(_Y, tilt))
-    attitude = quat_mul(tilted, axis_angle_to_quat(_Z, own))
-    nod = sinking / sine
-    omega = np.stack(
-        [
-            -around * sine * np.cos(own) + nod * np.sin(own),
-            around * sine * np.sin(own) + nod * np.cos(own),
-            np.full_like(times, SPIN),
-        ],
-        axis=1,
-    )
-    return Motion(times, np.empty((len(times), 0)), attitude[:, None], omega)
+_TOP = HeavyTop(gravity=9.81, mass=0.5, height=0.06, axial=4e-4, central=3e-4, spin=250.0, tilt=0.5)
 
 
 def _heavy() -> Problem:
-    """Half a second of the top, let go with spin only."""
-    moments = f'diaginertia="{CENTRAL} {CENTRAL} {AXIAL}"'
-    inertial = f'<inertial pos="0 0 {HEIGHT}" mass="{MASS}" {moments}/>'
+    """Half a second of the top."""
+    inertial = '<inertial pos="0 0 0.06" mass="0.5" diaginertia="3e-4 3e-4 4e-4"/>'
     world = f'    <body><joint type="ball"/>{inertial}</body>'
-    mjcf = model_text(world, f'gravity="0 0 -{GRAVITY}"', NO_CONTACT)
-    turned = (math.cos(TILT / 2), 0, math.sin(TILT / 2), 0)
-    scenario = Scenario(0.5, 0.02, turned, (0, 0, SPIN))
+    turned = (0.9689124217106447, 0.0, 0.24740395925452294, 0.0)
     return Problem(
         name="heavy-top",
         title="Heavy top on a ball joint, 250 rad/s",
         case=3,
-        mjcf=mjcf,
-        scenario=scenario,
+        mjcf=model_text(world, 'gravity="0 0 -9.81"', NO_CONTACT),
+        scenario=Scenario(0.5, 0.02, turned, (0.0, 0.0, 250.0)),
         position_bound=1.5,
-        velocity_bound=4 * SPIN,
-        reference=Reference(
-            "closed", "Lagrange's top, Goldstein, 5.7, with quadratures", heavy_motion, floor=1e-12
-        ),
-        second=engine_reference(mjcf, scenario),
+        velocity_bound=1000.0,
+        reference=Reference("closed", "Lagrange's top, Goldstein, 5.7, with quadratures", _TOP),
+        second=ENGINE,
         timesteps=divisions(0.02, 40, 80, 160, 320, 640, 1280),
         search=(1e-5, 1.0),
         span=2.0,

@@ -81,13 +81,33 @@ class WorkPrecisionRow(Record, frozen=True):
         return 1 / self.seconds.value if self.seconds and self.seconds.value else None
 
 
+class FittedOrder(Record, frozen=True):
+    """The power of the timestep that errors follow."""
+
+    value: float
+    uncertainty: float
+    """Half the width of the interval in which it lies in 95 % of cases."""
+    bend: float
+    """The largest difference of two slopes between neighbouring timesteps: 0 is a straight line."""
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"{self.value:.2f} ± {self.uncertainty:.2f}, bend {self.bend:.2f}"
+
+
 class OrderRow(Record, frozen=True):
-    """Fitted orders of an integrator; `None` where too few errors are in the asymptotic range."""
+    """Orders of an integrator; `None` where errors are too few, or follow no one power."""
 
     integrator: str
-    position: float | None
-    attitude: float | None
-    velocity: float | None
+    position: FittedOrder | None
+    attitude: FittedOrder | None
+    velocity: FittedOrder | None
+
+    @property
+    def there(self) -> bool:
+        """Whether there is any."""
+        return any(one is not None for one in (self.position, self.attitude, self.velocity))
 
 
 class StableRow(Record, frozen=True):

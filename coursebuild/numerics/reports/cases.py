@@ -5,10 +5,13 @@ Entry point: `CaseReport`; `merged`, integrators of which the same is said.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import TypeAlias
 
-from coursebuild.numerics.reports import Record
+from coursebuild.core.model.results import Machine
+from coursebuild.numerics.reports import Interval, Record
 from coursebuild.numerics.reports.bench import OrderRow, StableRow
 
 
@@ -38,6 +41,16 @@ class FigureLine(Record, frozen=True):
     exact: float | None
     """`None` where theory does not say it."""
     source: str
+    spread: tuple[float, float] | None = None
+    """Of an ensemble, between what eight tenths of it lie; `measured` is the middle one then."""
+
+
+class StepCost(Record, frozen=True):
+    """What a step of an integrator takes."""
+
+    integrator: str
+    seconds: Interval
+    """Processor time on the machine of the report."""
 
 
 class ErrorLine(Record, frozen=True):
@@ -67,13 +80,16 @@ class ReferenceLine(Record, frozen=True):
     """What the errors were measured against."""
 
     kind: str
-    """`closed`, `ode` or `self`."""
+    """`closed` or `ode`."""
     source: str
-    floor: float
     second: str
-    """The source of the second reference; empty where there is none."""
-    agreement: float | None
-    """The largest difference of the two."""
+    """The source of the second reference."""
+    position: float
+    """How far the two are apart, m or rad: no more is known."""
+    attitude: float
+    """rad."""
+    velocity: float
+    """m/s or rad/s."""
 
 
 class CaseReport(Record, frozen=True):
@@ -82,14 +98,39 @@ class CaseReport(Record, frozen=True):
     name: str
     title: str
     case: int
-    engine: str
-    """Version of MuJoCo."""
+    machine: Machine
     note: str
-    reference: ReferenceLine | None
+    reference: ReferenceLine
     boundaries: tuple[BoundaryLine, ...]
     figures: tuple[FigureLine, ...]
     orders: tuple[OrderRow, ...]
     errors: tuple[ErrorLine, ...]
+    costs: tuple[StepCost, ...]
+
+    def cost(self, line: ErrorLine) -> float | None:
+        """Processor time for a simulated second, s; `None` where the integrator was not timed."""
+        found = (one.seconds.value for one in self.costs if one.integrator == line.integrator)
+        step = next(found, None)
+        return None if step is None else step / line.timestep
+
+    def cost_to(self, integrator: str, error: float) -> float | None:
+        """The same for what is right to an error, m or rad; `None` where no run is.
+
+        Between two runs it goes by powers. No timestep longer than those tried is thought of.
+        """
+        runs = sorted(
+            (cost, max(pair[0] for pair in places))
+            for line in self.errors
+            if line.integrator == integrator and (cost := self.cost(line)) is not None
+            if (places := [pair for pair in (line.position, line.attitude) if pair is not None])
+        )
+        if runs and runs[0][1] <= error:
+            return runs[0][0]
+        for (cost, much), (more, less) in pairwise(runs):
+            if less <= error < much:
+                part = math.log(much / error) / math.log(much / less)
+                return float(cost * (more / cost) ** part)
+        return None
 
 
 Cells: TypeAlias = tuple[str, ...]

@@ -158,7 +158,8 @@ class _Comparison(Struct, frozen=True, eq=False):
         band = self.bands.order
         for name, first, last in _pairs(old, new, lambda row: row.integrator):
             for part in _PARTS:
-                a, b = (None if row is None else getattr(row, part) for row in (first, last))
+                fits = (None if row is None else getattr(row, part) for row in (first, last))
+                a, b = (None if fit is None else fit.value for fit in fits)
                 self.of(name)._within(f"order of {part}", a, b, band, f"± {band:g}")
 
     def _within(
@@ -277,8 +278,9 @@ def _sweep(comparison: _Comparison, old: SweepReport, new: SweepReport) -> None:
 
 
 def _case(comparison: _Comparison, old: CaseReport, new: CaseReport) -> None:
-    floors = [case.reference.floor for case in (old, new) if case.reference is not None]
-    least = FLOORS * max(floors, default=0.0)
+    both = old.reference, new.reference
+    place = FLOORS * max(max(one.position, one.attitude) for one in both)
+    speed = FLOORS * max(one.velocity for one in both)
     for name, limit, now in _pairs(old.boundaries, new.boundaries, lambda line: line.integrator):
         one = comparison.of(name)
         for before, after in one.both("largest stable timestep", limit, now):
@@ -290,13 +292,13 @@ def _case(comparison: _Comparison, old: CaseReport, new: CaseReport) -> None:
     for (figure, name), first, last in figures:
         one = comparison.of(name)
         for lines in one.both(figure, first, last):
-            _figure(one, *lines, least)
+            _figure(one, *lines, place)
     comparison.orders(old.orders, new.orders)
     runs = _pairs(old.errors, new.errors, lambda line: (line.integrator, line.timestep))
     for (name, timestep), run, again in runs:
         one = comparison.of(f"{name} at {seconds_text(timestep)}")
         for pair in one.both("run", run, again):
-            _run(one, *pair, least, least, known=True)
+            _run(one, *pair, place, speed, known=True)
 
 
 def _figure(comparison: _Comparison, old: FigureLine, new: FigureLine, least: float) -> None:
