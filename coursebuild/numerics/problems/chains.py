@@ -159,6 +159,6 @@ def _problem(
         precision=precision,
         timesteps=tuple(scenario.sample / n for n in (25, 50, 100, 200, 400)),
         search=search,
-        span=0.2 if name == "chain-heavy-tip" else 20.0,
+        span=0.2 if name == "chain-heavy-tip" else 40.0,
         energy_conserved=True,
     )
