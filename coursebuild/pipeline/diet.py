@@ -3,17 +3,18 @@
 Entry point: `diet(options, names, …)`.
 
 1. Names mean models. One that does not compile is told, and the others are looked at.
-2. Who reads a model are the files of the course that mention it; what any of them reads is no
-   finding. A finding that is wanted stands in `models/NAME.toml` with its reason.
+2. What code of the course may notice is not proved, and what scripts and labs say otherwise without
+   is no finding. A finding that is wanted stands in `models/NAME.toml` with its reason.
 3. What was found is kept under all that it depends on, as of `bench`.
-4. `fix` makes the changes after which every bit is the same, until there is none left: what
-   something needed that is gone may go as well. The files are read again, compiled and run before
-   they are written; a file that changed meanwhile is left as it is.
+4. `fix` takes out what is proved, until nothing is left: what something needed that is gone may go
+   as well. The files are read again, compiled and run before they are written; a file that changed
+   meanwhile is left as it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TypeVar
 
 from msgspec.structs import replace
@@ -24,11 +25,13 @@ from coursebuild.core.files.read import read_course
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.engine import silent
-from coursebuild.numerics.pruning.ablation import Survey
 from coursebuild.numerics.pruning.model_text import ModelText
+from coursebuild.numerics.pruning.survey import Rerun, Survey
 from coursebuild.numerics.reports.diet import DietReport
 from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.pipeline.diet_model import DietModel
+from coursebuild.pipeline.diet_readers import Reruns
+from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reports import (
     MeasuringRun,
@@ -40,7 +43,11 @@ from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.report.measuring import Measurement
 
 _T = TypeVar("_T")
-_CODE = ("coursebuild/numerics", "coursebuild/pipeline/diet_model.py", "mjcourse/spatial")
+_CODE = (
+    "coursebuild/numerics",
+    *("coursebuild/pipeline/diet_model.py", "coursebuild/pipeline/diet_readers.py"),
+    "mjcourse/spatial",
+)
 _ROUNDS = 20
 """Most times that something new is found after something was changed."""
 
@@ -55,7 +62,7 @@ def diet(
 ) -> Measurement[DietReport]:
     """Look at the models that the names mean; at all where there are none.
 
-    `fix`: the changes that change no bit are made, and the reports are of what is left. `record`:
+    `fix`: what is proved is taken out, and the reports are of what is left. `record`:
     each report is also written into the course.
 
     Raises:
@@ -72,6 +79,12 @@ def diet(
     return with_records(options.root, found, records)
 
 
+def _state(file: Path) -> str:
+    """What tells whether a file is another one."""
+    status = file.stat()
+    return f"{status.st_size} {status.st_mtime_ns}"
+
+
 class _DietRun(MeasuringRun):
     """Looks at models one after the other."""
 
@@ -84,12 +97,13 @@ class _DietRun(MeasuringRun):
         self.quick = quick
         self.fix = fix
         self.files = read_course(options.root).value
+        self.course = load(options.root).course
         self.here = machine()
         self.code = code_digest(*_CODE)
 
     def look_at(self, scene: CourseScene) -> DietReport | None:
         """What is found in a model; `None` where it cannot be looked at, or not be changed."""
-        look = DietModel(self.options.root, self.files, scene)
+        look = DietModel(self.options.root, self.files, self.course, scene)
         return self.once(
             scene.name, "diet", self._parts(look), DietReport, lambda: self._looked(look)
         )
@@ -101,7 +115,10 @@ class _DietRun(MeasuringRun):
 
     def _surveyed(self, look: DietModel) -> tuple[DietReport, Survey, ModelText]:
         tell = lambda text: self.progress.doing(look.scene.name, text)  # noqa: E731
-        survey, text = look.survey(quick=self.quick, tell=tell)
+        rerun: Rerun = lambda changed: ""  # noqa: E731
+        if not self.quick and self.course is not None:
+            rerun = Reruns(self.options, self.course, look.scene).differing
+        survey, text = look.survey(quick=self.quick, tell=tell, rerun=rerun)
         return look.report(survey, self.here, quick=self.quick), survey, text
 
     def _fixed(self, look: DietModel) -> DietReport | None:
@@ -137,7 +154,9 @@ class _DietRun(MeasuringRun):
             place = one.finding_span
             parts.append(f"{one.finding}\0{one.reason}\0{place.line}:{place.column}")
         parts += [f"{path}\0{why}" for path, why in look.locked.items()]
-        parts += [f"{reader.path}\0{reader.text}" for reader in look.readers.files]
+        if look.readers.files and self.course is not None:
+            parts += [f"{one.source.path}\0{one.source.text}" for one in self.course.documents]
+            parts += [f"{path}\0{_state(self.options.root / path)}" for path in self.files.files]
         return tuple(parts)
 
     def kept(self, kind: str, parts: Sequence[str], what: type[_T]) -> _T | None:

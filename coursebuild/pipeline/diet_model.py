@@ -2,8 +2,7 @@
 
 Entry point: `DietModel`.
 
-1. Who reads a model are the files of the course that mention it, and all code of the course if
-   there is one.
+1. Who reads a model is told by `diet_readers`, and by what is declared to be measured on it.
 2. A file that another model uses too, or that is not in `models/`, is not changed.
 3. Changes are collected, read again as files, compiled and compared with what was run; only then
    are they written, all of them or none.
@@ -21,36 +20,38 @@ import mujoco
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.write import write_atomic
-from coursebuild.core.model import Declarations, MjcfModel
+from coursebuild.core.model import Course, Declarations, MjcfModel
 from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source, Span
-from coursebuild.numerics.pruning.ablation import Order, Survey, survey
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelText, ModelTextError, open_model, saved
-from coursebuild.numerics.pruning.readers import Reader, Readers, readers_of
+from coursebuild.numerics.pruning.readers import Reader, Readers
+from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
 from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
 from coursebuild.numerics.scene import SceneError
+from coursebuild.pipeline.diet_readers import readers_of
 from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
 _TEXT = ".coursebuild-text.xml"
 """No file has this name: MuJoCo takes the text in its place."""
-_CODE_FILES = (".js", ".mjs", ".py", ".ts", ".json")
 
 
 class DietModel:
     """A model of the course, its files, and who reads it."""
 
-    def __init__(self, root: Path, files: CourseFiles, scene: CourseScene) -> None:
+    def __init__(
+        self, root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
+    ) -> None:
         self.root = root
         self.scene = scene
         self.path = scene.model.source.path
         self.keeps = {} if scene.declared is None else _keeps(scene.declared)
         self.locked = _locked(root, files, self.path, scene.model.source.text)
-        self.readers = _readers(root, files, scene)
+        self.readers = _readers(root, files, course, scene)
         self.original: dict[str, bytes] = {}
         """What was read of the disk."""
         self.changed: dict[str, bytes] = {}
@@ -77,8 +78,10 @@ class DietModel:
             shown = str(error).replace(f"{self.root}/", "").replace(_TEXT, Path(self.path).name)
             raise ValueError(shown) from None
 
-    def survey(self, *, quick: bool, tell: Callable[[str], None]) -> tuple[Survey, ModelText]:
-        """Try everything.
+    def survey(
+        self, *, quick: bool, tell: Callable[[str], None], rerun: Rerun
+    ) -> tuple[Survey, ModelText]:
+        """Try everything; `rerun` says who of the course's scripts and labs differs then.
 
         Raises:
             CannotError: it cannot be looked at.
@@ -97,6 +100,7 @@ class DietModel:
                 time.thread_time_ns,
                 quick,
                 tell,
+                lambda changed: rerun({**self.changed, **changed}),
             )
             return survey(order), text
         except MarkupError as error:
@@ -119,7 +123,7 @@ class DietModel:
             digest=self.scene.digest,
             quick=quick,
             machine=here,
-            readers=tuple(one.path for one in self.readers.files),
+            readers=tuple(dict.fromkeys(one.path.partition(":")[0] for one in self.readers.files)),
             scenarios=tuple(
                 DietScenario(
                     one.scene.name,
@@ -241,26 +245,14 @@ def _is_model(path: str) -> bool:
     return path.startswith("models/") and path.endswith(".xml")
 
 
-def _readers(root: Path, files: CourseFiles, scene: CourseScene) -> Readers:
-    """The files of the course that use a model, and what is to be measured on it."""
-    texts = [Reader(s.path, s.text) for s in (*files.lessons, *files.pages)]
-    found = list(readers_of(scene.name, texts).files)
-    if found:  # what lessons and labs are made with may read anything for them
-        for path in files.files:
-            if path.endswith(_CODE_FILES) and not path.startswith("content/reports/"):
-                data = _text(root, path)
-                found += [] if data is None else [Reader(path, data)]
-    declared = scene.declared
-    if declared is not None:
-        names = [one.measure.name for one in declared.scenarios if one.measure is not None]
-        names += ["energy" for one in declared.scenarios if "energy" in (one.conserved or ())]
-        if names:
-            found.append(Reader(declared.source.path, "\n".join(names)))
+def _readers(root: Path, files: CourseFiles, course: Course | None, scene: CourseScene) -> Readers:
+    """Everything in the course that may use a model, and what is to be measured on it."""
+    found = list(readers_of(course, root, files, scene).files)
+    if scene.declared is not None:
+        declared = scene.declared.scenarios
+        names = frozenset(one.measure.name for one in declared if one.measure is not None)
+        fields = {"energy"} if any("energy" in (one.conserved or ()) for one in declared) else set()
+        if names or fields:
+            path = scene.declared.source.path
+            found.append(Reader(path, names=names, fields=frozenset(fields)))
     return Readers(tuple(found))
-
-
-def _text(root: Path, path: str) -> str | None:
-    try:
-        return read_bytes(root, path).decode("utf-8", "replace")
-    except EffectError:
-        return None

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coursebuild.numerics.reports.diet import IDENTICAL, DietReport, Finding, Saving, TextEdit
+from coursebuild.numerics.reports.diet import DietReport, Finding, Saving, TextEdit
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 from coursebuild.report.values import plain, plural
 
@@ -105,7 +105,7 @@ def _finding(one: Finding, style: Style) -> list[str]:
     lines = style.wrap(f"{one.kind}: {one.message}", "  ")
     lines[0] = lines[0].replace(one.kind, style.paint(one.kind, colour), 1)
     label = one.label
-    if one.label != IDENTICAL and one.difference:
+    if one.difference:
         label += f" ({one.difference:.1e})"
     lines += style.wrap(f"{label}; {_saving(one.saving)}", "    ")
     if one.proof:

@@ -145,7 +145,7 @@ def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     told = text(site["models/box.html"])
     assert "One thing in it is not needed by any scenario." in told
     assert "sensor-unread Nobody reads &lt;this&gt; sensor." in told
-    assert "bit-identical; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in told
+    assert "proved; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in told
     assert "Because its value goes nowhere. models/box.xml:3" in told
     assert "Kept: it is the horizon." in told
     assert "It is no fault, as examples/a.py names &lt;it&gt;." in told

@@ -25,6 +25,24 @@ MODEL = """<mujoco>
   </sensor>
 </mujoco>
 """
+MAP = """[course]
+title = "A course"
+[[level]]
+id = "1"
+title = "All"
+[[level.lesson]]
+id = "1.1"
+slug = "a"
+title = "A"
+status = "complete"
+"""
+LESSON = """## A
+
+```python file=examples/a.py
+from mjcourse import model_path
+SCRIPT
+```
+"""
 CLEAN = MODEL.replace('    <clock name="time"/> <!-- for the plot -->\n', "").replace(
     "  <sensor>\n  </sensor>\n", ""
 )
@@ -33,7 +51,7 @@ CLEAN = MODEL.replace('    <clock name="time"/> <!-- for the plot -->\n', "").re
 @pytest.fixture
 def course(tmp_path: Path) -> Path:
     (tmp_path / "content").mkdir()
-    (tmp_path / "content" / "course.toml").write_text("")
+    (tmp_path / "content" / "course.toml").write_text(MAP)
     (tmp_path / "models").mkdir()
     (tmp_path / "models" / "swing.xml").write_text(MODEL)
     return tmp_path
@@ -56,7 +74,7 @@ def test_diet_tells_a_finding_as_text_and_as_json(
 ) -> None:
     assert run(course) == 1
     out, err = capsys.readouterr()
-    assert "  sensor-unread: nobody reads the sensor time\n    bit-identical; " in out
+    assert "  sensor-unread: nobody reads the sensor time\n    proved; " in out
     assert '    models/swing.xml:6:5\n    - <clock name="time"/>\n' in out
     assert "1 finding not explained, 1 of them for `coursebuild diet swing --fix`" in out
     assert "integrator and timestep are judged against a reference" in out
@@ -67,7 +85,7 @@ def test_diet_tells_a_finding_as_text_and_as_json(
     assert model["model"] == "swing" and model["quick"] and not model["ok"]
     assert [one["status"] for one in model["scenarios"]] == ["ok"]
     (finding,) = model["findings"]
-    assert finding["label"] == "bit-identical" and finding["fixable"]
+    assert finding["label"] == "proved" and finding["fixable"]
     assert finding["places"] == [
         {
             "name": "time",
@@ -112,25 +130,25 @@ def test_fix_changes_only_what_is_in_vain_and_then_nothing(
     assert file.stat().st_mtime_ns == status.st_mtime_ns and file.read_bytes() == wanted
 
 
-def test_fix_goes_on_until_nothing_is_left(
+def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The class is of no use when the far body is gone."""
     file = course / "models" / "swing.xml"
-    file.write_text(
-        CLEAN.replace(
-            "  </worldbody>",
-            '    <body name="far" pos="900 0 1"><freejoint/><geom class="c" size=".1"/></body>\n'
-            "  </worldbody>\n"
-            '  <default><default class="c"><geom rgba="1 0 0 1"/></default></default>',
-        )
-    )
-    assert run(course, "--fix") == 1
-    told = " ".join(capsys.readouterr().out.split())
-    assert "not for --fix: short runs say too little of it: leave out --quick" in told
+    spare = """  <asset>
+    <material name="spare" texture="spots"/>
+    <texture name="spots" type="2d" builtin="flat" width="8" height="8"/>
+  </asset>
+"""
+    far = '    <body name="far" pos="900 0 1"><freejoint/><geom size=".1"/></body>\n'
+    whole = CLEAN.replace("  </worldbody>", far + "  </worldbody>")
+    file.write_text(whole.replace("<mujoco>\n", "<mujoco>\n" + spare))
     assert main(["-C", str(course), "diet", "--fix"]) == 0
-    assert "changed models/swing.xml: far-body, unused-default" in capsys.readouterr().out
-    assert file.read_text() == CLEAN
+    out = capsys.readouterr().out
+    assert "changed models/swing.xml: unused-material, unused-texture" in out
+    assert file.read_text() == whole
+    assert "far-body: what the scene is about moves in the same way without the body far" in (
+        " ".join(out.split())
+    )
 
 
 def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -159,14 +177,15 @@ def test_sensor_that_a_lesson_reads_is_no_finding(
     lessons = course / "content" / "lessons"
     lessons.mkdir()
     lesson = lessons / "1.1-a.md"
-    lesson.write_text('A lesson on another model: `data.sensor("time")`.\n')
+    lesson.write_text(LESSON.replace("SCRIPT", 'print("another model")'))
     assert run(course) == 1
-    lesson.write_text('```python\nmodel_path("swing"); data.sensor("time")\n```\n')
+    use = 'model_path("swing")\nprint(data.sensor("time").data)'
+    lesson.write_text(LESSON.replace("SCRIPT", use))
     assert run(course) == 0
     _, value = values(course, capsys)
-    assert value["models"][0]["readers"] == ["content/lessons/1.1-a.md"]
+    assert value["models"][0]["readers"] == ["examples/a.py"]
     # A lab's own code may read for the lesson.
-    lesson.write_text("A lab of `swing`.\n")
+    lesson.write_text(LESSON.replace("SCRIPT", 'model_path("swing")'))
     assert run(course) == 1
     (course / "content" / "labs").mkdir()
     (course / "content" / "labs" / "twin.js").write_text("data.sensordata[0]")

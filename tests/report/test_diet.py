@@ -8,8 +8,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports.diet import (
-    EQUAL,
-    IDENTICAL,
+    PROVED,
+    SAME,
     DietReport,
     DietScenario,
     Finding,
@@ -31,16 +31,16 @@ FINDING = Finding(
     kind="sensor-unread",
     message="nobody reads the sensor gyro",
     places=(PLACE,),
-    label=IDENTICAL,
+    label=PROVED,
     difference=0.0,
     scenarios=("go",),
     proof="what a sensor says changes nothing that moves",
-    setting=False,
     saving=SURE,
     edits=(EDIT,),
     fixable=True,
     unfixed="",
     kept="",
+    doubt="",
 )
 MACHINE = Machine("3.14.0", "3.11.7", "2.4.6", "Linux x86_64", "")
 REPORT = DietReport(
@@ -69,7 +69,7 @@ def test_a_finding_is_told_with_its_saving_reason_and_change() -> None:
         "  in go",
         "",
         "  sensor-unread: nobody reads the sensor gyro",
-        "    bit-identical; ×2.2 as fast, 1,234 bytes of memory fewer, 30 bytes of text fewer",
+        "    proved; ×2.2 as fast, 1,234 bytes of memory fewer, 30 bytes of text fewer",
         "    because what a sensor says changes nothing that moves",
         "    models/arm.xml:9:1",
         "    - <gyro",
@@ -86,11 +86,11 @@ def test_a_finding_is_told_with_its_saving_reason_and_change() -> None:
 
 def test_a_saving_that_is_none_or_uncertain_is_said_to_be_so() -> None:
     none = replace(FINDING, saving=Saving(None, None, False, 0, 0))
-    assert "    bit-identical; saves nothing that is measured" in lines(
-        replace(REPORT, findings=(none,))
+    assert "    proved; saves nothing that is measured" in lines(replace(REPORT, findings=(none,)))
+    more = replace(FINDING, label=SAME, difference=3e-12, saving=Saving(1.01, 0.1, False, -5, 0))
+    text = (
+        "    the same in what was run (3.0e-12); no time that can be told, 5 bytes of memory more"
     )
-    more = replace(FINDING, label=EQUAL, difference=3e-12, saving=Saving(1.01, 0.1, False, -5, 0))
-    text = "    equal within tolerance (3.0e-12); no time that can be told, 5 bytes of memory more"
     assert text in lines(replace(REPORT, findings=(more,)))
 
 

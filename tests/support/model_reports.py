@@ -15,6 +15,8 @@ from coursebuild.numerics.reports.cases import (
     StepCost,
 )
 from coursebuild.numerics.reports.diet import (
+    PROVED,
+    SAME,
     DietReport,
     DietScenario,
     Finding,
@@ -40,16 +42,16 @@ def finding(kind: str = "sensor-unread", **other: object) -> Finding:
         "kind": kind,
         "message": "nobody reads <this> sensor",
         "places": (ModelPlace("tip", "mujoco/sensor/framepos", "models/box.xml", 3, 5),),
-        "label": "bit-identical",
+        "label": PROVED,
         "difference": 0.0,
         "scenarios": ("swing",),
         "proof": "its value goes nowhere",
-        "setting": False,
         "saving": Saving(1.07, 0.01, True, 120, 40),
         "edits": (),
         "fixable": True,
         "unfixed": "",
         "kept": "",
+        "doubt": "",
         **other,
     }
     return Finding(**fields)  # type: ignore[arg-type]
@@ -116,7 +118,8 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
 def reports() -> Reports:
     """All of it."""
     kept = finding("geom-far", kept="it is the horizon", proof="", label="equal within tolerance")
-    doubted = finding("site-unused", doubt="examples/a.py names <it>")
+    told = {"label": SAME, "doubt": "examples/a.py names <it>"}
+    doubted = finding("site-unused", **told)
     return Reports(
         {"box": box()},
         {"box": diet(finding(), kept, doubted)},

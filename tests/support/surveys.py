@@ -7,14 +7,17 @@ from collections.abc import Mapping
 import mujoco
 
 from coursebuild.core.model.scenarios import Declarations
-from coursebuild.numerics.pruning.ablation import Order, Survey, survey
+from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
-from coursebuild.numerics.pruning.readers import Reader, Readers
+from coursebuild.numerics.pruning.readers import Readers, python_reader
+from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
 from coursebuild.numerics.reports.diet import Finding
 from coursebuild.numerics.timing import Clock
 
 PATH = "models/a.xml"
+SETTINGS = ("cone", "island", "sleep", "solver")
 PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
       <geom name="ball" size=".05" pos=".3 0 0"/></body>"""
 
@@ -22,6 +25,28 @@ PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
 def scene(world: str = PENDULUM, *, head: str = "", rest: str = "") -> str:
     """A model, laid out over lines."""
     return f"<mujoco>\n  {head}\n  <worldbody>\n    {world}\n  </worldbody>\n  {rest}\n</mujoco>\n"
+
+
+def field(links: int, pieces: int) -> str:
+    """An arm with sensors over a floor, and boxes at rest out of its reach."""
+    inner = ""
+    for i in reversed(range(links)):
+        inner = f'''<body name="link{i}" pos="{0.2 if i else 0} 0 {0 if i else 2}">
+      <joint name="joint{i}" axis="{("0 1 0", "0 0 1", "1 0 0")[i % 3]}" damping="0.5"/>
+      <geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.03"/>
+      <site name="at{i}" pos="0.1 0 0"/>{inner}</body>'''
+    boxes = "".join(
+        f'<body pos="{20 + i % 8} {i // 8} 0.1"><freejoint/>'
+        '<geom type="box" size="0.1 0.1 0.1"/></body>'
+        for i in range(pieces)
+    )
+    sensors = "".join(
+        f'<accelerometer site="at{i}"/><gyro site="at{i}"/><force site="at{i}"/>'
+        f'<framepos objtype="site" objname="at{i}"/>'
+        for i in range(links)
+    )
+    floor = '<geom type="plane" size="60 60 1"/>'
+    return scene(floor + inner + boxes, rest=f"<sensor>{sensors}</sensor>")
 
 
 def opened(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
@@ -35,6 +60,13 @@ def opened(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
     return open_model(path, data.get, compiled)
 
 
+def declared(text: str) -> Declarations:
+    """What a file beside a model declares."""
+    parsed = parse_declarations(Source("models/a.toml", text))
+    assert parsed.value is not None, parsed.diagnostics
+    return parsed.value
+
+
 def tried(
     text: str | bytes | Mapping[str, str | bytes],
     *,
@@ -45,28 +77,31 @@ def tried(
     declared: Declarations | None = None,
     quick: bool = True,
     clock: Clock | None = None,
+    rerun: Rerun = lambda _: "",
 ) -> tuple[ModelText, Survey]:
-    """The model, and what was found in it; `lesson` is what the course says of it."""
+    """The model, and what was found in it; `lesson` is a script that uses it."""
     model = opened(text if isinstance(text, Mapping) else {PATH: text})
     order = Order(
         model,
         pruning_scenes(model.model, declared, quick=quick),
-        Readers((Reader("content/lessons/1.1-a.md", lesson),) if lesson else ()),
+        Readers((python_reader("examples/a.py", lesson),) if lesson else ()),
         keeps or {},
         locked or {},
         numbered,
         clock,
         quick,
         lambda _: None,
+        rerun,
     )
     return model, survey(order)
 
 
 def found(survey: Survey) -> dict[str, Finding]:
-    """Findings that are no settings, by kind."""
-    kinds = [one.kind for one in survey.findings if not one.setting]
+    """Findings that are no settings, by kind; where nothing is timed, all that there is."""
+    things = [one for one in survey.findings if one.kind not in SETTINGS]
+    kinds = [one.kind for one in things]
     assert len(set(kinds)) == len(kinds)
-    return {one.kind: one for one in survey.findings if not one.setting}
+    return {one.kind: one for one in things}
 
 
 def names(finding: Finding) -> list[str]:
@@ -75,7 +110,7 @@ def names(finding: Finding) -> list[str]:
 
 
 def fixed(model: ModelText, survey: Survey, path: str = PATH) -> str:
-    """The file after all that is bit-identical was changed."""
+    """The file after all that is proved was changed."""
     files = model.files(survey.edits)
     data = files.get(path)
     if data is None:

@@ -1,33 +1,28 @@
 """Changes of MJCF as replacements of bytes: everything else stays as its author wrote it.
 
-Entry points: `ModelEdit`; `remove`, `set_attributes`, `drop_attribute`, `drop_numbers`,
-`set_options` make them; `apply_edits` makes the new bytes, `merge_edits` fewer edits of many.
+Entry points: `ModelEdit`; `remove`, `set_attributes`, `drop_numbers`, `set_option` make them;
+`apply_edits` makes the new bytes, `merge_edits` fewer edits of many.
 
 1. An element that has lines of its own goes with these; one that shares its line goes with the
    blanks beside it. Comments stay, also those beside what goes.
-2. MuJoCo takes no included file without an element: where nothing is left in one, the `include`
-   goes, and the file stays.
-3. What is written newly takes the line ends and the indentation that it finds.
+2. A section goes with the last element in it, and so does the `include` of a file: MuJoCo takes no
+   included file without an element.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
-from typing import TypeAlias
+from collections.abc import Collection, Iterable
 
 from msgspec import Struct
 
 from coursebuild.numerics.pruning.markup import Element, Markup
 
-Settings: TypeAlias = Sequence[tuple[str, str | None]]
-"""Names of attributes and their values; `None` for one to take out."""
-_BLANKS_BEFORE = re.compile(rb"[ \t]*\Z")
-_BLANKS_AFTER = re.compile(rb"[ \t]*")
-_LINE_END = re.compile(rb"\r\n|\r|\n")
-_NUMBER = re.compile(rb"[^\s]+")
+_BLANKS = re.compile(rb"[ \t]*")
+_LINE_END = re.compile(rb"\r\n|\r|\n|\Z")
+_NUMBER = re.compile(rb"[^\s]+\s*")
 _SECTIONS = frozenset(
-    ("actuator", "asset", "contact", "default", "equality", "keyframe", "sensor", "tendon")
+    "actuator asset contact default equality keyframe option sensor tendon".split(" ")
 )
 """What may go when nothing is left in it."""
 
@@ -72,101 +67,92 @@ def merge_edits(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
     return tuple(found)
 
 
-# ---------------------------------------------------------------------------------------- elements
-
-
 def remove(elements: Iterable[Element]) -> tuple[ModelEdit, ...]:
     """Take elements out of their files, with sections of which nothing is left."""
     gone = set(elements)
     waiting = list(gone)
+    includes: set[Element] = set()
     while waiting:
-        parent = waiting.pop().parent
+        element = waiting.pop()
+        document, parent = element.document, element.parent
+        while document.at is not None and gone.issuperset(document.root.children):
+            includes.add(document.at)
+            document = document.at.document
         if parent is None or parent in gone or not gone.issuperset(parent.children):
             continue
-        include = parent.document.at if parent.parent is None else None
-        if include is not None:
-            gone -= set(parent.children)
-            gone.add(include)
-            waiting.append(include)
-        elif parent.tag in _SECTIONS and not (parent.attributes or _has_more(parent)):
+        if _goes_too(parent, includes):
             gone.add(parent)
             waiting.append(parent)
-    return tuple(sorted(_removal(one) for one in gone if not _goes_with_another(one, gone)))
+    whole = {one for one in gone | includes if not _goes_with_more(one, gone, includes)}
+    return tuple(sorted(map(_removal, whole)))
 
 
-def _goes_with_another(element: Element, gone: Collection[Element]) -> bool:
-    """Whether its parent goes, or an `include` that pulls in the file that it is in."""
-    if element.parent in gone:
-        return True
-    include = element.document.at
-    return include is not None and (include in gone or _goes_with_another(include, gone))
+def _goes_with_more(
+    element: Element, gone: Collection[Element], includes: Collection[Element]
+) -> bool:
+    """Whether something around it goes, or the file that it is in."""
+    return element.document.at in includes or any(one in gone for one in element.above())
 
 
-def _has_more(parent: Element) -> bool:
-    """Whether there is something besides the children: a comment."""
-    ends = [parent.head, *(child.end for child in parent.children)]
-    starts = [*(child.start for child in parent.children), parent.tail]
-    data = parent.document.data
-    return any(data[end:start].strip() for end, start in zip(ends, starts, strict=True))
+def _goes_too(section: Element, includes: Collection[Element]) -> bool:
+    """Whether a section holds nothing besides its elements: no attribute, no comment."""
+    if section.tag not in _SECTIONS or section.attributes:
+        return False
+    own = [one for one in section.children if one.document is section.document]
+    inner = [one for one in includes if one.parent is section]
+    data, at, rest = section.document.data, section.head, b""
+    for one in sorted((*own, *inner), key=lambda each: each.start):
+        rest += data[at : one.start]
+        at = one.end
+    return not (rest + data[at : section.tail]).strip()
 
 
 def _removal(element: Element) -> ModelEdit:
     data, start, end = element.document.data, element.start, element.end
-    left = _before(data, start)
-    right = _after(data, end)
+    line = max(data.rfind(b"\n", 0, start), data.rfind(b"\r", 0, start)) + 1
+    left = line + len(data[line:start].rstrip(b" \t"))
+    blanks = _BLANKS.match(data, end)
+    right = end if blanks is None else blanks.end()
     line_end = _LINE_END.match(data, right)
-    begins = left == 0 or data[left - 1 : left] in (b"\n", b"\r")
-    if begins:  # of a line that holds nothing else, its end goes too
-        start, end = (left, line_end.end()) if line_end else (start, right)
-    else:
+    if left > line:
         start = left
+    elif line_end is None:  # more stands behind it on its line
+        end = right
+    else:
+        start, end = left, line_end.end()
     return ModelEdit(element.document.path, start, end, b"")
-
-
-def _before(data: bytes, at: int) -> int:
-    """Where the blanks begin that stand before a byte."""
-    line = max(data.rfind(b"\n", 0, at), data.rfind(b"\r", 0, at)) + 1
-    found = _BLANKS_BEFORE.search(data, line, at)
-    return at if found is None else found.start()
-
-
-def _after(data: bytes, at: int) -> int:
-    """Where the blanks end that stand behind a byte."""
-    found = _BLANKS_AFTER.match(data, at)
-    return at if found is None else found.end()
-
-
-# -------------------------------------------------------------------------------------- attributes
 
 
 def set_attributes(element: Element, values: Iterable[tuple[str, str]]) -> tuple[ModelEdit, ...]:
     """Give attributes other values; write those that are not there behind the last."""
     path = element.document.path
     edits: list[ModelEdit] = []
-    new: list[tuple[str, str]] = []
+    new = ""
     for name, value in values:
         there = element.attribute(name)
         if there is not None:
             edits.append(ModelEdit(path, *there.inner, value.encode()))
         else:
-            new.append((name, value))
+            new += f' {name}="{value}"'
     if new:
         tag = element.start + 1 + len(element.tag.encode())
         at = max([a.end for a in element.attributes], default=tag)
-        edits.append(ModelEdit(path, at, at, _written(new)))
+        edits.append(ModelEdit(path, at, at, new.encode()))
     return tuple(edits)
 
 
-def _written(values: Iterable[tuple[str, str]]) -> bytes:
-    return "".join(f' {name}="{value}"' for name, value in values).encode()
+def drop_attribute(element: Element, name: str) -> tuple[ModelEdit, ...]:
+    """Take out an attribute with the blanks before it; the element, where it has no other."""
+    if len(element.attributes) == 1 and not element.children:
+        return remove((element,))
+    return _without(element, name)
 
 
-def drop_attribute(element: Element, name: str) -> ModelEdit:
-    """Take out an attribute, with the blanks before it."""
+def _without(element: Element, name: str) -> tuple[ModelEdit, ...]:
     there = element.attribute(name)
     assert there is not None, name
     start = len(element.document.data[: there.start].rstrip())
-    return ModelEdit(element.document.path, start, there.end, b"")
+    return (ModelEdit(element.document.path, start, there.end, b""),)
 
 
 def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[ModelEdit, ...]:
@@ -175,98 +161,27 @@ def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[
     if there is None or not places:
         return ()
     start, end = there.inner
-    spans = [match.span() for match in _NUMBER.finditer(element.document.data[start:end])]
-    left = [place for place in range(len(spans)) if place not in places]
+    numbers = [match.group() for match in _NUMBER.finditer(element.document.data[start:end])]
+    left = [number for place, number in enumerate(numbers) if place not in places]
+    if len(left) == len(numbers):
+        return ()
     if not left:
-        return (drop_attribute(element, name),)
-    path, found = element.document.path, []
-    for place in range(left[-1]):  # each with the blanks behind it
-        if place not in left:
-            found.append(ModelEdit(path, start + spans[place][0], start + spans[place + 1][0], b""))
-    if left[-1] + 1 < len(spans):  # the last ones with the blanks before them
-        found.append(ModelEdit(path, start + spans[left[-1]][1], start + spans[-1][1], b""))
-    return tuple(found)
+        return _without(element, name)
+    return (ModelEdit(element.document.path, start, end, b"".join(left).rstrip()),)
 
 
-# ----------------------------------------------------------------------------------------- options
-
-
-def set_options(main: Markup, options: Settings, flags: Settings) -> tuple[ModelEdit, ...]:
-    """Set attributes of `option` and of its `flag`, or take them out (`None`), all at once.
-
-    What is left without attributes goes; what is not there yet is written into the model's own
-    file.
-    """
-    holders = [one for one in main.root.spliced() if one.tag == "option"]
-    flagged = [one for holder in holders for one in holder.spliced() if one.tag == "flag"]
-    own = [one for one in holders if one.document is main]
-    spared: set[Element] = set()
-    edits, new = _changed(holders, options, main, spared)
-    more, new_flags = _changed(flagged, flags, main, spared)
-    flag = b"<flag" + _written(new_flags) + b"/>" if new_flags else b""
-    if new or (flag and not own):
-        inner = b">" + flag + b"</option>" if flag else b"/>"
-        edits.append(_first_child(main.root, b"<option" + _written(new) + inner))
-    elif flag:
-        edits.append(_first_child(own[-1], flag))
-        spared.add(own[-1])
-    gone: list[Element] = []
-    for one, wanted in (*((one, flags) for one in flagged), *((one, options) for one in holders)):
-        if one not in spared and _is_emptied(one, wanted, gone):
-            gone.append(one)
-    return (*edits, *more, *remove(gone))
-
-
-def _changed(
-    elements: Sequence[Element], wanted: Settings, main: Markup, spared: set[Element]
-) -> tuple[list[ModelEdit], list[tuple[str, str]]]:
-    """Edits of elements that are there, and what none of them can take."""
-    edits: list[ModelEdit] = []
-    new: list[tuple[str, str]] = []
-    for name, value in wanted:
-        having = [one for one in elements if one.attribute(name) is not None]
-        if value is None:
-            edits += [drop_attribute(one, name) for one in having]
-        elif having:
-            edits += set_attributes(having[-1], ((name, value),))
-        else:
-            new.append((name, value))
-    own = [one for one in elements if one.document is main]
-    if not new or not own:
-        return edits, new
-    spared.add(own[-1])
-    return [*edits, *set_attributes(own[-1], new)], []
-
-
-def _is_emptied(element: Element, wanted: Settings, gone: Collection[Element]) -> bool:
-    """Whether something was in an element, and nothing is left."""
-    dropped = {name for name, value in wanted if value is None}
-    left = [one for one in element.attributes if one.name not in dropped]
-    inside = [one for one in element.children if one not in gone]
-    had = bool(element.attributes or element.children)
-    return had and not (left or inside or _has_more(element))
-
-
-def _first_child(parent: Element, new: bytes) -> ModelEdit:
-    """Write an element before the first child of another, on a line of its own."""
-    path, data = parent.document.path, parent.document.data
-    newline = b"\r\n" if b"\r\n" in data else b"\n"
-    outer = _indent(data, parent.start)
-    inner = newline + outer + b"  " + new
-    if parent.tail == parent.end:  # it is one tag, `<a/>`
-        slash = len(data[: parent.end - 2].rstrip())
-        text = b">" + inner + newline + outer + f"</{parent.tag}>".encode()
-        return ModelEdit(path, slash, parent.end, text)
-    if parent.children:
-        first = parent.children[0]
-        if data[parent.head : first.start].strip(b" \t") == b"":  # all on one line
-            inner = new
-        else:
-            inner = newline + _indent(data, first.start) + new
-    return ModelEdit(path, parent.head, parent.head, inner)
-
-
-def _indent(data: bytes, at: int) -> bytes:
-    """The blanks at the beginning of the line on which a byte stands."""
-    line = max(data.rfind(b"\n", 0, at), data.rfind(b"\r", 0, at)) + 1
-    return data[line : _after(data, line)]
+def set_option(main: Markup, tag: str, name: str, value: str) -> tuple[ModelEdit, ...]:
+    """Set an attribute of `option`, or of its `flag`, where it stands or in a new element."""
+    holders = [one for one in main.root.walk() if one.tag == tag]
+    having = [one for one in holders if one.attribute(name) is not None]
+    own = having or [one for one in holders if one.document is main]
+    if own:
+        return set_attributes(own[-1], ((name, value),))
+    new = f'<{tag} {name}="{value}"/>'
+    if tag == "flag":
+        new = f"<option>{new}</option>"
+    # On a line of its own, indented as the first element is.
+    data, head = main.data, main.root.head
+    blank = re.match(rb"\s*", data[head:])
+    lead = blank.group() if blank is not None and b"\n" in blank.group() else b""
+    return (ModelEdit(main.path, head, head, lead + new.encode()),)

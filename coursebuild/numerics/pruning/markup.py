@@ -1,6 +1,6 @@
 """MJCF as text whose every element and attribute knows its place, in bytes.
 
-Entry points: `Markup`, `Element`, `parse_markup(path, data)`; `place_of`.
+Entry points: `Markup`, `Element`, `parse_markup(path, data)`, `splice`; `place_of`.
 
 1. The standard library's parser tells at which byte an element begins and ends; attributes are then
    looked up in its tag. Whatever the file declares, it is read as UTF-8, as MuJoCo does.
@@ -49,6 +49,7 @@ class Element(Struct, eq=False):
     document: Markup
     tag: str
     parent: Element | None
+    """Around it, also where it is in a file included there."""
     attributes: tuple[Attribute, ...]
     start: int
     head: int
@@ -57,11 +58,7 @@ class Element(Struct, eq=False):
     """Where its end tag begins; `head` where it has none."""
     end: int = 0
     children: list[Element] = field(default_factory=list)
-    included: Markup | None = None
-    """The file that an `include` pulls in."""
-
-    def __repr__(self) -> str:
-        return f"<{self.tag}> at byte {self.start} of {self.document.path}"
+    """With those of included files in place of the `include`."""
 
     def get(self, name: str) -> str | None:
         """The value of an attribute."""
@@ -73,27 +70,17 @@ class Element(Struct, eq=False):
         return next((one for one in self.attributes if one.name == name), None)
 
     def walk(self) -> Iterator[Element]:
-        """It and all below it, in the order of the text; an `include` is what it includes."""
-        if self.included is None:
-            yield self
-        for child in self.spliced() if self.included is None else self.included.root.spliced():
+        """It and all below it, in the order in which MuJoCo meets them."""
+        yield self
+        for child in self.children:
             yield from child.walk()
 
-    def spliced(self) -> Iterator[Element]:
-        """Its children, with those of files that are included among them."""
-        for child in self.children:
-            if child.included is None:
-                yield child
-            else:
-                yield from child.included.root.spliced()
-
-    @property
-    def above(self) -> Element | None:
-        """The element that it lies in, also where it is in a file included there."""
-        parent = self.parent
-        if parent is not None and parent.parent is None and self.document.at is not None:
-            return self.document.at.above
-        return parent
+    def above(self) -> Iterator[Element]:
+        """The elements that it lies in, from the nearest on."""
+        element = self.parent
+        while element is not None:
+            yield element
+            element = element.parent
 
 
 class Markup:
@@ -105,6 +92,7 @@ class Markup:
         self.root: Element
         self.at: Element | None = None
         """The `include` that pulls it in; `None` for a model's own file."""
+        self.included: list[Markup] = []
 
     def position(self, offset: int) -> tuple[int, int]:
         """Line and column of a byte, both from 1; columns count characters."""
@@ -128,8 +116,7 @@ def parse_markup(path: str, data: bytes) -> Markup:
         begin = parser.CurrentByteIndex
         found, at = _attributes(data, begin, given)
         parent = opened[-1] if opened else None
-        head = data.index(b">", at) + 1
-        element = Element(document, tag, parent, found, begin, head)
+        element = Element(document, tag, parent, found, begin, data.index(b">", at) + 1)
         if parent is None:
             document.root = element
         else:
@@ -171,21 +158,30 @@ def _attributes(data: bytes, start: int, given: list[str]) -> tuple[tuple[Attrib
     return tuple(found), at
 
 
+def splice(include: Element, inner: Markup) -> None:
+    """Put what a file holds in place of the `include` that pulls it in."""
+    parent = include.parent
+    assert parent is not None
+    inner.at = include
+    include.document.included.append(inner)
+    for child in inner.root.children:
+        child.parent = parent
+    at = parent.children.index(include)
+    parent.children[at : at + 1] = inner.root.children
+
+
 def place_of(element: Element) -> str:
     """The way to an element from the root, with names, and numbers where there is none."""
     parts: list[str] = []
-    here: Element | None = element
-    while here is not None:
-        above = here.above
+    for here in (element, *element.above()):
         key = "class" if here.tag == "default" else "name"
         name = here.get("name") or (here.get("class") if here.tag == "default" else None)
         part = here.tag
         if name:
             part += f'[@{key}="{name}"]'
-        elif above is not None:
-            alike = [one for one in above.spliced() if one.tag == here.tag]
+        elif here.parent is not None:
+            alike = [one for one in here.parent.children if one.tag == here.tag]
             if len(alike) > 1:
                 part += f"[{alike.index(here) + 1}]"
         parts.append(part)
-        here = above
     return "/".join(reversed(parts))

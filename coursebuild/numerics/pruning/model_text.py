@@ -21,7 +21,7 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, set_attributes
-from coursebuild.numerics.pruning.markup import Element, Markup, parse_markup
+from coursebuild.numerics.pruning.markup import Element, Markup, parse_markup, splice
 
 _DEEPEST = 32
 
@@ -45,11 +45,10 @@ KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
     "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
 }
 """Kinds of things that elements become: MuJoCo's number for them, and where it counts them."""
-_BODY_PARTS = {"body": "body", "joint": "joint", "freejoint": "joint", "geom": "geom"}
-_BODY_PARTS |= {"site": "site"}
+_IN_BODIES = {"body": "body", "joint": "joint", "freejoint": "joint", "geom": "geom"}
+_IN_BODIES |= {"site": "site"}
 _HOLDERS = frozenset(("worldbody", "body", "frame", "replicate"))
 _SECTIONS = frozenset(("sensor", "actuator", "tendon"))
-_TAG = "diet_"
 
 
 class Thing(Struct, frozen=True):
@@ -63,10 +62,10 @@ class Thing(Struct, frozen=True):
 class ModelText:
     """A model and its files."""
 
-    def __init__(self, documents: Sequence[Markup], compile: Compile, *, check: bool) -> None:
-        self.documents = tuple(documents)
-        self.main = documents[0]
-        self.elements: tuple[Element, ...] = tuple(self.main.root.walk())
+    def __init__(self, main: Markup, compile: Compile, *, check: bool) -> None:
+        self.main = main
+        self.documents = tuple(_with_included(main))
+        self.elements: tuple[Element, ...] = tuple(main.root.walk())
         """All of them, in the order in which MuJoCo meets them."""
         self._compile = compile
         self.model: Any = self._checked() if check else self.compiled()
@@ -89,6 +88,12 @@ class ModelText:
         """What an element becomes; `None` where that is not known."""
         return self._things.get(element)
 
+    def things(self, kind: str) -> Iterator[tuple[Element, tuple[int, ...]]]:
+        """Elements of a kind, with the numbers of what they become."""
+        for element, thing in self._things.items():
+            if thing.kind == kind:
+                yield element, thing.ids
+
     def ids_of(self, elements: Iterable[Element], kind: str) -> frozenset[int]:
         """The numbers of one kind that elements become."""
         things = (self.ids(element) for element in elements)
@@ -96,7 +101,7 @@ class ModelText:
 
     def _checked(self) -> Any:
         model = self._compile(self.main.data)
-        if len(self.documents) > 1:
+        if self.main.included:
             try:
                 same = saved(self.compiled()) == saved(model)
             except ValueError:
@@ -115,8 +120,8 @@ class ModelText:
                 continue
             name = element.get("name")
             if not name:
-                name = f"{_TAG}{number}_"
-                while name.encode() in self.main.data:
+                name = f"diet_{number}_"
+                while any(name.encode() in one.data for one in self.documents):
                     name += "_"
                 edits += set_attributes(element, (("name", name),))
             wanted[element] = kind, name
@@ -153,14 +158,12 @@ def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -
     main = parse_markup(path, data)
     if main.root.tag != "mujoco":
         raise ModelTextError(f"its root is <{main.root.tag}>: it is no model of its own")
-    return ModelText(
-        [main, *_included(main, posixpath.dirname(path), read, 0)], compile, check=check
-    )
+    _include(main, posixpath.dirname(path), read, 0)
+    return ModelText(main, compile, check=check)
 
 
-def _included(document: Markup, folder: str, read: Read, depth: int) -> list[Markup]:
-    """The files that a file includes, from its folder or the model's, and those that they do."""
-    found: list[Markup] = []
+def _include(document: Markup, folder: str, read: Read, depth: int) -> None:
+    """Splice in the files that a file includes, from its folder or the model's."""
     for element in list(document.root.walk()):
         if element.tag != "include":
             continue
@@ -173,9 +176,14 @@ def _included(document: Markup, folder: str, read: Read, depth: int) -> list[Mar
         if depth >= _DEEPEST:
             raise ModelTextError("its includes are nested too deeply")
         inner = parse_markup(path, read(path) or b"")
-        inner.at, element.included = element, inner
-        found += [inner, *_included(inner, folder, read, depth + 1)]
-    return found
+        _include(inner, folder, read, depth + 1)
+        splice(element, inner)
+
+
+def _with_included(document: Markup) -> Iterator[Markup]:
+    yield document
+    for inner in document.included:
+        yield from _with_included(inner)
 
 
 def _by_path(edits: Iterable[ModelEdit]) -> dict[str, list[ModelEdit]]:
@@ -188,26 +196,16 @@ def _by_path(edits: Iterable[ModelEdit]) -> dict[str, list[ModelEdit]]:
 def _whole(document: Markup, edits: Mapping[str, Sequence[ModelEdit]]) -> bytes:
     """A file with edits, and in place of its includes what these hold."""
     own = list(edits.get(document.path, ()))
-    removed = [(one.start, one.end) for one in own if not one.new and one.end > one.start]
-    for element in _includes(document.root):
-        if any(start <= element.start and element.end <= end for start, end in removed):
+    removed = [(one.start, one.end) for one in own if not one.new]
+    for inner in document.included:
+        include = inner.at
+        assert include is not None
+        if any(start <= include.start and include.end <= end for start, end in removed):
             continue
-        inner = element.included
-        assert inner is not None
-        text = _whole(inner, edits)
-        root = parse_markup(inner.path, text).root
-        own.append(
-            ModelEdit(document.path, element.start, element.end, text[root.head : root.tail])
-        )
+        root = parse_markup(inner.path, text := _whole(inner, edits)).root
+        held = text[root.head : root.tail]
+        own.append(ModelEdit(document.path, include.start, include.end, held))
     return apply_edits(document.data, own)
-
-
-def _includes(element: Element) -> Iterator[Element]:
-    if element.included is not None:
-        yield element
-        return
-    for child in element.children:
-        yield from _includes(child)
 
 
 def saved(model: Any) -> bytes:
@@ -217,25 +215,19 @@ def saved(model: Any) -> bytes:
     return buffer.tobytes()
 
 
+def section_of(element: Element) -> str:
+    """The section that an element stands in; empty for one that stands elsewhere."""
+    parent = element.parent
+    return parent.tag if parent and parent.parent and not parent.parent.parent else ""
+
+
 def thing_kind(element: Element) -> str | None:
     """What kind of thing an element becomes; `None` for others, and for templates of things."""
-    above = element.above
-    if above is None:
-        return None
-    if above.tag in _SECTIONS and above.above is not None and above.above.parent is None:
-        return above.tag
-    kind = _BODY_PARTS.get(element.tag)
-    return kind if kind is not None and above.tag in _HOLDERS else None
-
-
-def is_repeated(element: Element) -> bool:
-    """Whether MuJoCo makes several of it, with numbers behind their names."""
-    above = element.above
-    while above is not None:
-        if above.tag == "replicate":
-            return True
-        above = above.above
-    return False
+    section = section_of(element)
+    if section in _SECTIONS:
+        return section
+    held = element.parent is not None and element.parent.tag in _HOLDERS
+    return _IN_BODIES.get(element.tag) if held else None
 
 
 def _assigned(
@@ -247,7 +239,7 @@ def _assigned(
     places = {kind: {name: i for i, name in enumerate(all)} for kind, all in names.items()}
     for element, (kind, name) in wanted.items():
         ids: tuple[int, ...]
-        if is_repeated(element):
+        if any(one.tag == "replicate" for one in element.above()):
             shape = re.compile(re.escape(name) + r".*\d", re.DOTALL)
             ids = tuple(i for i, one in enumerate(names[kind]) if shape.fullmatch(one))
         else:

@@ -1,6 +1,7 @@
 """Where geoms can get, whatever happens: a bound, not an observation.
 
-Entry points: `possible_pairs(model)`, `each_pair(model)`, `separate(model, pairs)`, `Reach`.
+Entry points: `possible_pairs(model)`, `each_pair(model)`, `separate(model, pairs)`; `PREMISES`,
+the fields that the bound rests on.
 
 1. MuJoCo looks for contact between geoms whose masks allow it, but not within a body, nor between
    bodies that are welded to each other or do not move, between parent and child, or where an
@@ -16,7 +17,6 @@ Entry points: `possible_pairs(model)`, `each_pair(model)`, `separate(model, pair
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -30,6 +30,16 @@ _HFIELD = int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _SLACK = 1e-6
 """m and relative: rounding, and the engine's own margins."""
+
+PREMISES = frozenset(
+    "geom_contype geom_conaffinity geom_bodyid geom_margin geom_gap geom_type geom_dataid geom_pos"
+    " geom_quat geom_size geom_rbound geom_aabb geom_sameframe body_parentid body_rootid"
+    " body_weldid body_mocapid body_jntnum body_jntadr body_dofnum body_pos body_quat"
+    " body_sameframe body_contype body_conaffinity body_margin jnt_type jnt_bodyid jnt_qposadr"
+    " jnt_pos jnt_axis pair_geom1 pair_geom2 pair_margin pair_gap exclude_signature mesh_vert"
+    " hfield_data hfield_size qpos0 qpos_spring disableflags o_margin".split(" ")
+)
+"""Fields of a model: where one of them is changed, geoms may get elsewhere."""
 
 Pair = tuple[int, int]
 Vector = NDArray[np.float64]
@@ -168,27 +178,19 @@ class Reach:
         line = self._above[int(model.geom_bodyid[geom])]
         size = 0.0 if model.geom_type[geom] == _PLANE else self._radius(geom)
         anchors: list[Vector] = []
-        turning, sliding = [], 0.0
         for body in reversed(line[: line.index(common)]):
             if int(model.body_mocapid[body]) >= 0:
                 return None
             start = int(model.body_jntadr[body])
             for joint in range(start, start + int(model.body_jntnum[body])):
-                slides = self._slides(joint)
-                if slides is None:
+                if model.jnt_type[joint] in (_FREE, _SLIDE):
                     return None
-                sliding += slides
                 anchors.append(np.asarray(data.xanchor[joint], dtype=np.float64))
-                turning.append(model.jnt_type[joint] != _SLIDE)
-        # Anchors of slides only add to the way; without a turn the point keeps its direction.
-        turns = [anchor for anchor, turn in zip(anchors, turning, strict=True) if turn]
-        if not turns:
-            return Shell(point, 0.0, sliding + size)
-        corners = [*turns, point]
-        legs = [float(np.linalg.norm(q - p)) for p, q in itertools.pairwise(corners)]
-        reach = sum(legs) + sliding
-        least = max(0.0, legs[-1] - (reach - legs[-1]) - size)
-        return Shell(turns[0], least if len(turns) == 1 else 0.0, reach + size)
+        if not anchors:
+            return Shell(point, 0.0, size)
+        legs = [float(np.linalg.norm(q - p)) for p, q in itertools.pairwise([*anchors, point])]
+        least = max(0.0, legs[0] - size) if len(legs) == 1 else 0.0
+        return Shell(anchors[0], least, sum(legs) + size)
 
     def _radius(self, geom: int) -> float:
         """About the geom's own place; a mesh or field may lie beside it."""
@@ -201,39 +203,8 @@ class Reach:
             )
         return float(model.geom_rbound[geom])
 
-    def _slides(self, joint: int) -> float | None:
-        """By how much a joint can shift what it carries, m; `None`: without bound."""
-        model = self._model
-        kind = int(model.jnt_type[joint])
-        if kind == _FREE:
-            return None
-        if kind != _SLIDE:
-            return 0.0
-        low, high = (float(one) for one in model.jnt_range[joint])
-        limited = bool(model.jnt_limited[joint])
-        if int(model.opt.disableflags) & int(
-            mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        ):
-            limited = False
-        if not limited:
-            return None
-        start = float(model.qpos0[int(model.jnt_qposadr[joint])])
-        return max(abs(low - start), abs(high - start)) + abs(high - low)
-
 
 def separate(model: Any, pairs: Iterable[Pair]) -> frozenset[Pair]:
     """Those pairs of geoms that can never touch."""
     reach = Reach(model)
     return frozenset(pair for pair in pairs if reach.separate(*pair))
-
-
-def moving_ball(model: Any, geoms: Iterable[int]) -> tuple[Vector, float] | None:
-    """A ball (centre, radius, m) that these geoms never leave; `None` where there is none."""
-    reach = Reach(model)
-    shells = [reach.shell(geom, 0) for geom in geoms]
-    known = [one for one in shells if one is not None]
-    if len(known) != len(shells) or not known:
-        return None
-    centre = np.mean([one.centre for one in known], axis=0)
-    radius = max(float(np.linalg.norm(one.centre - centre)) + one.most for one in known)
-    return centre, radius if math.isfinite(radius) else math.inf

@@ -1,145 +1,70 @@
-"""What could be left out of a model, and models without it, run and timed beside the original.
+"""A model without some things: compiled, compared with the whole one, run and timed beside it.
 
-Entry points: `Candidate`, `Item`, `PruningContext`; `PruningTrials`.
-
-1. A candidate is a kind of thing that may be in vain, with every place where the model has it. Why
-   it must be in vain whatever happens is its `proof`; without one only runs speak for it.
-2. A changed model is compiled of the changed text.
+Entry points: `Trials`, which makes a `Trial`; `largest(items, holds)`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import mujoco
+import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.engine import full_state, initial_data, silent
-from coursebuild.numerics.pruning.compare import MotionComparison, Seen, compare
-from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove, set_options
+from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
+from coursebuild.numerics.pruning.candidates import Item
+from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
+from coursebuild.numerics.pruning.differences import Difference, state_difference
+from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove
 from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
-from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import ModelText, saved
-from coursebuild.numerics.pruning.readers import Readers
 from coursebuild.numerics.reports.diet import Saving
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock, Timing, scenario_job, timed
 
-
-class Item(Struct, frozen=True, eq=False):
-    """One thing that may be in vain, and how to be without it."""
-
-    name: str
-    """What it is called; the way to its element where it has no name."""
-    element: Element | None
-    """Where to point at; `None`: at the model."""
-    gone: tuple[Element, ...] = ()
-    """Elements to take out."""
-    edits: tuple[ModelEdit, ...] = ()
-    """Other changes of the text."""
-    options: tuple[tuple[str, str | None], ...] = ()
-    flags: tuple[tuple[str, str | None], ...] = ()
+_T = TypeVar("_T")
+_DRAWS = 2
+"""Random states in which two models are compared."""
 
 
-class Candidate(Struct, frozen=True, eq=False):
-    """A kind of thing that may be in vain."""
+def largest(items: Sequence[_T], holds: Callable[[list[_T]], bool]) -> list[_T]:
+    """Most of the items for which something holds together, by delta debugging.
 
-    kind: str
-    message: str
-    """What is found if it is in vain; `{}` stands for the names."""
-    items: tuple[Item, ...]
-    proof: str = ""
-    """Why it holds whatever happens; empty where only runs can tell."""
-    is_setting: bool = False
-    """Whether nothing is taken out: only the time that it saves speaks for it."""
-    by_runs: bool = False
-    """Whether runs are enough, in full length; the proof only says what they show."""
-    timed: bool = True
-    """Whether it may change the time of a step."""
-    blocked: str = ""
-    """Why it is left to the author even where no bit changes; empty where it is not."""
-    doubt: str = ""
-    """Who may need it, so that it is no fault; empty where nobody does."""
+    All of them are tried first, then halves, each together with what was found before; again, until
+    no more are found. In the end no single one can be added.
+    """
+    found: list[_T] = []
 
+    def add(some: Sequence[_T]) -> None:
+        if holds([*found, *some]):
+            found.extend(some)
+        elif len(some) > 1:
+            add(some[: len(some) // 2])
+            add(some[len(some) // 2 :])
 
-class PruningContext(Struct, frozen=True, eq=False, dict=True):
-    """All that is known before anything is tried."""
-
-    text: ModelText
-    readers: Readers
-    seen: tuple[Seen, ...]
-    """Of the scenarios that went well."""
-    used_keyframes: frozenset[int]
-    numbered: frozenset[str]
-    """What scenarios give by number: `qpos`, `qvel`, `controls`."""
-
-    @property
-    def model(self) -> Any:
-        """The whole model, compiled."""
-        return self.text.model
-
-    @property
-    def elements(self) -> tuple[Element, ...]:
-        """All elements of its files."""
-        return self.text.elements
-
-    @cached_property
-    def values(self) -> dict[str, list[tuple[str, Element]]]:
-        """For each value of an attribute the attributes that have it, with their elements."""
-        found: dict[str, list[tuple[str, Element]]] = {}
-        for element in self.elements:
-            for one in element.attributes:
-                found.setdefault(one.value, []).append((one.name, element))
-        return found
-
-    def users(self, name: str, attributes: Collection[str]) -> list[Element]:
-        """Elements that name something in one of these attributes."""
-        return [element for key, element in self.values.get(name, ()) if name and key in attributes]
-
-    def things(self, kind: str) -> Iterator[tuple[Element, tuple[int, ...]]]:
-        """Elements of a kind, with the numbers of what they become in the compiled model."""
-        for element in self.elements:
-            thing = self.text.ids(element)
-            if thing is not None and thing.kind == kind:
-                yield element, thing.ids
+    left = list(items)
+    while left:
+        before = len(found)
+        add(left)
+        left = [one for one in left if one not in found]
+        if len(found) == before:
+            break
+    return found
 
 
-def worded(items: Sequence[Item], one: str, many: str) -> str:
-    """What to say of one item, or of several."""
-    return one if len(items) == 1 else many
-
-
-def called(element: Element) -> str:
-    """The name of an element, or the way to it where it has none."""
-    return element.get("name") or place_of(element)
-
-
-def named_item(element: Element, *more: Element) -> Item:
-    """An element to take out, with others that go with it."""
-    return Item(called(element), element, (element, *more))
-
-
-# ----------------------------------------------------------------------------------------- trials
-
-
-class PruningTrial(Struct, frozen=True, eq=False):
-    """A changed model, and how it did."""
+class Trial(Struct, frozen=True, eq=False):
+    """A model without some things."""
 
     edits: tuple[ModelEdit, ...]
     model: Any
     index: IndexMap
-    result: MotionComparison | None
-    """`None` where it was not compared yet."""
 
 
-class NotTriedError(Exception):
-    """A change that makes no model, or one that cannot be compared."""
-
-
-class PruningTrials:
-    """Tries a model without things, in its scenarios."""
+class Trials:
+    """Tries a model without things."""
 
     def __init__(
         self, text: ModelText, scenes: Sequence[Scene], clock: Clock | None, *, quick: bool
@@ -149,105 +74,116 @@ class PruningTrials:
         self.clock = clock
         self.quick = quick
 
-    def run(self, items: Iterable[Item]) -> PruningTrial:
-        """The model without these, in all scenarios.
-
-        Raises:
-            NotTriedError: it is no model, or cannot be compared.
-        """
-        return self.compared(self.changed(items))
-
-    def changed(self, items: Iterable[Item]) -> PruningTrial:
-        """The model without these, not compared yet.
-
-        Raises:
-            NotTriedError: it is no model, or not the one that it should be.
-        """
-        edits, gone = changes(self.text, list(items))
-        index = index_map(self.text.model, gone)
+    def without(self, items: Iterable[Item]) -> Trial | None:
+        """The model without these; `None` where that is no model, or not the one it should be."""
+        text = self.text
         try:
-            model = self.text.compiled(edits)
-        except ValueError as error:
-            raise NotTriedError(" ".join(str(error).split())) from None
-        if not fits(index, self.text.model, model):
-            raise NotTriedError("what is left cannot be told from what is gone")
-        return PruningTrial(edits, model, index, None)
-
-    def compared(self, trial: PruningTrial) -> PruningTrial:
-        """How a changed model does.
-
-        Raises:
-            NotTriedError: that cannot be compared.
-        """
-        try:
-            result = compare(self.text.model, trial.model, trial.index, self.scenes)
-        except (ValueError, mujoco.FatalError) as error:
-            raise NotTriedError(" ".join(str(error).split())) from None
-        return PruningTrial(trial.edits, trial.model, trial.index, result)
-
-    def timing(self, trial: PruningTrial) -> Timing | None:
-        """Time of the original over that of a changed model; `None` where it cannot be told."""
-        if self.clock is None or not self.scenes:
+            edits, gone = _changes(text, list(items))
+            index, model = index_map(text.model, gone), text.compiled(edits)
+        except ValueError:
             return None
-        whole, model, index = self.text.model, trial.model, trial.index
-        begins, others = [], []
+        without_reset(model)
+        return Trial(edits, model, index) if fits(index, text.model, model) else None
+
+    def edits(self, items: Iterable[Item]) -> tuple[ModelEdit, ...]:
+        """The changes that take these out."""
+        return _changes(self.text, list(items))[0]
+
+    def bytes_of(self, edits: Iterable[ModelEdit]) -> int:
+        """Bytes that changes take out of the text."""
+        before = {one.path: len(one.data) for one in self.text.documents}
+        files = self.text.files(edits)
+        return sum(before[path] - len(data) for path, data in files.items())
+
+    def compare(self, trial: Trial) -> MotionComparison | None:
+        """How it does in all scenarios; `None` where that cannot be told."""
         try:
-            for scene in self.scenes:
-                data, other = initial_data(scene.scenario, whole), mujoco.MjData(model)
-                transfer(whole, data, index, model, other)
-                begins.append((scene.scenario, full_state(whole, data)))
-                others.append((scene.scenario, full_state(model, other)))
-            jobs = (
-                scenario_job(whole, begins, self.scenes[0].own),
-                scenario_job(model, others, self.scenes[0].own, index.ctrl.tolist()),
-            )
-            with silent():
-                found, own = timed(jobs, 1, self.clock, quick=self.quick)
+            return compare(self.text.model, trial.model, trial.index, self.scenes)
         except (ValueError, mujoco.FatalError):
             return None
-        return found if min(found.nanoseconds.low, own.nanoseconds.low) > 0 else None
 
-    def saving(self, trial: PruningTrial, timing: Timing | None) -> Saving:
+    def state_difference(self, trial: Trial) -> Difference:
+        """By what code could tell both apart in some states of the whole model."""
+        whole, found = self.text.model, Difference()
+        for state in self._states:
+            data, other = mujoco.MjData(whole), mujoco.MjData(trial.model)
+            mujoco.mj_setState(whole, data, state, STATE)
+            transfer(whole, data, trial.index, trial.model, other)
+            advance(whole, data)
+            advance(trial.model, other)
+            found |= state_difference(data, other)
+        return found
+
+    @cached_property
+    def _states(self) -> list[Any]:
+        """Where the first scenario begins, and states that are drawn from there."""
+        model, scenario, found = self.text.model, self.scenes[0].scenario, []
+        random = np.random.default_rng(0)
+        for draw in range(1 + _DRAWS):
+            data = initial_data(scenario, model)
+            if draw:
+                mujoco.mj_integratePos(model, data.qpos, random.normal(size=model.nv), 0.3)
+                data.qvel[:] += random.normal(size=model.nv)
+            found.append(full_state(model, data))
+        return found
+
+    def saving(self, trial: Trial, *, timed: bool = True) -> Saving:
         """What a change saves, in time and bytes."""
-        before = {one.path: len(one.data) for one in self.text.documents}
-        files = self.text.files(trial.edits)
-        text = sum(before[path] - len(data) for path, data in files.items())
+        text = self.bytes_of(trial.edits)
         memory = len(saved(self.text.model)) - len(saved(trial.model))
+        timing = self._timing(trial) if timed else None
         if timing is None:
             return Saving(None, None, False, memory, text)
         ratio = timing.ratio
         return Saving(ratio.value, ratio.half_width / 2, timing.certain, memory, text)
 
+    def _timing(self, trial: Trial) -> Timing | None:
+        """Time of the whole model over that of this one, in whole scenarios."""
+        if self.clock is None:
+            return None
+        whole, index, begins, others = self.text.model, trial.index, [], []
+        try:
+            for scene in self.scenes:
+                data, other = initial_data(scene.scenario, whole), mujoco.MjData(trial.model)
+                transfer(whole, data, index, trial.model, other)
+                begins.append((scene.scenario, full_state(whole, data)))
+                others.append((scene.scenario, full_state(trial.model, other)))
+        except ValueError:
+            return None
+        jobs = (
+            scenario_job(whole, begins, self.scenes[0].own),
+            scenario_job(trial.model, others, self.scenes[0].own, index.ctrl.tolist()),
+        )
+        with silent():
+            found, own = timed(jobs, 1, self.clock, quick=self.quick)
+        return found if min(found.nanoseconds.low, own.nanoseconds.low) > 0 else None
 
-def changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Gone]:
+
+def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Gone]:
     """All the edits that items make together, and what they take out of the compiled model."""
     elements = list(dict.fromkeys(one for item in items for one in item.gone))
     below = [one for element in elements for one in element.walk()]
     gone = Gone(*(text.ids_of(below, kind) for kind in ("body", "geom", "sensor", "actuator")))
     edits = [*remove(elements), *_keyframes(text, gone, set(below))]
     edits += [edit for item in items for edit in item.edits]
-    options = dict(pair for item in items for pair in item.options)
-    flags = dict(pair for item in items for pair in item.flags)
-    if options or flags:
-        edits += set_options(text.main, tuple(options.items()), tuple(flags.items()))
-    return _outermost(edits), gone
+    return tuple(_outermost(edits)), gone
 
 
-def _outermost(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
+def _outermost(edits: Iterable[ModelEdit]) -> Iterator[ModelEdit]:
     """Without those inside of what another one takes out."""
-    found: list[ModelEdit] = []
+    last: ModelEdit | None = None
     for edit in sorted(set(edits), key=lambda one: (one.path, one.start, -one.end)):
-        last = found[-1] if found else None
-        inside = last is not None and last.path == edit.path and not last.new
-        if last is None or not (inside and last.start <= edit.start and edit.end <= last.end):
-            found.append(edit)
-    return tuple(found)
+        inside = last is not None and last.path == edit.path and edit.end <= last.end
+        if inside and last is not None and not last.new and last.start < last.end:
+            continue
+        yield edit
+        last = edit
 
 
-def _keyframes(text: ModelText, gone: Gone, removed: set[Element]) -> Sequence[ModelEdit]:
+def _keyframes(text: ModelText, gone: Gone, removed: Collection[Element]) -> Iterator[ModelEdit]:
     """Keyframes list a number for every coordinate: those of what is gone go too."""
     if not (gone.bodies or gone.actuators):
-        return ()
+        return
     model, left = text.model, index_map(text.model, gone)
 
     def lost(size: int, kept: Any, width: int = 1) -> frozenset[int]:
@@ -262,5 +198,7 @@ def _keyframes(text: ModelText, gone: Gone, removed: set[Element]) -> Sequence[M
         "mpos": lost(model.nmocap, left.mocap, 3),
         "mquat": lost(model.nmocap, left.mocap, 4),
     }
-    keys = [one for one in text.elements if one.tag == "key" and one not in removed]
-    return [e for key in keys for name, at in places.items() for e in drop_numbers(key, name, at)]
+    for key in text.elements:
+        if key.tag == "key" and key not in removed:
+            for name, at in places.items():
+                yield from drop_numbers(key, name, at)

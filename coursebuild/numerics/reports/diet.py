@@ -8,13 +8,10 @@ from __future__ import annotations
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Record
 
-IDENTICAL = "bit-identical"
-"""Without it every bit is the same, and a reason says why that does not hang on the scenarios."""
-EQUAL = "equal within tolerance"
-UNTOUCHED = "never touched in these runs"
-"""Without it every bit was the same, and no reason says that it must be."""
-CHANGES = "changes the result"
-LABELS = (IDENTICAL, EQUAL, UNTOUCHED, CHANGES)
+PROVED = "proved"
+"""Without it every bit is the same in every state, for a reason that is stated."""
+SAME = "the same in what was run"
+"""Without it scenarios, scripts and labs gave the same; nothing says that it must be so."""
 
 
 class ModelPlace(Record, frozen=True):
@@ -69,7 +66,7 @@ class Finding(Record, frozen=True):
     places: tuple[ModelPlace, ...]
     """Empty where it is about the model as a whole."""
     label: str
-    """One of `LABELS`."""
+    """`PROVED` or `SAME`."""
     difference: float
     """The largest within 50 ms, relative to a number's size where that is over 1; 0 where all bits
     are the same."""
@@ -77,8 +74,6 @@ class Finding(Record, frozen=True):
     """In which it was tried."""
     proof: str
     """Why it holds whatever happens; empty where only runs speak for it."""
-    setting: bool
-    """Whether it only chooses between ways of computing: no fault, and a matter of time."""
     saving: Saving
     edits: tuple[TextEdit, ...]
     fixable: bool
@@ -87,14 +82,13 @@ class Finding(Record, frozen=True):
     """Why it does not; empty where it does."""
     kept: str
     """The reason for which it stays; empty where there is none."""
-    doubt: str = ""
-    """Who may need it all the same; empty where nobody does."""
+    doubt: str
+    """Which code may notice, of what only runs speak for; empty where none can."""
 
     @property
     def counts(self) -> bool:
-        """Whether it is a fault of the model: nothing explains it."""
-        excused = self.kept or self.setting or self.doubt
-        return not excused and self.label in (IDENTICAL, EQUAL)
+        """Whether it is a fault of the model: it is proved, and nothing explains it."""
+        return self.label == PROVED and not self.kept
 
 
 class Tried(Record, frozen=True):

@@ -7,11 +7,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import pytest
 
-from coursebuild.core.model.scenarios import Declarations, Visible
-from coursebuild.core.syntax.scenarios import parse_declarations
-from coursebuild.core.text.source import Source
+from coursebuild.core.model.scenarios import Visible
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import (
@@ -23,6 +20,7 @@ from coursebuild.numerics.pruning.compare import (
 )
 from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
+from support.surveys import declared
 
 DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
@@ -49,7 +47,7 @@ def test_chaos_is_no_difference() -> None:
     """After 15 s the trajectories are far apart for that; within 50 ms they are one."""
     one, other = double(), double(1.0 + 1e-13)
     found = compare(one, other, same(one), [CHAOS])
-    assert not found.identical and found.equal and 0 < found.difference < 1e-11
+    assert not found.identical and 0 < found.difference < 1e-11
     ends = []
     for model in (one, other):
         data = initial_data(CHAOS.scenario, model)
@@ -62,7 +60,7 @@ def test_the_same_and_another_model() -> None:
     one = double()
     assert compare(one, double(), same(one), [SHORT]) == compare(one, one, same(one), [])
     other = compare(one, double(1.001), same(one), [SHORT])
-    assert not other.identical and not other.equal and TOLERANCE < other.difference < 1
+    assert not other.identical and TOLERANCE < other.difference < 1
 
 
 def test_a_changed_model_that_diverges_is_not_equal() -> None:
@@ -92,7 +90,6 @@ def test_what_a_run_shows() -> None:
     model = mujoco.MjModel.from_xml_string(text)
     seen = watch(model, lasting(1.0))
     assert seen.judgement.ok and seen.touching == {(0, 1)} and seen.constrained
-    assert seen.high[1, 2] == pytest.approx(0.3) and seen.low[1, 2] < 0.11
     seen = watch(model, lasting(0.1))
     assert not seen.touching and not seen.constrained
 
@@ -125,12 +122,6 @@ def test_a_state_is_brought_over() -> None:
     assert into.act.tolist() == [1, 2] and into.ctrl.tolist() == [4, 5, 6]
     assert into.mocap_pos[1].tolist() == [7] * 3
     assert into.xfrc_applied[other.body("b").id].tolist() == [8] * 6
-
-
-def declared(text: str) -> Declarations:
-    parsed = parse_declarations(Source("models/a.toml", text))
-    assert parsed.value is not None, parsed.diagnostics
-    return parsed.value
 
 
 def test_scenarios_as_the_author_wrote_them() -> None:

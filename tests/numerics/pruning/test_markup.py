@@ -7,9 +7,10 @@ import pytest
 from coursebuild.numerics.pruning.edits import (
     ModelEdit,
     apply_edits,
+    drop_attribute,
     drop_numbers,
     remove,
-    set_options,
+    set_option,
 )
 from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup, place_of
 
@@ -159,66 +160,49 @@ def test_numbers_go_out_of_a_list(gone: list[int], left: str) -> None:
     assert drop_numbers(document(text).root, "other", gone) == ()
 
 
-DROP = (("energy", None),)
-
-
 @pytest.mark.parametrize(
-    ("before", "options", "flags", "left"),
+    ("before", "tag", "name", "value", "left"),
     [
         (
             "<m>\n  <y/>\n</m>",
-            (),
-            (("contact", "disable"),),
+            "flag",
+            "contact",
+            "disable",
             '<m>\n  <option><flag contact="disable"/></option>\n  <y/>\n</m>',
         ),
-        (
-            "<m>\r\n\t<option a='1'/>\r\n</m>",
-            (),
-            (("contact", "disable"),),
-            "<m>\r\n\t<option a='1'>\r\n\t  <flag contact=\"disable\"/>\r\n\t</option>\r\n</m>",
-        ),
-        (
-            "<m><option><flag energy='enable'/></option></m>",
-            (),
-            (("energy", None), ("contact", "disable")),
-            '<m><option><flag contact="disable"/></option></m>',
-        ),
-        ("<m>\n  <option>\n    <flag energy='enable'/>\n  </option>\n</m>", (), DROP, "<m>\n</m>"),
-        (
-            "<m><option a='1'><flag energy='enable'/></option></m>",
-            (),
-            DROP,
-            "<m><option a='1'></option></m>",
-        ),
-        (
-            "<m><option><!-- --><flag energy='enable'/></option></m>",
-            (),
-            DROP,
-            "<m><option><!-- --></option></m>",
-        ),
-        ("<m><option wind='1 0 0'/></m>", (("wind", None),), (), "<m></m>"),
-        (
-            "<m><option wind='1 0 0'/></m>",
-            (("wind", None), ("cone", "elliptic")),
-            (),
-            '<m><option cone="elliptic"/></m>',
-        ),
+        ("<m><option a='1'/></m>", "option", "b", "2", "<m><option a='1' b=\"2\"/></m>"),
         (
             "<m><option a='1'/><option a='2'/></m>",
-            (("a", "3"),),
-            (),
+            "option",
+            "a",
+            "3",
             "<m><option a='1'/><option a='3'/></m>",
         ),
-        ("<m/>", (("a", "3"),), (("b", "4"),), '<m>\n  <option a="3"><flag b="4"/></option>\n</m>'),
+        ("<m><y/></m>", "option", "a", "3", '<m><option a="3"/><y/></m>'),
     ],
 )
-def test_options_and_flags(
-    before: str,
-    options: tuple[tuple[str, str | None], ...],
-    flags: tuple[tuple[str, str | None], ...],
-    left: str,
-) -> None:
-    assert after(before, *set_options(document(before), options, flags)) == left
+def test_options_and_flags(before: str, tag: str, name: str, value: str, left: str) -> None:
+    assert after(before, *set_option(document(before), tag, name, value)) == left
+
+
+@pytest.mark.parametrize(
+    ("before", "left"),
+    [
+        ("<m>\n  <option>\n    <flag energy='enable'/>\n  </option>\n</m>", "<m>\n</m>"),
+        ("<m><option a='1'><flag energy='enable'/></option></m>", "<m><option a='1'></option></m>"),
+        (
+            "<m><option><!-- --><flag energy='enable'/></option></m>",
+            "<m><option><!-- --></option></m>",
+        ),
+        (
+            "<m><option><flag energy='enable' b='1'/></option></m>",
+            "<m><option><flag b='1'/></option></m>",
+        ),
+    ],
+)
+def test_an_attribute_goes_with_an_element_that_has_no_other(before: str, left: str) -> None:
+    flags = [one for one in document(before).root.walk() if one.tag == "flag"]
+    assert after(before, *drop_attribute(flags[0], "energy")) == left
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:

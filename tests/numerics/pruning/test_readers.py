@@ -1,81 +1,135 @@
-"""Who reads a model, and what of it."""
+"""Who may notice that a part of a model is gone: scripts that use one, each in its own way."""
 
 from __future__ import annotations
 
+import textwrap
+
 import pytest
 
-from coursebuild.numerics.pruning.readers import Reader, Readers, readers_of
+from coursebuild.numerics.pruning.readers import python_reader
+from support.surveys import declared, names, scene, tried
 
-
-def of(*texts: str) -> Readers:
-    return Readers(tuple(Reader(f"{i}.md", text) for i, text in enumerate(texts)))
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        'model_path("arm")',
-        "A lesson on the arm.",
-        '{"model": "robots/arm", "title": "…"}',
-        'for name in ("a", "b"): model_path(f"models/{name}.xml")',
-        "for path in Path('models').glob('*.xml'): pass",
-        "model_path('models/' + kind + '.xml')",
-    ],
+MODEL = scene(
+    """<geom name="wall" type="box" size=".1 .1 .1" pos="0 0 2" material="m"/>
+    <body name="leg" pos="0 0 1"><joint name="hip" axis="0 1 0"/>
+      <geom name="shin" size=".05" pos=".3 0 0"/><site name="tip_l"/><site name="tip_r"/></body>""",
+    head="""<option><flag energy="enable"/></option>
+  <asset><material name="m"/><material name="spare" rgba="1 0 0 1"/>
+    <mesh name="cube" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>""",
+    rest="""<sensor><jointpos name="hip_l" joint="hip"/><jointvel name="hip_r" joint="hip"/>
+    <subtreeangmom name="spin" body="leg"/><framepos name="at" objtype="site" objname="tip_l"/>
+  </sensor>
+  <actuator><motor name="push" joint="hip"/></actuator>
+  <tendon><fixed name="cord"><joint joint="hip" coef="1"/></fixed></tendon>
+  <keyframe><key name="up" qpos="1"/><key name="down" qpos="3"/></keyframe>""",
 )
-def test_a_text_that_names_a_model_or_builds_its_path_may_use_it(text: str) -> None:
-    assert readers_of("robots/arm", [Reader("a.md", text)]).files
+HEAD = """
+import json, mujoco, numpy as np
+from mjcourse import model_path
+model = mujoco.MjModel.from_xml_path(str(model_path("leg")))
+data = mujoco.MjData(model)
+"""
+
+GO = declared('[[scenario]]\nname = "go"\nkeyframe = "up"\nduration = 0.1\n')
+
+HOSTILE = {
+    # What of the model it uses, by the kind of a finding, and the script.
+    "concatenation": ("sensor", 'print([data.sensor("hip_" + s).data for s in "lr"])'),
+    "percent": ("sensor", 'print(data.sensor("hip_%s" % "l").data)'),
+    "f-string": ("sensor", 's = "r"\nprint(data.sensor(f"hip_{s}").data)'),
+    "format": ("sensor", 'print(data.sensor("hip_{}".format("r")).data)'),
+    "join": ("sensor", 'print(data.sensor("_".join(["hip", "l"])).data)'),
+    "number": ("sensor", "print(data.sensor(0).data)"),
+    "keyword": ("sensor", 'print(model.sensor(name="hip_l").adr)'),
+    "slice": ("sensor", "print(data.sensordata[:2])"),
+    "alias": ("sensor", "d = data\nvalues = d.sensordata\nprint(values.sum())"),
+    "walrus": ("sensor", "if (n := model.nsensor) > 1: print(n)"),
+    "getattr": ("sensor", 'print(getattr(data, "sensordata"))'),
+    "getattr built": ("sensor", 'print(getattr(data, "sensor" + "data"))'),
+    "vars": ("sensor", 'print({k: getattr(data, k) for k in dir(data) if "sens" in k})'),
+    "format field": ("sensor", 'print("{0.sensordata}".format(data))'),
+    "format method": ("sensor", 'show = "{0.sensordata}".format\nprint(show(data))'),
+    "pattern": ("sensor", "match data:\n    case object(sensordata=s): print(s)"),
+    "function handed on": ("sensor", 'print([f(n).data for f in (data.sensor,) for n in ("at",)])'),
+    "attrgetter": ("sensor", 'from operator import attrgetter\nprint(attrgetter("x" + "y")(data))'),
+    "names of a file": ("sensor", 'for n in json.load(open("names.json")): print(data.sensor(n))'),
+    "helper": ("sensor", "from tools import log\nlog(model, data)"),
+    "unknown package": ("sensor", "import observe\nobserve.everything(model, data)"),
+    "name2id": ("sensor", 'i = mujoco.mj_name2id(model, 20, "hip" + "_l")\nprint(i)'),
+    "id of another": ("sensor", 'print(model.sensor("at").id)'),
+    "what a sensor computes": (
+        "sensor spin",
+        "mujoco.mj_step(model, data)\nprint(data.subtree_angmom)",
+    ),
+    "spec": ("sensor", "spec = mujoco.MjSpec.from_file('x')\nprint(len(spec.sensors))"),
+    "rollout": ("sensor", "from mujoco import rollout\nprint(rollout.rollout(model, data, [0]))"),
+    "exec": ("sensor", 'exec("print(data." + "sensor" + "data)")'),
+    "dunder": ("sensor", 'print(data.__getattribute__("sensor" + "data"))'),
+    "text of the model": ("sensor", 'print(model_path("leg").read_text().count("<"))'),
+    "include": ("sensor", "x = '<mujoco><include file=\"leg.xml\"/></mujoco>'"),
+    "site by number": ("site", "print(data.site(1).xpos)"),
+    "site name built": ("site", 'print(data.site("tip_" + str("l")).xpos)'),
+    "jacobian of a site": ("site", "mujoco.mj_jacSite(model, data, None, None, 0)"),
+    "keyframes in a loop": (
+        "keyframe",
+        "for k in range(2): mujoco.mj_resetDataKeyframe(model, data, k)",
+    ),
+    "keyframe by star": ("keyframe", "a = (model, data, 1)\nmujoco.mj_resetDataKeyframe(*a)"),
+    "keyframe array": ("keyframe", "data.qpos[:] = model.key_qpos[-1]"),
+    "material by number": ("material", "model.geom_matid[0] = 1"),
+    "material of a view": ("material", 'model.geom("wall").matid = 1'),
+    "mesh by number": ("mesh", "model.geom_dataid[0] = 0"),
+    "wall moved": ("contact-off", 'model.geom("wall").pos[0] = .3'),
+    "wall moved by alias": ("contact-off", "m = model\nm.geom_pos[:] = 0"),
+    "wall moved by copyto": ("contact-off", "np.copyto(model.body_pos, 0)"),
+    "wall grown": ("contact-off", 'g = model.geom("wall")\ng.size[:] = 3'),
+    "joint changed": ("contact-off", 'model.joint("hip").pos = [9, 9, 9]'),
+    "commands": ("actuator", "data.ctrl[0] = 1"),
+    "command of a view": ("actuator", 'for n in ("push",): data.actuator(n).ctrl = 1'),
+    "tendon": ("tendon", "print(data.ten_length)"),
+    "energy": ("energy", "print(data.energy.sum())"),
+    "energy flag": ("energy", "print(model.opt.enableflags)"),
+}
 
 
-@pytest.mark.parametrize("text", ["model_path('army')", "alarm", "f'{name}.xml'", "charm arms"])
-def test_a_text_with_other_words_only_does_not_use_the_model(text: str) -> None:
-    assert not readers_of("robots/arm", [Reader("a.md", text)]).files
+@pytest.mark.site
+def test_no_hostile_script_loses_a_part() -> None:
+    whole = {one.kind: names(one) for one in tried(MODEL, declared=GO)[1].findings if one.fixable}
+    lost = []
+    for title, (part, script) in HOSTILE.items():
+        kind, _, name = part.partition(" ")
+        assert any(kind in one for one in whole), kind
+        _, survey = tried(MODEL, lesson=HEAD + script, declared=GO)
+        counted = [one for one in survey.findings if one.counts and kind in one.kind]
+        lost += [(title, one.kind) for one in counted if not name or name in names(one)]
+    assert lost == []
 
 
-@pytest.mark.parametrize(
-    ("what", "text"),
-    [
-        ("sensor", "data.sensordata"),
-        ("sensor", "data.sensor(name)"),
-        ("sensor", "data.sensor( i )"),
-        ("actuator", "data.ctrl[:]"),
-        ("actuator", "model.actuator(0)"),
-        ("keyframe", 'lab {"key": 1}'),
-        ("keyframe-number", "mj_resetDataKeyframe(model, data, 2)"),
-        ("site", "data.site_xpos"),
-        ("energy", "lib.energy().kinetic"),
-        ("shape", "model.geom_size[0] = 2"),
-        ("material", "model.mat(i)"),
-        ("tendon", "data.ten_length"),
-        ("number", "data.qpos[3:]"),
-        ("number", "qpos = initial"),
-        ("body-number", "data.xpos[2]"),
-    ],
-)
-def test_what_counts_things_or_takes_them_all_reads_the_whole_kind(what: str, text: str) -> None:
-    assert of("nothing", text).whole(what) == "1.md"
+@pytest.mark.site
+def test_what_a_script_names_stays_and_the_rest_goes() -> None:
+    """The default is that everything is used, but not that everything always is."""
+    script = textwrap.dedent("""
+        for _ in range(10):
+            mujoco.mj_step(model, data)
+        print(data.time, data.joint("hip").qpos[0], data.body("leg").xpos, data.qpos[0])
+        print(data.sensor("hip_l").data, data.site("tip_r").xpos)
+        mujoco.mj_resetDataKeyframe(model, data, model.key("down").id)
+        print("the spare cube and spin are in the prose only")
+    """)
+    _, survey = tried(MODEL, lesson=HEAD + script, declared=GO)
+    found = {one.kind: names(one) for one in survey.findings if one.counts}
+    assert found.pop("contact-off") == []
+    assert found == {
+        "energy-flag": ["energy"],
+        "sensor-unread": ["hip_r", "spin", "at"],
+        "actuator-idle": ["push"],
+        "tendon-idle": ["cord"],
+        "unused-site": ["tip_l"],
+        "unused-material": ["spare"],
+        "unused-mesh": ["cube"],
+    }
 
 
-@pytest.mark.parametrize(
-    ("what", "text"),
-    [
-        ("sensor", 'data.sensor("gyro")'),
-        ("sensor", "a sensor, somewhere"),
-        ("actuator", "menu, manual"),
-        ("keyframe", 'lab {"key": "up"}'),
-        ("keyframe-number", 'mj_resetDataKeyframe(model, data, model.key("up").id)'),
-        ("site", 'data.site("tip")'),
-        ("site", "opposite(x)"),
-        ("material", "format(i)"),
-        ("number", 'data.joint("pivot").qpos[0] + data.body("arm").xpos'),
-    ],
-)
-def test_what_asks_for_one_thing_by_name_does_not_read_the_whole_kind(what: str, text: str) -> None:
-    assert of(text).whole(what) == ""
-
-
-def test_names_are_found_as_whole_words() -> None:
-    readers = of('data.sensor("gyro-2")', "the Kügelchen; a.b")
-    assert readers.named("gyro-2") == "0.md" and readers.named("Kügelchen") == "1.md"
-    assert readers.named("a.b") and not readers.named("a+b") and not readers.named("")
-    assert not readers.named("gyr") and not readers.named("Kügel")
-    assert readers.reads("sensor", "gyro-2") and not readers.reads("sensor", "touch")
+def test_a_reader_that_is_no_python_may_use_everything() -> None:
+    assert python_reader("a.py", "print(").opaque
+    assert not python_reader("a.py", "import numpy\nprint(numpy.pi)").opaque
