@@ -353,6 +353,14 @@ test('a model that the reader wrote is compiled here; what MuJoCo says of it is 
     assert.deepEqual([type, kind, fatal], wrong ? ['error', 'load', false] : ['ready', undefined, undefined], `${xml.slice(0, 90)}: ${message}`)
     if (wrong) assert.match(message, wrong)
   }
+  for (const [size, distance] of [[1.1, 7], [9, null]]) {
+    bench.take()
+    const camera = { azimuth: null, elevation: null, distance: 7, target: null }
+    await bench.load('a', { xml: world(`<geom size="${size}"/>`), camera, extent: 2, floor: 0 }, 'plain', 'missing')
+    const { scene } = bench.of('ready')[0]
+    if (distance) assert.deepEqual([scene.camera.distance, scene.floor], [7, 0], 'the camera of a model as large')
+    else assert.deepEqual([scene.camera.distance > 10, scene.floor], [true, null], 'the camera of this model')
+  }
   bench.send({ type: 'ping' })
   assert.equal(bench.of('pong').length, 1)
 })

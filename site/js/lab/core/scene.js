@@ -23,11 +23,13 @@ export function describeScene(engine, { model, shown: data }, config, camera, la
   const name = (type, i) => nameOf(engine, model, type, i)
   const each = (count, make) => Array.from({ length: count }, (_, i) => make(i))
   const { stat, vis } = model
+  const { extent = stat.extent } = config // of the model that the camera and the floor were found for
+  const fits = stat.extent < 1.5 * extent && extent < 1.5 * stat.extent
   return {
     layout: { ...layout },
     timestep: model.opt.timestep,
-    camera: freeCamera(mj, model, config.camera, camera),
-    floor: config.floor ?? null,
+    camera: freeCamera(mj, model, fits ? config.camera : null, camera),
+    floor: fits ? (config.floor ?? null) : null,
     center: Array.from(stat.center),
     extent: stat.extent,
     visual: visual(vis),
