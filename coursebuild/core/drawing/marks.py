@@ -1,6 +1,6 @@
 """Text in drawings: what markup can hold, how wide it is, and how labels keep apart.
 
-Entry points: `markup_text`, `text_width`, `shortened`; `apart`, `clear_place`.
+Entry points: `markup_text`, `text_width`, `shortened`; `apart`.
 """
 
 from __future__ import annotations
@@ -8,8 +8,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from html import escape
-
-from msgspec import Struct
 
 _REMEMBERED = 1024
 """Texts: those of a drawing stand in others as well, in several sizes."""
@@ -72,45 +70,3 @@ def apart(wanted: Sequence[float], gap: float, top: float, bottom: float) -> lis
         most = places[i] = min(places[i], most)
         most -= gap
     return places
-
-
-class Box(Struct, frozen=True):
-    """A rectangle that is taken."""
-
-    left: float
-    top: float
-    right: float
-    bottom: float
-
-    def over(self, other: Box) -> float:
-        """The area that two have in common."""
-        wide = min(self.right, other.right) - max(self.left, other.left)
-        high = min(self.bottom, other.bottom) - max(self.top, other.top)
-        return max(wide, 0.0) * max(high, 0.0)
-
-
-def clear_place(
-    at: tuple[float, float], size: tuple[float, float], inside: Box, taken: Sequence[Box]
-) -> tuple[Box, float]:
-    """A place for a label of this size near a point, and the area that it hides there.
-
-    The first that hides nothing, nearer ones before others, or where it hides least.
-    """
-    x, y = at
-    wide, high = size
-    best: tuple[float, Box] | None = None
-    for away in (13.0, 24.0, 40.0, 60.0):
-        for side, up in ((1, -1), (-1, -1), (1, 1), (-1, 1), (1, 0), (-1, 0), (0, -1), (0, 1)):
-            left = x + away * side if side > 0 else x - away - wide if side < 0 else x - wide / 2
-            top = y + up * away - high / 2
-            left = min(max(left, inside.left), inside.right - wide)
-            top = min(max(top, inside.top), inside.bottom - high)
-            box = Box(left, top, left + wide, top + high)
-            own = Box(x - 9, y - 9, x + 9, y + 9)
-            hidden = sum(box.over(other) for other in taken) + 4 * box.over(own)
-            if best is None or hidden < best[0] - 1e-6:
-                best = (hidden, box)
-            if hidden == 0:
-                return box, 0.0
-    assert best is not None
-    return best[1], best[0]

@@ -96,11 +96,6 @@ def bounded(value: float | None, least: float) -> Markup:
     return power(value)
 
 
-def exact(value: float | None) -> Markup:
-    """A number in ten digits, as far as it has them."""
-    return Markup() if value is None else _raised(f"{value:.10g}")
-
-
 def _raised(text: str) -> Markup:
     """A number as Python writes it, with a raised exponent."""
     mantissa, found, exponent = text.partition("e")

@@ -169,7 +169,7 @@ def _free(name: str) -> Problem:
         velocity_bound=10 * abs(top.omega[2]),
         reference=known_turn(top),
         second=ENGINE,
-        timesteps=divisions(0.05, 10, 20, 40, 80, 160, 320, 640),
+        timesteps=divisions(0.05, 40, 60, 80, 120, 160, 320, 640, 1280),
         checks=tuple(_growth(name, z) for z in (0.03, 0.1, 0.3)),
         limit=lambda integrator: _limit(top, integrator),
         search=(1e-2 / abs(top.rate), 1e1 / abs(top.rate)),
