@@ -192,6 +192,23 @@ def test_sensor_that_a_lesson_reads_is_no_finding(
     assert run(course) == 0
 
 
+def test_what_a_script_says_otherwise_without_is_no_finding(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No scenario tells that the far body is gone, but the number of positions does."""
+    far = '<body pos="900 0 1"><freejoint/><geom size=".1"/></body>\n  </worldbody>'
+    (course / "models" / "swing.xml").write_text(CLEAN.replace("  </worldbody>", far))
+    lessons = course / "content" / "lessons"
+    lessons.mkdir()
+    script = 'import mujoco\nm = mujoco.MjModel.from_xml_path(str(model_path("swing")))\nprint('
+    for asked, found in (("m.nq", False), ('m.body("bob").mass', True)):
+        (lessons / "1.1-a.md").write_text(LESSON.replace("SCRIPT", f"{script}{asked})"))
+        main(["-C", str(course), "diet"])
+        told = " ".join(capsys.readouterr().out.split())
+        assert ("far-body: what the scene is about" in told) is found, asked
+        assert ("because examples/a.py says something else then: far-body" in told) is not found
+
+
 def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

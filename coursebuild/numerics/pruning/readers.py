@@ -256,12 +256,13 @@ def _uses(name: str) -> tuple[str, ...] | None:
     if name in ("MjModel", "MjData") or name.startswith("mjt") or isinstance(member, int | float):
         return ()
     found: list[str] = []
-    lines = re.findall(
-        rf"^(?:\d+\. )?({name}\(.*\)) ->", getattr(member, "__doc__", "") or "", re.M
-    )
+    said = getattr(member, "__doc__", "") or ""
+    lines = re.findall(rf"^(?:\d+\. )?({name}\(.*\)) -> (.*)$", said, re.M)
     if not lines:
         return None
-    for line in lines:
+    for line, gives in lines:
+        if gives != "None" and re.search("MjModel|MjData", line):
+            return None  # what is told of the whole
         (function,) = ast.parse(f"def {line}: ...").body
         assert isinstance(function, ast.FunctionDef)
         for argument in function.args.args:
@@ -277,5 +278,5 @@ def _argument_use(argument: ast.arg) -> str | None:
     given = ast.unparse(argument.annotation) if argument.annotation is not None else ""
     if "SupportsInt" in given and argument.arg != "nstep":
         return VIEWS.get(argument.arg.rstrip("12"))
-    known = ("MjModel", "MjData", "NDArray", "SupportsFloat", "SupportsInt", "bool")
+    known = ("MjModel", "MjData", "NDArray", "SupportsFloat", "SupportsInt")
     return "" if any(word in given for word in known) else None
