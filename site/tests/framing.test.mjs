@@ -80,6 +80,7 @@ test('what stands still close by is seen, and what lies far off draws the camera
 test('the floor is the plane of the model, or under everything, and there is none where nothing falls', () => {
   const plane = '<geom type="plane" size="1 1 1" pos="0 0 -.5"/>'
   assert.equal(framed(model(plane)).framing.floor(), -0.5)
+  assert.equal(framed(model(plane.replace('/>', ' euler="0 20 0"/>'))).framing.floor(), null)
   const { framing } = framed(model(''))
   assert.ok(framing.floor() < -0.3 && framing.floor() > -0.6, `${framing.floor()}`)
   assert.equal(framed(model('', GEOMS, '<option gravity="0 0 0"/>')).framing.floor(), null)

@@ -15,7 +15,7 @@
 const ASPECT = 1.6 // width of a view over its height
 const MARGIN = 0.9 // of the view is the motion's
 const AROUND = 0.3 // of the motion's size: so far around it, what stands still belongs to the picture
-const FARTHEST = 3.5 // distances of the first run's camera
+const FARTHEST = 5 // distances of the first run's camera
 const GAP = 0.04 // of the motion's size: between it and the floor
 const LEVEL = 0.999
 const SHOWN_GROUPS = 3
@@ -50,8 +50,9 @@ export class Framing {
     this.still = shown.filter((i) => !moves(i) && model.geom_type[i] > this.kinds.HFIELD)
     const { gravity } = model.opt
     this.falls = gravity[2] < 0 && Math.hypot(gravity[0], gravity[1]) < -gravity[2]
-    const level = shown.filter((i) => model.geom_type[i] === this.kinds.PLANE && data.geom_xmat[9 * i + 8] > LEVEL)
-    this.planes = level.map((i) => data.geom_xpos[3 * i + 2])
+    const planes = shown.filter((i) => model.geom_type[i] === this.kinds.PLANE)
+    this.tilted = planes.some((i) => data.geom_xmat[9 * i + 8] < LEVEL)
+    this.planes = planes.map((i) => data.geom_xpos[3 * i + 2])
     this.runs = []
     this.around = []
   }
@@ -137,10 +138,10 @@ export class Framing {
     return { distance: middle - depth, target: this.world([(right - left) / 2, (top - bottom) / 2, middle]) }
   }
 
-  /** The height of the floor: that of a level plane of the model, else under everything; null where nothing falls. */
+  /** The height of the floor: that of a level plane of the model, else under everything; null where nothing falls, or on a slope. */
   floor() {
     const { moments } = this
-    if (!this.falls || moments.length === 0) return null
+    if (!this.falls || this.tilted || moments.length === 0) return null
     if (this.planes.length > 0) return Math.max(...this.planes)
     const reach = furthest(moments)
     const size = sizeOf(reach)

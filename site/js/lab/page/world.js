@@ -135,7 +135,7 @@ export class World {
     const solid = new Solid(this.scene, this.materials, { type, geometry, model: false, extent: this.description.extent })
     for (const mesh of solid.meshes) mesh.castShadow = mesh.receiveShadow = false
     // A box of inertia may lie in the faces of a geom: what is added is seen before what it is added to.
-    Object.assign(solid.material, { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1 })
+    Object.assign(solid.material, { polygonOffset: true, polygonOffsetFactor: -0.1, polygonOffsetUnits: -4 })
     return solid
   }
 
