@@ -208,8 +208,7 @@ def test_two_fingers_zoom_and_move(phone: Phone, sideways: bool) -> None:
 
 def test_finger_that_rests_on_a_body_pulls_it(phone: Phone) -> None:
     page, fingers, _ = phone
-    page.locator("#tried input[type=range]").fill("0")  # no gravity
-    page.locator("#tried .lab-play").tap()
+    page.locator("#tried input[type=range]").fill("0")  # no gravity; it begins to move
     until(page, "() => window.made.state === 'playing'")
     page.evaluate(RESTS, 10)
     x, y = middle(page)
@@ -233,9 +232,9 @@ def test_finger_that_rests_where_nothing_is_turns_as_ever(phone: Phone) -> None:
     page, fingers, _ = phone
     x, y = middle(page)
     before = camera(page)
-    fingers.down((x - 150, y + 130))
+    fingers.down((x - 150, y + 100))
     until(page, "() => made.hands.pointers.size === 1 && made.hands.resting === null")
-    fingers.move((x - 50, y + 130))
+    fingers.move((x - 50, y + 100))
     fingers.up()
     turned(page, before, azimuth=100)
     assert page.evaluate("() => window.made.view.frame[3]") == 0
@@ -256,7 +255,6 @@ def test_buttons_sliders_and_lists_by_touch(phone: Phone) -> None:
     comes(page, lambda: abs(float(slider.input_value()) - 18) <= 1.2)
     page.locator("#tried .lab-buttons button").tap()
     until(page, "() => window.made.values[0] > 16")
-    page.locator("#tried .lab-play").tap()
     until(page, "() => window.made.state === 'playing'")
     page.locator("#tried .lab-play").tap()
     until(page, "() => window.made.state === 'paused'")
