@@ -118,7 +118,7 @@ def horizons(integrator: Integrator, timestep: float = 1e-3) -> list[float]:
     """When the error of the angles first passes 0.1 rad, s, for each member of the ensemble."""
     model, found = compiled(MJCF, integrator, timestep), []
     for member in _ensemble():
-        scenario = Scenario(14.0, 0.05, (member.upper, member.lower))
+        scenario = Scenario(20.0, 0.05, (member.upper, member.lower))
         run = simulate(replace(problem(), scenario=scenario), model).states
         truth = reference_motion(replace(REFERENCE, solution=member), tuple(run.times.tolist()))
         error = np.linalg.norm(run.qpos - truth.position, axis=1)
