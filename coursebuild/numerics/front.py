@@ -23,29 +23,29 @@ COST_SLACK, ERROR_SLACK = 0.03, 0.05
 Rows: TypeAlias = Sequence[WorkPrecisionRow]
 
 
-class Place(Struct, frozen=True):
+class FrontPoint(Struct, frozen=True):
     """Where a setting is in the plot."""
 
     cost: Interval
     error: float
 
-    def beats(self, other: Place) -> bool:
+    def beats(self, other: FrontPoint) -> bool:
         """Whether one is clearly better in one respect, and no worse in the other."""
         exacter = self.error * (1 + ERROR_SLACK) < other.error
         no_worse = self.error <= other.error * (1 + ERROR_SLACK)
         return (self.cheaper(other) and no_worse) or (exacter and not other.cheaper(self))
 
-    def cheaper(self, other: Place) -> bool:
+    def cheaper(self, other: FrontPoint) -> bool:
         """Whether it costs less, beyond what can be told."""
         apart = self.cost.high < other.cost.low
         return apart and self.cost.value * (1 + COST_SLACK) < other.cost.value
 
 
-def _place(row: WorkPrecisionRow) -> Place | None:
+def _place(row: WorkPrecisionRow) -> FrontPoint | None:
     """What a setting costs, and its error; `None` where it was lost, or not timed."""
     if row.cost is None or row.seen is None:
         return None
-    return Place(row.cost, row.seen if row.figure is None else row.figure[0])
+    return FrontPoint(row.cost, row.seen if row.figure is None else row.figure[0])
 
 
 def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:

@@ -189,7 +189,7 @@ def _judged(
         converged,
         *ends,
         (halved or "").strip(),
-        shown(number, repeat if converged is None else min(repeat, converged)),
+        rounded_text(number, repeat if converged is None else min(repeat, converged)),
         compared,
     )
 
@@ -197,7 +197,7 @@ def _judged(
 def _unconverged(span: Span, number: Number, halved: str) -> Doubt:
     """A number that only half the timestep changes."""
     digits, converged, text = _digits(number), _converged(number, halved), number.text
-    instead = shown(number, converged)
+    instead = rounded_text(number, converged)
     return Doubt(
         span, text, digits, digits, converged, text, text, halved.strip(), instead, compared=False
     )
@@ -212,7 +212,7 @@ def _converged(number: Number, halved: str) -> int:
     return _holding(number, 2 * change) if change else _digits(number)
 
 
-def shown(number: Number, digits: int) -> str:
+def rounded_text(number: Number, digits: int) -> str:
     """A number with so many digits; empty for a count, which is not rounded."""
     return "" if number.integer else rounded(number, digits)
 
@@ -347,7 +347,7 @@ def _doubt(doubt: Doubt) -> str:
         return f"no digit repeats: {between}"
     repeat = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
     number = _number(doubt.printed)
-    instead = "" if number is None else shown(number, doubt.repeat)
+    instead = "" if number is None else rounded_text(number, doubt.repeat)
     return f"{repeat}{f', print {instead}' if instead else ''}: {between}"
 
 

@@ -1,7 +1,7 @@
 """What differs between two compiled models, and between their states: all by which code could tell.
 
-Entry points: `Difference`, `difference(whole, changed)`, `state_difference`; `VIEWS`, the words by
-which code asks a model for one thing.
+Entry points: `ModelDifference`, `difference(whole, changed)`, `state_difference`; `VIEWS`, the
+words by which code asks a model for one thing.
 
 The fields are those that MuJoCo's structures have, whatever their names.
 """
@@ -31,7 +31,7 @@ _LISTS = re.compile(r"n?names(_map)?|n?paths|nbuffer|narena|name_\w+adr|n?bvh.*"
 """What lists the names, paths and boxes of all things, and says how much memory there is."""
 
 
-class Difference(Struct, frozen=True):
+class ModelDifference(Struct, frozen=True):
     """By what code could tell two models apart."""
 
     fields: frozenset[str] = frozenset()
@@ -39,8 +39,8 @@ class Difference(Struct, frozen=True):
     parts: frozenset[tuple[str, str]] = frozenset()
     """Of views on things that are in both, by their kind: `("Sensor", "adr")`."""
 
-    def __or__(self, other: Difference) -> Difference:
-        return Difference(self.fields | other.fields, self.parts | other.parts)
+    def __or__(self, other: ModelDifference) -> ModelDifference:
+        return ModelDifference(self.fields | other.fields, self.parts | other.parts)
 
     def beyond(self, kinds: frozenset[str]) -> frozenset[str]:
         """Fields that are neither those of these kinds nor lists nor references by number."""
@@ -64,14 +64,14 @@ def _prefixes() -> tuple[tuple[str, str, str], ...]:
     return tuple(one for one in found if hasattr(mujoco.MjModel, one[1]))
 
 
-def difference(whole: Any, changed: Any) -> Difference:
+def difference(whole: Any, changed: Any) -> ModelDifference:
     """What differs between two models."""
-    return Difference(_fields(whole, changed), frozenset(_parts(whole, changed)))
+    return ModelDifference(_fields(whole, changed), frozenset(_parts(whole, changed)))
 
 
-def state_difference(data: Any, other: Any) -> Difference:
+def state_difference(data: Any, other: Any) -> ModelDifference:
     """What differs between states of two models."""
-    return Difference(_fields(data, other))
+    return ModelDifference(_fields(data, other))
 
 
 def _fields(one: Any, other: Any) -> frozenset[str]:

@@ -22,7 +22,7 @@ from collections.abc import Collection, Sequence
 import mujoco
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.differences import VIEWS, Difference
+from coursebuild.numerics.pruning.differences import VIEWS, ModelDifference
 
 _LEAVE_MODELS_ALONE = frozenset(
     "__future__ bisect collections colorsys copy csv dataclasses datetime decimal enum fractions"
@@ -66,7 +66,9 @@ class Reader(Struct, frozen=True):
     opaque: str = ""
     """Why it may use everything; empty where it does not."""
 
-    def notices(self, names: Collection[str], kinds: Collection[str], change: Difference) -> bool:
+    def notices(
+        self, names: Collection[str], kinds: Collection[str], change: ModelDifference
+    ) -> bool:
         """Whether it may notice that things of these names and kinds are gone."""
         parts = {part for _, part in change.parts}
         return bool(
@@ -96,7 +98,7 @@ class Readers(Struct, frozen=True):
     files: tuple[Reader, ...] = ()
 
     def noticing(
-        self, names: Collection[str], kinds: Collection[str], change: Difference
+        self, names: Collection[str], kinds: Collection[str], change: ModelDifference
     ) -> Reader | None:
         """The first who may notice that things are gone."""
         return next((one for one in self.files if one.notices(names, kinds, change)), None)

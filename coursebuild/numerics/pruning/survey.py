@@ -33,13 +33,13 @@ from coursebuild.numerics.pruning.candidates import (
     unread,
 )
 from coursebuild.numerics.pruning.compare import TOLERANCE, MotionComparison, Seen, watch
-from coursebuild.numerics.pruning.differences import Difference, difference
+from coursebuild.numerics.pruning.differences import ModelDifference, difference
 from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
 from coursebuild.numerics.pruning.readers import Readers
-from coursebuild.numerics.pruning.trials import Trial, Trials, largest
+from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest
 from coursebuild.numerics.reports.diet import (
     PROVED,
     SAME,
@@ -128,7 +128,7 @@ class _Surveyor:
     def __init__(self, order: Order, seen: tuple[Seen, ...], good: tuple[Seen, ...]) -> None:
         self.order = order
         self.seen, self.good = seen, good
-        self.trials = Trials(
+        self.trials = PruningTrials(
             order.text, [one.scene for one in good], order.clock, quick=order.quick
         )
         self.tried: list[Tried] = []
@@ -188,7 +188,9 @@ class _Surveyor:
 
     def _unread(self, item: Item) -> bool:
         names = {item.name} | {one.get("class") or "" for e in item.gone for one in e.walk()}
-        return self.order.readers.noticing(names - {""}, {item.view} - {""}, Difference()) is None
+        return (
+            self.order.readers.noticing(names - {""}, {item.view} - {""}, ModelDifference()) is None
+        )
 
     def _holds(self, items: Sequence[Item]) -> bool:
         """Whether nothing but these would be missing, in any state."""
@@ -279,7 +281,7 @@ class _Surveyor:
 
     def _found(self, items: Sequence[Item], reason: str, label: str, apart: float) -> _Found:
         kind, trial = items[0].kind, self.trials.without(items)
-        change, edits = Difference(), self.trials.edits(items)
+        change, edits = ModelDifference(), self.trials.edits(items)
         saving = Saving(None, None, False, 0, self.trials.bytes_of(edits))
         if trial is not None:  # not where it goes only with what uses it
             timed = not kind.startswith("unused-") or kind == "unused-site"
@@ -335,7 +337,7 @@ class _Surveyor:
 
     # --- all together
 
-    def _without(self, found: Sequence[_Found]) -> Trial | None:
+    def _without(self, found: Sequence[_Found]) -> PrunedModel | None:
         return self.trials.without([item for one in found for item in one.items])
 
     def _says_otherwise(self, found: Sequence[_Found]) -> str:

@@ -1,6 +1,6 @@
 """A model without some things: compiled, compared with the whole one, run and timed beside it.
 
-Entry points: `Trials`, which makes a `Trial`; `largest(items, holds)`.
+Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest(items, holds)`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from msgspec import Struct
 from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
 from coursebuild.numerics.pruning.candidates import Item
 from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
-from coursebuild.numerics.pruning.differences import Difference, state_difference
+from coursebuild.numerics.pruning.differences import ModelDifference, state_difference
 from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove
 from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
 from coursebuild.numerics.pruning.markup import Element
@@ -55,7 +55,7 @@ def largest(items: Sequence[_T], holds: Callable[[list[_T]], bool]) -> list[_T]:
     return found
 
 
-class Trial(Struct, frozen=True, eq=False):
+class PrunedModel(Struct, frozen=True, eq=False):
     """A model without some things."""
 
     edits: tuple[ModelEdit, ...]
@@ -63,7 +63,7 @@ class Trial(Struct, frozen=True, eq=False):
     index: IndexMap
 
 
-class Trials:
+class PruningTrials:
     """Tries a model without things."""
 
     def __init__(
@@ -74,7 +74,7 @@ class Trials:
         self.clock = clock
         self.quick = quick
 
-    def without(self, items: Iterable[Item]) -> Trial | None:
+    def without(self, items: Iterable[Item]) -> PrunedModel | None:
         """The model without these; `None` where that is no model, or not the one it should be."""
         text = self.text
         try:
@@ -83,7 +83,7 @@ class Trials:
         except ValueError:
             return None
         without_reset(model)
-        return Trial(edits, model, index) if fits(index, text.model, model) else None
+        return PrunedModel(edits, model, index) if fits(index, text.model, model) else None
 
     def edits(self, items: Iterable[Item]) -> tuple[ModelEdit, ...]:
         """The changes that take these out."""
@@ -95,16 +95,16 @@ class Trials:
         files = self.text.files(edits)
         return sum(before[path] - len(data) for path, data in files.items())
 
-    def compare(self, trial: Trial) -> MotionComparison | None:
+    def compare(self, trial: PrunedModel) -> MotionComparison | None:
         """How it does in all scenarios; `None` where that cannot be told."""
         try:
             return compare(self.text.model, trial.model, trial.index, self.scenes)
         except (ValueError, mujoco.FatalError):
             return None
 
-    def state_difference(self, trial: Trial) -> Difference:
+    def state_difference(self, trial: PrunedModel) -> ModelDifference:
         """By what code could tell both apart in some states of the whole model."""
-        whole, found = self.text.model, Difference()
+        whole, found = self.text.model, ModelDifference()
         for state in self._states:
             data, other = mujoco.MjData(whole), mujoco.MjData(trial.model)
             mujoco.mj_setState(whole, data, state, STATE)
@@ -127,7 +127,7 @@ class Trials:
             found.append(full_state(model, data))
         return found
 
-    def saving(self, trial: Trial, *, timed: bool = True) -> Saving:
+    def saving(self, trial: PrunedModel, *, timed: bool = True) -> Saving:
         """What a change saves, in time and bytes."""
         text = self.bytes_of(trial.edits)
         memory = len(saved(self.text.model)) - len(saved(trial.model))
@@ -137,7 +137,7 @@ class Trials:
         ratio = timing.ratio
         return Saving(ratio.value, ratio.half_width / 2, timing.certain, memory, text)
 
-    def _timing(self, trial: Trial) -> Timing | None:
+    def _timing(self, trial: PrunedModel) -> Timing | None:
         """Time of the whole model over that of this one, in whole scenarios."""
         if self.clock is None:
             return None
