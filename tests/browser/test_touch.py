@@ -164,9 +164,9 @@ def test_tap_gives_the_picture_every_gesture(phone: Phone) -> None:
     comes(page, lambda: focused(page))
     before, scroll = camera(page), scrolled(page)
     fingers.down((x, y - 40))
-    fingers.move((x, y + 80), steps=12)
+    fingers.move((x, y + 40), steps=12)
     fingers.up()
-    turned(page, before, elevation=120)
+    turned(page, before, elevation=80)
     assert scrolled(page) == scroll
 
     def left() -> bool:
@@ -210,6 +210,7 @@ def test_finger_that_rests_on_a_body_pulls_it(phone: Phone) -> None:
     page, fingers, _ = phone
     page.locator("#tried input[type=range]").fill("0")  # no gravity; it begins to move
     until(page, "() => window.made.state === 'playing'")
+    page.evaluate("() => window.made.view.element.scrollIntoView({ block: 'center' })")
     page.evaluate(RESTS, 10)
     x, y = middle(page)
     scale = HEIGHT / (2 * 2.5 * math.tan(math.pi / 8))
