@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.drawing.marks import Box, apart, clear_place, markup_text
+from coursebuild.core.drawing.marks import apart, markup_text
 from coursebuild.core.drawing.scales import decades, log_ticks, number_text, power_text
 
 
@@ -62,14 +62,3 @@ def test_labels_keep_apart(wanted: list[float], gap: float) -> None:
     places = apart(sorted(wanted), gap, 0, 100)
     assert all(b - a >= gap - 1e-9 for a, b in pairwise(places))
     assert all(place <= 100 + 1e-9 for place in places)
-
-
-def test_a_label_goes_where_it_hides_nothing() -> None:
-    inside = Box(0, 0, 200, 100)
-    box, hidden = clear_place((20, 50), (60, 15), inside, [Box(0, 0, 200, 45)])
-    assert hidden == 0
-    assert box.top >= 45
-    everywhere = [Box(0, 0, 200, 100)]
-    box, hidden = clear_place((195, 50), (60, 15), inside, everywhere)
-    assert hidden > 0
-    assert box.right <= 200

@@ -30,7 +30,7 @@ def test_measuring_does_not_disturb_the_run() -> None:
     model = compiled(problem.mjcf, Integrator.EULER, 1e-3)
     data = mujoco.MjData(model)
     data.qpos[:] = problem.scenario.qpos
-    mujoco.mj_step(model, data, 1000)
+    mujoco.mj_step(model, data, round(problem.scenario.duration / 1e-3))
     assert np.array_equal(run.states.qpos[-1], data.qpos)
     assert np.array_equal(run.states.qvel[-1], data.qvel)
 

@@ -86,8 +86,9 @@ def test_timings_that_cannot_be_read_or_written_are_told(tmp_path: Path) -> None
         read_timings(str(tmp_path / "none.json"))
     said = f"--timings: {tmp_path}/none.json cannot be read: no such file or directory"
     assert str(caught.value) == said
+    (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match=r"^--write-timings: "):
-        write_timings(str(tmp_path / "no folder/times.json"), {"a": 1.0}, ["a"])
+        write_timings(str(tmp_path / "file/times.json"), {"a": 1.0}, ["a"])
 
 
 def test_times_are_written_sorted_and_merged(tmp_path: Path) -> None:

@@ -251,11 +251,11 @@ class TrialLine(Struct, frozen=True):
     """How many things were tried."""
     parity: str = ""
     """How it compares with native MuJoCo, in words; empty where it was not compared."""
-    fill: float | None = None
-    """The part of its picture that what moves fills, in the mean; `None` where nothing does."""
     cached: bool = False
     unexported: str = ""
     """Why its page offers no Python script, in words."""
+    fill: float | None = None
+    """The part of its picture that what moves fills, in the mean; `None` where nothing does."""
 
 
 class TrialResult(Struct, frozen=True):

@@ -18,9 +18,9 @@ def findings(fence: str, files: tuple[str, ...] = OWN) -> list[str]:
 
 
 def test_a_course_has_the_kinds_of_its_own_scripts_beside_the_built_in_one() -> None:
-    assert lab_kinds(make_course()) == {"simlab"}
+    assert lab_kinds(make_course()) == {"mjcf", "simlab"}
     files = (*OWN, "content/labs/x.js", "content/other.js", "content/labs/.js.txt")
-    assert lab_kinds(make_course(files=files)) == {"simlab", "pendulum", "x"}
+    assert lab_kinds(make_course(files=files)) == {"mjcf", "simlab", "pendulum", "x"}
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_a_lab_of_a_known_kind_with_a_known_model_is_good(fence: str) -> None:
         (" pendulm\n{}", "lab-kind: pendulm; no kind of lab is called `pendulm`"
          " [did you mean `pendulum`?]"),
         (" hidden\n{}", "lab-kind: hidden; no kind of lab is called `hidden`"
-         " [known: `pendulum`, `simlab`]"),
+         " [known: `mjcf`, `pendulum`, `simlab`]"),
         (' simlab\n{"model": "bix"}', 'lab-model: "bix"; no model `bix` in models/'
          " [did you mean `box`?]"),
     ],
