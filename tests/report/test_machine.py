@@ -87,6 +87,7 @@ def test_json_has_diagnostics_scripts_labs_and_a_summary() -> None:
         "parity": "bit-identical",
         "cached": True,
         "no_python_export": "",
+        "fill": None,
     }
     assert value["summary"]["ok"] is False
     assert value["summary"]["errors"] == 1
