@@ -83,7 +83,8 @@ def words(inlines: Iterable[Inline]) -> Iterator[str]:
 
 def texts(document: Document) -> Iterator[str]:
     """Every piece of text that a reader has to find."""
-    yield from words(document_inlines(document))
+    # The label of a paragraph `Figure:` says what it is, and is not shown.
+    yield from (text for text in words(document_inlines(document)) if text != "Figure: ")
     for block in document_blocks(document):
         if isinstance(block, Script | CodeBlock | Mjcf | PlainCode):
             yield from block.code.text.splitlines()
