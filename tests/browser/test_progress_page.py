@@ -167,7 +167,7 @@ def test_pages_without_a_script_say_so_and_are_complete(
         page.goto(site + "progress/")
         said = page.locator("noscript")
         expect(said).to_contain_text("Progress is kept by a script", use_inner_text=True)
-        page.locator("summary").first.click()
+        page.locator("main summary").first.click()
         expect(page.get_by_role("link", name="Push & <em>pull</em>")).to_be_visible()
         page.goto(site + "review/")
         expect(said).to_contain_text("scripts are switched off here", use_inner_text=True)
