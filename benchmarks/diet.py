@@ -13,8 +13,8 @@ import argparse
 import tempfile
 from pathlib import Path
 
+from coursebuild.features.bench.commands.diet.run import diet
 from coursebuild.numerics.reports.diet import DietReport
-from coursebuild.pipeline.diet import diet
 from coursebuild.pipeline.options import Options
 
 MAP = """[course]

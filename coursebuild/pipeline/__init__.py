@@ -1,6 +1,6 @@
 """The commands: the stages joined.
 
-Entry points: `check`, `build`, `update`, `extract`, `explain`, `serve`, `stability`. Each takes the
+Entry points: `check`, `build`, `update`, `extract`, `explain`, `serve`. Each takes the
 course's root and options, tells a `Progress` what it does, and gives what it found, most of them as
 a `Report`.
 

@@ -1,6 +1,6 @@
 """The recorded reports of a course that still fit it, and what is wrong with the others.
 
-Entry point: `shown_reports(root, course)`. Nothing is measured here.
+Entry points: `shown_reports(root, course)`; `read_record`, one of them. Nothing is measured here.
 
 A report fits if it is of the model as it is now, with its files and scenarios, and of the version
 of MuJoCo that is installed. Any other is left out of the site, and told.
@@ -13,6 +13,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course, MjcfModel
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
@@ -23,7 +25,7 @@ if TYPE_CHECKING:  # a course without reports needs none of it
     from coursebuild.numerics.reports.bench import SceneReport
     from coursebuild.numerics.reports.cases import CaseReport
     from coursebuild.numerics.reports.diet import DietReport
-    from coursebuild.numerics.reports.records import ReportKind
+    from coursebuild.numerics.reports.records import ReportFailure, ReportKind
 
     _Scene = TypeVar("_Scene", SceneReport, DietReport)
 
@@ -94,9 +96,8 @@ class _Reader:
 
     def _decoded(self, kind: ReportKind[_T], model: str = "") -> _T | None:
         from coursebuild.numerics.reports.records import ReportFailure
-        from coursebuild.pipeline.reports import read_record
 
-        found = read_record(self._root, kind, model, _decode)
+        found = read_record(self._root, kind, model)
         if isinstance(found, ReportFailure):
             self._tell(kind.path(model), found.message, found.help)
             return None
@@ -116,6 +117,22 @@ class _Reader:
     def _tell(self, path: str, message: str, help: str) -> None:
         place = Source(path, "").span(0, 0)
         self._found.append(diagnose("report-stale", place, message, help=help))
+
+
+def read_record(root: Path, kind: ReportKind[_T], model: str = "") -> _T | ReportFailure:
+    """The recorded report on a model (or on the hard cases), or why there is none."""
+    from coursebuild.numerics.reports.records import RecordError, ReportFailure
+
+    path, make = kind.path(model), kind.command(model)
+    if not (root / path).exists() and not (root / path).is_symlink():
+        return ReportFailure(f"{path} is not there", f"make it with `{make}`, and commit it")
+    try:
+        report: _T = _decode(kind, read_bytes(root, path), model)
+    except EffectError as error:
+        return ReportFailure(error.message, error.help)
+    except RecordError as error:
+        return ReportFailure(f"{path} {error.message}", f"make it again with `{make}`")
+    return report
 
 
 @functools.lru_cache(maxsize=32)

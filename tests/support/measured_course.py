@@ -8,10 +8,10 @@ from typing import Any
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.features.bench.commands.bench.measuring import CompiledScene
+from coursebuild.features.bench.commands.runs import CannotError
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
-from coursebuild.pipeline.measuring import CompiledScene
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene
 from support.bench_reports import swing
 

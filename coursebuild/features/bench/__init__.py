@@ -1,8 +1,8 @@
-"""Recorded reports: what was measured of models, on their pages and in texts.
+"""What is measured on models, and the recorded reports of it on their pages and in texts.
 
 `measured` is the part of a model's page, of `scenarios` and of what the model can be without. A
 `bench` fence in a text names a model (`parse`): `checks` compares it with the course, `page` shows
-a scenario as the page of the model does.
+a scenario as the page of the model does. `commands` measures and records.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ KIND = FenceKind(
 )
 FEATURE = Feature(
     name="bench",
+    needs=("lab",),
     fences=(KIND,),
     model_part=ModelPart(facts=measured_facts, values=measured_view, draw=draw_measured),
     check=check_benches,

@@ -1,5 +1,8 @@
 """The commands that measure: `bench`, `diet`, and what `stability` shares with them.
 
+`runs` measures one thing after the other and records what was found, a `Measurement`
+(`measurement`).
+
 Entry points: `add_recorded`, what is done with reports in the course's folder; `measured`, which
 runs; `write_measured`, which prints what was found.
 """
@@ -13,8 +16,12 @@ from typing import Any
 
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, WRONG, style_of, write
+from coursebuild.features.bench.commands.measurement import (
+    Measurement,
+    measured_json,
+    measured_text,
+)
 from coursebuild.pipeline.options import Options
-from coursebuild.report.measuring import Measurement, measured_json, measured_text
 from coursebuild.report.terminal import Style
 
 

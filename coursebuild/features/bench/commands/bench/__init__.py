@@ -9,11 +9,11 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.features.bench.commands import add_recorded, measured, write_measured
-from coursebuild.pipeline import bench
+from coursebuild.features.bench.commands.bench.run import bench, check, plot_file, write_plots
+from coursebuild.features.bench.commands.bench.text import bench_text
+from coursebuild.features.bench.commands.bench.values import bench_values
+from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.pipeline.options import Options
-from coursebuild.report.bench import bench_text
-from coursebuild.report.bench_json import bench_values
-from coursebuild.report.measuring import Measurement
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -37,17 +37,17 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, or measure again, and draw."""
-    plot = None if arguments.plot is None else bench.plot_file(arguments.plot)
+    plot = None if arguments.plot is None else plot_file(arguments.plot)
     names, quick = tuple(arguments.scenes), arguments.quick
 
     def measure(options: Options) -> Measurement[Any]:
         if arguments.check:
-            found = bench.check(options, names, quick=quick)
+            found = check(options, names, quick=quick)
         else:
-            found = bench.bench(options, names, quick=quick, record=arguments.record)
+            found = bench(options, names, quick=quick, record=arguments.record)
         if plot is None:
             return found
-        return replace(found, remarks=(*found.remarks, *bench.write_plots(plot, found.reports)))
+        return replace(found, remarks=(*found.remarks, *write_plots(plot, found.reports)))
 
     found = measured(arguments, measure)
     shown = () if arguments.check else found.reports

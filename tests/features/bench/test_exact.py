@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.features.bench.commands.bench.measuring import measured, scenarios_of
+from coursebuild.features.bench.commands.runs import CannotError
 from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.pipeline.measuring import measured, scenarios_of
-from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import write
 

@@ -22,12 +22,13 @@ from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine, one_processor
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
+from coursebuild.features.bench.commands.measurement import Measurement
+from coursebuild.features.bench.commands.runs import MeasuringRun, machine_parts, with_records
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.departures import Checked, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.reports import MeasuringRun, machine_parts, read_record, with_records
-from coursebuild.report.measuring import Measurement
+from coursebuild.pipeline.shown_reports import read_record
 
 _CODE = ("coursebuild/numerics", "mjcourse/spatial")
 """What measures and says what was measured."""

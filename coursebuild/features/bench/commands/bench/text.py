@@ -13,6 +13,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coursebuild.core.model.results import Machine
+from coursebuild.features.bench.commands.bench.columns import BETTER, FRONT, OWN, VISIBLE, columns
+from coursebuild.features.bench.commands.stable import (
+    STABLE,
+    stable_again,
+    stable_cells,
+    stable_meaning,
+)
 from coursebuild.numerics.reports.bench import (
     FittedOrder,
     MeasuredSetting,
@@ -30,8 +37,6 @@ from coursebuild.numerics.reports.points import (
     usual_setting,
 )
 from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, cell, shown_figures
-from coursebuild.report.bench_columns import BETTER, FRONT, OWN, VISIBLE, columns
-from coursebuild.report.stable import STABLE, stable_again, stable_cells, stable_meaning
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,

@@ -25,6 +25,8 @@ from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source, Span
+from coursebuild.features.bench.commands.diet.readers import readers_of
+from coursebuild.features.bench.commands.runs import CannotError
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelText, ModelTextError, open_model, saved
@@ -32,8 +34,6 @@ from coursebuild.numerics.pruning.readers import Reader, Readers
 from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
 from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
 from coursebuild.numerics.scene import SceneError
-from coursebuild.pipeline.diet_readers import readers_of
-from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
 _TEXT = ".coursebuild-text.xml"

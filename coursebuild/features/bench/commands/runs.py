@@ -1,7 +1,6 @@
 """What `bench`, `stability` and `diet` find, and reports of it in the course's folder.
 
-Entry points: `MeasuringRun`, which gives a `Measurement`; `CannotError`; `read_record`,
-`with_records`.
+Entry points: `MeasuringRun`, which gives a `Measurement`; `CannotError`; `with_records`.
 """
 
 from __future__ import annotations
@@ -16,14 +15,13 @@ from msgspec.structs import astuple, replace
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import resolve_inside, write_atomic
 from coursebuild.core.model.results import Machine
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
-from coursebuild.numerics.reports.records import RecordError, ReportFailure, ReportKind
+from coursebuild.features.bench.commands.measurement import Measurement
+from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
-from coursebuild.report.measuring import Measurement
 
 _T = TypeVar("_T")
 _A = TypeVar("_A")
@@ -131,24 +129,6 @@ def forbid_quick(option: str, *, quick: bool) -> None:
     """
     if quick:
         raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
-
-
-def read_record(
-    root: Path,
-    kind: ReportKind[_T],
-    model: str = "",
-    decode: Callable[[ReportKind[_T], bytes, str], _T] = ReportKind.decode,
-) -> _T | ReportFailure:
-    """The recorded report on a model (or on the hard cases), or why there is none."""
-    path, make = kind.path(model), kind.command(model)
-    if not (root / path).exists() and not (root / path).is_symlink():
-        return ReportFailure(f"{path} is not there", f"make it with `{make}`, and commit it")
-    try:
-        return decode(kind, read_bytes(root, path), model)
-    except EffectError as error:
-        return ReportFailure(error.message, error.help)
-    except RecordError as error:
-        return ReportFailure(f"{path} {error.message}", f"make it again with `{make}`")
 
 
 def with_records(

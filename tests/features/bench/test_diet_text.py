@@ -7,6 +7,12 @@ import json
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Machine
+from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
+from coursebuild.features.bench.commands.measurement import (
+    Measurement,
+    measured_json,
+    measured_text,
+)
 from coursebuild.numerics.reports.diet import (
     PROVED,
     SAME,
@@ -21,8 +27,6 @@ from coursebuild.numerics.reports.diet import (
 )
 from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.report import Style
-from coursebuild.report.diet import diet_text, diet_values
-from coursebuild.report.measuring import Measurement, measured_json, measured_text
 
 PLACE = ModelPlace("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")

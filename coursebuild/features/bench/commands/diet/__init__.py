@@ -9,8 +9,8 @@ from msgspec.structs import replace
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.cli.output import CLEAN
 from coursebuild.features.bench.commands import measured, write_measured
-from coursebuild.pipeline.diet import diet
-from coursebuild.report.diet import diet_text, diet_values
+from coursebuild.features.bench.commands.diet.run import diet
+from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
 
 
 def declare(parser: argparse.ArgumentParser) -> None:

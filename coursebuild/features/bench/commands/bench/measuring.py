@@ -30,6 +30,7 @@ from coursebuild.core.run.machine import one_processor
 from coursebuild.core.run.runner import run_scripts
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
+from coursebuild.features.bench.commands.runs import CannotError
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.problem import Array, Scenario
@@ -40,7 +41,6 @@ from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.sweep import measure_sweep
-from coursebuild.pipeline.reports import CannotError
 from coursebuild.pipeline.scenes import CourseScene, exact_path
 
 _SECONDS = 20.0
@@ -180,10 +180,8 @@ def with_card(
 
 def _in_browser(root: Path, scene: CourseScene, scenario: Scenario, seconds: float) -> float | None:
     """Simulated time over the time that it takes in a browser; `None` where that is not known."""
-    try:
-        from coursebuild.features.lab.engines.speed import real_time_factor
-    except ImportError:
-        return None  # installed without labs
+    from coursebuild.features.lab.engines.speed import real_time_factor
+
     key = None if scenario.keyframe < 0 else scenario.keyframe
     run = scenario.duration, scene.facts.timestep
     return real_time_factor(root, scene.model.source, key, run, seconds)

@@ -14,20 +14,20 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import RowVerdict, SceneReport, WorkPrecisionRow
-from coursebuild.numerics.reports.departures import Checked, Departure
-from coursebuild.numerics.reports.records import ReportFailure
-from coursebuild.report import Style
-from coursebuild.report.bench import bench_text
-from coursebuild.report.bench_json import bench_values
-from coursebuild.report.measuring import (
+from coursebuild.features.bench.commands.bench.text import bench_text
+from coursebuild.features.bench.commands.bench.values import bench_values
+from coursebuild.features.bench.commands.measurement import (
     Measurement,
     checked_text,
     failure_text,
     measured_json,
     measured_text,
 )
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import RowVerdict, SceneReport, WorkPrecisionRow
+from coursebuild.numerics.reports.departures import Checked, Departure
+from coursebuild.numerics.reports.records import ReportFailure
+from coursebuild.report import Style
 from coursebuild.report.terminal import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene, swing
 

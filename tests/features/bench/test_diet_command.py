@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from coursebuild.cli import main
+from coursebuild.features.bench.commands.diet import model as diet_model
 from coursebuild.numerics.reports.records import DIET, RecordError
-from coursebuild.pipeline import diet_model
+from support.scratch_course import ROOT
 
 pytestmark = pytest.mark.site
 
-ROOT = Path(__file__).parents[2]
 MODEL = """<mujoco>
   <worldbody>
     <body name="bob" pos="0 0 1"><joint axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>

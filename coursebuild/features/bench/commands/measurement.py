@@ -12,6 +12,12 @@ from typing import Generic, TypeVar
 from msgspec import Struct
 
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.features.bench.commands.stable import (
+    STABLE,
+    stable_again,
+    stable_cells,
+    stable_meaning,
+)
 from coursebuild.numerics.reports.bench import FittedOrder
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
@@ -23,7 +29,6 @@ from coursebuild.numerics.reports.cases import (
 )
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
-from coursebuild.report.stable import STABLE, stable_again, stable_cells, stable_meaning
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.run.machine import machine
+from coursebuild.features.bench.commands.bench.measuring import with_card
 from coursebuild.numerics.reports.bench import SceneReport
-from coursebuild.pipeline.measuring import with_card
 from coursebuild.pipeline.scenes import find_scenes
 
 pytestmark = pytest.mark.site

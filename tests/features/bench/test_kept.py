@@ -13,8 +13,8 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.features.bench.commands.bench.run import bench
 from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.pipeline.bench import bench
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import find_scenes

@@ -24,28 +24,29 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_course
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.numerics.engine import silent
-from coursebuild.numerics.pruning.model_text import ModelText
-from coursebuild.numerics.pruning.survey import Rerun, Survey
-from coursebuild.numerics.reports.diet import DietReport
-from coursebuild.numerics.reports.records import DIET, ReportFailure
-from coursebuild.pipeline.diet_model import DietModel
-from coursebuild.pipeline.diet_readers import Reruns
-from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.reports import (
+from coursebuild.features.bench.commands.diet.model import DietModel
+from coursebuild.features.bench.commands.diet.readers import Reruns
+from coursebuild.features.bench.commands.measurement import Measurement
+from coursebuild.features.bench.commands.runs import (
     MeasuringRun,
     forbid_quick,
     machine_parts,
     with_records,
 )
+from coursebuild.numerics.engine import silent
+from coursebuild.numerics.pruning.model_text import ModelText
+from coursebuild.numerics.pruning.survey import Rerun, Survey
+from coursebuild.numerics.reports.diet import DietReport
+from coursebuild.numerics.reports.records import DIET, ReportFailure
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
-from coursebuild.report.measuring import Measurement
 
 _T = TypeVar("_T")
 _CODE = (
     "coursebuild/numerics",
-    *("coursebuild/pipeline/diet_model.py", "coursebuild/pipeline/diet_readers.py"),
+    "coursebuild/features/bench/commands/diet/model.py",
+    "coursebuild/features/bench/commands/diet/readers.py",
     "mjcourse/spatial",
 )
 _ROUNDS = 20

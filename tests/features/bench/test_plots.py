@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.pipeline.bench import plot_file, write_plots
+from coursebuild.features.bench.commands.bench.run import plot_file, write_plots
 from coursebuild.pipeline.options import UsageError
 from support.bench_reports import lost, scenario, scene, swing
 

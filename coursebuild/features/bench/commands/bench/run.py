@@ -24,22 +24,26 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.features.bench.commands.measurement import Measurement
+from coursebuild.features.bench.commands.runs import (
+    MeasuringRun,
+    forbid_quick,
+    machine_parts,
+    with_records,
+)
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
 from coursebuild.numerics.reports.records import BENCH, FOLDER, ReportFailure
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.reports import (
-    MeasuringRun,
-    forbid_quick,
-    machine_parts,
-    read_record,
-    with_records,
-)
 from coursebuild.pipeline.scenes import CourseScene, Scenes, find_scenes
-from coursebuild.report.measuring import Measurement
+from coursebuild.pipeline.shown_reports import read_record
 
-_CODE = ("coursebuild/numerics", "coursebuild/pipeline/measuring.py", "mjcourse/spatial")
+_CODE = (
+    "coursebuild/numerics",
+    "coursebuild/features/bench/commands/bench/measuring.py",
+    "mjcourse/spatial",
+)
 """What measures and says what was measured."""
 
 
@@ -54,7 +58,7 @@ def bench(
     """Measure the models that the names mean; all where there are none.
 
     `record`: each model's report is also written into the course. `measuring`: what measures, if
-    not the module `pipeline.measuring`.
+    not the module `measuring`.
 
     Raises:
         UsageError: no model is called so, or only a part is to be recorded.
@@ -213,7 +217,7 @@ class SceneRun(MeasuringRun):
     def measuring(self) -> Any:
         """What measures, which is heavy."""
         if self._measuring is None:
-            from coursebuild.pipeline import measuring
+            from coursebuild.features.bench.commands.bench import measuring
 
             self._measuring = measuring
         return self._measuring

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from coursebuild.features.bench.commands.measurement import stability_text
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import FittedOrder, OrderRow
 from coursebuild.numerics.reports.cases import (
@@ -15,7 +16,6 @@ from coursebuild.numerics.reports.cases import (
     StepCost,
 )
 from coursebuild.report import Style
-from coursebuild.report.measuring import stability_text
 from coursebuild.report.values import json_text
 from support.bench_reports import FIRST, MACHINE
 
