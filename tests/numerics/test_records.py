@@ -31,7 +31,7 @@ def test_what_is_written_is_read() -> None:
 
 def test_a_row_is_a_line_and_keys_are_sorted() -> None:
     lines = GOOD.decode().splitlines()
-    assert lines[:3] == ["{", ' "form": 1,', ' "holds": "coursebuild bench",']
+    assert lines[:3] == ["{", ' "form": 2,', ' "holds": "coursebuild bench",']
     assert sum('"timestep"' in line for line in lines) == len(swing().rows)
     assert GOOD.endswith(b"}\n")
 
@@ -65,15 +65,15 @@ def test_where_a_report_is() -> None:
         (b'{"holds": "coursebuild bench"}', "does not say which form it has"),
         (b'{"holds": "coursebuild bench", "form": true}', "does not say which form it has"),
         (
-            b'{"holds": "coursebuild bench", "form": 0}',
-            "was written by an older version of this tool (form 0, not 1)",
+            b'{"holds": "coursebuild bench", "form": 1}',
+            "was written by an older version of this tool (form 1, not 2)",
+        ),
+        (
+            b'{"holds": "coursebuild bench", "form": 3}',
+            "was written by a newer version of this tool (form 3, not 2)",
         ),
         (
             b'{"holds": "coursebuild bench", "form": 2}',
-            "was written by a newer version of this tool (form 2, not 1)",
-        ),
-        (
-            b'{"holds": "coursebuild bench", "form": 1}',
             "is damaged: object missing required field `scene`",
         ),
         (GOOD[:900], "is damaged: input data was truncated"),
@@ -116,11 +116,4 @@ def test_what_is_no_report(data: bytes, message: str) -> None:
 
 def test_two_cases_of_one_name() -> None:
     with pytest.raises(RecordError, match="holds two cases of one name"):
-        STABILITY.decode(
-            STABILITY.encode(
-                (
-                    CASE,
-                    CASE,
-                )
-            )
-        )
+        STABILITY.decode(STABILITY.encode((CASE, CASE)))

@@ -26,7 +26,7 @@ from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.diet import DietReport
 
 FOLDER = "content/reports"
-FORM = 1
+FORM = 2
 """Goes up when files that were written before cannot be read any more."""
 
 _T = TypeVar("_T")

@@ -99,8 +99,8 @@ class TestRecords:
             (b"{", f"{PATH} is damaged: input data was truncated"),
             (b"{}", f"{PATH} holds no report of `coursebuild bench`"),
             (
-                b'{"holds": "coursebuild bench", "form": 0}',
-                f"{PATH} was written by an older version of this tool (form 0, not 1)",
+                b'{"holds": "coursebuild bench", "form": 1}',
+                f"{PATH} was written by an older version of this tool (form 1, not 2)",
             ),
         ],
     )
