@@ -17,17 +17,6 @@ from coursebuild.features.bench.commands.diet.run import diet
 from coursebuild.numerics.reports.diet import DietReport
 from coursebuild.pipeline.options import Options
 
-MAP = """[course]
-title = "Two scenes"
-[[level]]
-id = "1"
-title = "All"
-[[level.lesson]]
-id = "1.1"
-slug = "a"
-title = "A"
-"""
-
 
 def arm(links: int = 6) -> str:
     """A chain of links under damping, each with a site and four sensors."""
@@ -71,7 +60,7 @@ def main() -> None:
         root = (arguments.out or Path(folder)).resolve()
         (root / "content").mkdir(parents=True, exist_ok=True)
         (root / "models").mkdir(exist_ok=True)
-        (root / "content" / "course.toml").write_text(MAP)
+        (root / "content" / "course.toml").write_text('[course]\ntitle = "Two scenes"\n')
         (root / "models" / "arm.xml").write_text(arm().replace("RUBBLE", ""))
         field = arm().replace("RUBBLE", rubble(arguments.pieces))
         (root / "models" / "rubble.xml").write_text(field)

@@ -109,7 +109,7 @@ def document_scripts(document: Document) -> tuple[Script, ...]:
     return tuple(block for block in document_blocks(document) if isinstance(block, Script))
 
 
-def walk_inlines(inlines: tuple[Inline, ...]) -> Iterator[Inline]:
+def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
     """Every inline in order, a container before what it holds."""
     for inline in inlines:
         yield inline

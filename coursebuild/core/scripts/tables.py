@@ -262,7 +262,7 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter] = ()) -> MappedT
 
 
 def _stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
-    for inline in inlines:
+    for inline in model.walk_inlines(inlines):
         match inline:
             case model.Text():
                 yield inline.text, inline.span
@@ -272,21 +272,13 @@ def _stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
                 yield inline.text, inline.text_span
             case model.Math():
                 yield inline.tex.text, inline.tex.span()
-            case (
-                model.Emphasis()
-                | model.Strong()
-                | model.Strikethrough()
-                | model.Link()
-                | model.Term()
-            ):
-                yield from _stretches(inline.children)
             case model.Image():
                 yield inline.alt, inline.span
             case model.SoftBreak() | model.HardBreak():
                 yield " ", inline.span
             case model.RawInline():
                 yield (" " if inline.html.startswith("<br") else ""), inline.span
-            case model.FootnoteRef():
+            case _:
                 pass
 
 

@@ -156,7 +156,7 @@ class SectionReader:
 
     def text(self, inlines: Iterable[model.Inline]) -> str:
         """The text of inlines, as the search has it."""
-        return "".join(map(self._inline, inlines))
+        return "".join(map(self._inline, model.walk_inlines(inlines)))
 
     def _inline(self, inline: model.Inline) -> str:
         match inline:
@@ -168,22 +168,12 @@ class SectionReader:
                 return self._formula(inline.tex.text)
             case model.SoftBreak() | model.HardBreak():
                 return " "
-            case (
-                model.Emphasis()
-                | model.Strong()
-                | model.Strikethrough()
-                | model.Link()
-                | model.Term()
-            ):
-                return self.text(inline.children)
             case model.Image():
                 return inline.alt
             case model.RawInline():
                 return " " if inline.html.lower().startswith("<br") else ""
-            case model.FootnoteRef():
-                return ""
             case _:
-                assert_never(inline)
+                return ""
 
 
 def _line(text: str) -> str:

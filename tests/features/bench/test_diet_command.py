@@ -12,7 +12,7 @@ import pytest
 from coursebuild.cli import main
 from coursebuild.features.bench.commands.diet import model as diet_model
 from coursebuild.numerics.reports.records import DIET, RecordError
-from support.scratch_course import ROOT
+from support.scratch_course import ROOT, course_map
 
 pytestmark = pytest.mark.site
 
@@ -24,17 +24,6 @@ MODEL = """<mujoco>
     <clock name="time"/> <!-- for the plot -->
   </sensor>
 </mujoco>
-"""
-MAP = """[course]
-title = "A course"
-[[level]]
-id = "1"
-title = "All"
-[[level.lesson]]
-id = "1.1"
-slug = "a"
-title = "A"
-status = "complete"
 """
 LESSON = """## A
 
@@ -51,7 +40,7 @@ CLEAN = MODEL.replace('    <clock name="time"/> <!-- for the plot -->\n', "").re
 @pytest.fixture
 def course(tmp_path: Path) -> Path:
     (tmp_path / "content").mkdir()
-    (tmp_path / "content" / "course.toml").write_text(MAP)
+    (tmp_path / "content" / "course.toml").write_text(course_map(1))
     (tmp_path / "models").mkdir()
     (tmp_path / "models" / "swing.xml").write_text(MODEL)
     return tmp_path
@@ -176,7 +165,7 @@ def test_sensor_that_a_lesson_reads_is_no_finding(
 ) -> None:
     lessons = course / "content" / "lessons"
     lessons.mkdir()
-    lesson = lessons / "1.1-a.md"
+    lesson = lessons / "1.1-one.md"
     lesson.write_text(LESSON.replace("SCRIPT", 'print("another model")'))
     assert run(course) == 1
     use = 'model_path("swing")\nprint(data.sensor("time").data)'
@@ -202,7 +191,7 @@ def test_what_a_script_says_otherwise_without_is_no_finding(
     lessons.mkdir()
     script = 'import mujoco\nm = mujoco.MjModel.from_xml_path(str(model_path("swing")))\nprint('
     for asked, found in (("m.nq", False), ('m.body("bob").mass', True)):
-        (lessons / "1.1-a.md").write_text(LESSON.replace("SCRIPT", f"{script}{asked})"))
+        (lessons / "1.1-one.md").write_text(LESSON.replace("SCRIPT", f"{script}{asked})"))
         main(["-C", str(course), "diet"])
         told = " ".join(capsys.readouterr().out.split())
         assert ("far-body: what the scene is about" in told) is found, asked
