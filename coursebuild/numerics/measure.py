@@ -22,11 +22,9 @@ from msgspec import Struct
 
 from coursebuild.numerics.engine import Run
 from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
-from coursebuild.numerics.reports.bench import FittedOrder, OrderRow
+from coursebuild.numerics.reports.bench import FLOORS, FittedOrder, OrderRow
 from mjcourse.spatial import angular_distance
 
-FLOORS = 10.0
-"""No error below so many floors of the reference is given."""
 _LOWEST, _HIGHEST = 100.0, 0.1
 """Where an order is fitted: over so many floors, and under so much."""
 _FEWEST = 4

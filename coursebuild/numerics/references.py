@@ -50,16 +50,11 @@ from coursebuild.numerics.integrate import (
     bulirsch_stoer,
     dop853,
 )
-from coursebuild.numerics.measure import (
-    FLOORS,
-    energy_drift,
-    energy_scale,
-    errors,
-    momentum_drift,
-)
+from coursebuild.numerics.measure import energy_drift, energy_scale, errors, momentum_drift
 from coursebuild.numerics.observe import Sticks, sticking, visible_error
 from coursebuild.numerics.pilot import Pilot, apart
 from coursebuild.numerics.problem import Array, Integrator, Motion, Setup, Sizes
+from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
 from coursebuild.numerics.settings import CONES
 

@@ -21,18 +21,11 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.numerics.engine import EngineStates, Run, motion_of, refsafe_active, simulate
-from coursebuild.numerics.measure import (
-    FLOORS,
-    Pair,
-    energy_drift,
-    errors,
-    momentum_drift,
-    raised,
-)
+from coursebuild.numerics.measure import Pair, energy_drift, errors, momentum_drift, raised
 from coursebuild.numerics.observe import quantity_name, quantity_values, slip, visible_error
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.references import Cone, Conserved, Known
-from coursebuild.numerics.reports.bench import MeasuredSetting, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import FLOORS, MeasuredSetting, WorkPrecisionRow
 from coursebuild.numerics.scene import thickness
 from coursebuild.numerics.settings import with_setting
 from coursebuild.numerics.stability import attempted

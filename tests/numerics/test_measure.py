@@ -12,14 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import floor, measure, orders
-from coursebuild.numerics.measure import (
-    FLOORS,
-    Errors,
-    Sizes,
-    errors,
-    fitted_order,
-    raised,
-)
+from coursebuild.numerics.measure import Errors, Sizes, errors, fitted_order, raised
 from coursebuild.numerics.problem import STANDARD, Integrator, Motion
 from coursebuild.numerics.problems import (
     double_pendulum,
@@ -32,6 +25,7 @@ from coursebuild.numerics.problems import (
     tops,
     tumbling_box,
 )
+from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.reports.cases import ErrorLine
 
 FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)

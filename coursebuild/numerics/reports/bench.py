@@ -9,6 +9,9 @@ from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval, Record
 from coursebuild.numerics.reports.sweep import SweepReport
 
+FLOORS = 10.0
+"""No error below so many floors of the reference is given."""
+
 
 class MeasuredSetting(Record, frozen=True):
     """What can be chosen without changing the scene."""

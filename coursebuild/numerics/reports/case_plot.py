@@ -13,9 +13,10 @@ from collections.abc import Iterator, Mapping
 from msgspec import Struct
 
 from coursebuild.core.drawing.marks import apart, markup_text
+from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.reports.cases import CaseReport, ErrorLine
 from coursebuild.numerics.reports.layout import Frame, grid, log, svg
-from coursebuild.numerics.reports.points import FLOORS, KNOWN, seconds_text, status_text
+from coursebuild.numerics.reports.points import KNOWN, seconds_text, status_text
 from coursebuild.numerics.reports.strokes import (
     FINE,
     HALO,

@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import Bands
 from coursebuild.numerics.reports.bench import (
+    FLOORS,
     OrderRow,
     ScenarioReport,
     SceneReport,
@@ -27,7 +28,7 @@ from coursebuild.numerics.reports.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.cases import CaseReport, ErrorLine, FigureLine
-from coursebuild.numerics.reports.points import FLOORS, seconds_text, setting_text, status_text
+from coursebuild.numerics.reports.points import seconds_text, setting_text, status_text
 from coursebuild.numerics.reports.sweep import SweepReport
 
 _STABLE = 0.01

@@ -19,12 +19,15 @@ from collections.abc import Sequence
 from msgspec import Struct
 
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import MeasuredSetting, ScenarioReport, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import (
+    FLOORS,
+    MeasuredSetting,
+    ScenarioReport,
+    WorkPrecisionRow,
+)
 
 KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are told, and keep their colour and mark."""
-FLOORS = 10.0
-"""No error under so many floors of the reference is given."""
 FEWEST_STEPS = 20
 """Steps of a scenario at the longest timestep of which it is tried whether it is stable."""
 

@@ -7,9 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from coursebuild.numerics.reports.bench import MeasuredSetting, ScenarioReport, WorkPrecisionRow
-from coursebuild.numerics.reports.points import (
+from coursebuild.numerics.reports.bench import (
     FLOORS,
+    MeasuredSetting,
+    ScenarioReport,
+    WorkPrecisionRow,
+)
+from coursebuild.numerics.reports.points import (
     quantities,
     seconds_text,
     solving_parts,
