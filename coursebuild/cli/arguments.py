@@ -88,7 +88,7 @@ def _commands(*, with_features: bool) -> Iterator[tuple[str, str, str]]:
 
 def options_of(arguments: argparse.Namespace) -> Options:
     """What the arguments say to every command."""
-    from coursebuild.pipeline.options import Options, find_course, open_executor, open_store
+    from coursebuild.pipeline.options import Options, find_course, open_store
 
     jobs = getattr(arguments, "jobs", None) or available_cores()
     root = find_course(arguments.root)
@@ -96,10 +96,8 @@ def options_of(arguments: argparse.Namespace) -> Options:
     if hasattr(arguments, "cache"):
         fresh = arguments.no_cache
         store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
-    where = getattr(arguments, "executor", None)
-    executor = None if where is None else open_executor(where)
     quiet, long = getattr(arguments, "quiet", False), getattr(arguments, "long", False)
-    return Options(root, jobs, quiet, store, executor, long)
+    return Options(root, jobs, quiet, store, long)
 
 
 def available_cores() -> int:

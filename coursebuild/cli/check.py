@@ -35,11 +35,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--write-timings", metavar="FILE", help="write how long each takes into this file"
     )
-    parser.add_argument(
-        "--executor",
-        metavar="PLACE",
-        help="run the scripts on a Dask cluster: dask://HOST:PORT",
-    )
     add_long(parser)
     parser.add_argument(
         "--sensitivity",
@@ -93,7 +88,6 @@ def _against(arguments: argparse.Namespace) -> int:
 
     for given, what in (
         (arguments.format not in ("text", "json"), f"--format {arguments.format}"),
-        (arguments.executor, "--executor"),
         (arguments.shard, "--shard"),
         (arguments.timings, "--timings"),
         (arguments.write_timings, "--write-timings"),

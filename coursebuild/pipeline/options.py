@@ -34,8 +34,6 @@ class Options(Struct, frozen=True):
     quiet: bool
     cache: Memo | None = None
     """What was made before; what is kept in the course's folder where nothing is said."""
-    executor: str | None = None
-    """Where scripts run, `dask://HOST:PORT`; here, where nothing is said."""
     long: bool = False
     """Whether scripts run of which the course keeps a run."""
     run_all: RunAll | None = None
@@ -103,19 +101,6 @@ def open_store(
         except EffectError as error:
             raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
     return Memo(root, shared=shared, size=limit, fresh=fresh)
-
-
-def open_executor(where: str) -> str:
-    """Where scripts run.
-
-    Raises:
-        UsageError: no scripts can run there.
-    """
-    from coursebuild.core.run.dask_runner import is_dask
-
-    if not is_dask(where):
-        raise UsageError(f"--executor: {where!r} is no place to run scripts: dask://HOST:PORT")
-    return where
 
 
 def _size(said: str, text: str) -> int:

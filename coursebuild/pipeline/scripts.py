@@ -171,13 +171,8 @@ def _run(
     memory.begin()
     with progress.stage(stage, count):
         ordered = longest_first(todo, seconds)
-        if options.executor is not None:
-            from coursebuild.core.run.dask_runner import run_on_dask
-
-            runs = run_on_dask(options.executor, options.root, ordered, on_event=note)
-        else:
-            run_all = run_all or options.run_all or run_scripts
-            runs = run_all(options.root, ordered, parallel=options.jobs, on_event=note)
+        run_all = run_all or options.run_all or run_scripts
+        runs = run_all(options.root, ordered, parallel=options.jobs, on_event=note)
     memory.close()
     return runs
 

@@ -10,7 +10,6 @@ are remembered like others.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Collection, Sequence
 
 from coursebuild.core.model import Course, Recording
@@ -80,11 +79,11 @@ def _runs(
     if not scripts:
         return found
     memory = Memory(options.root, options.store)
-    with contextlib.ExitStack() as stack:
-        run_all = None if options.executor else stack.enter_context(ScriptServer()).run
+    with ScriptServer() as server:
         for number in numbers:
             halving = number == HALVED
             stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
-            for one in run(scripts, options, progress, stage, memory, run_all, perturbation=number):
+            runs = run(scripts, options, progress, stage, memory, server.run, perturbation=number)
+            for one in runs:
                 found[one.path].append(one)
     return found

@@ -15,7 +15,6 @@ Entry point: `update(options, names, dry_run=…)`.
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import time
 from collections.abc import Collection, Mapping, Sequence
@@ -69,11 +68,9 @@ def _update(
     chosen = select(course, names, options.root)
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
-    with contextlib.ExitStack() as stack:
-        # What scripts import stays imported from one run to the other.
-        run_all = None if options.executor else stack.enter_context(ScriptServer()).run
-        first = run(scripts, options, progress, run_all=run_all)
-        again = _again(course, chosen, scripts, first, options, progress, run_all)
+    with ScriptServer() as server:  # what scripts import stays imported from one run to the other
+        first = run(scripts, options, progress, run_all=server.run)
+        again = _again(course, chosen, scripts, first, options, progress, server.run)
     edits, refused = _edits(course, chosen, first, again, _repeated(extracted))
     for told in loaded.diagnostics:
         if told.rule == "source-part" and told.span.path in (chosen.documents or [told.span.path]):
@@ -116,7 +113,7 @@ def _again(
     first: Sequence[ScriptRun],
     options: Options,
     progress: Progress,
-    run_all: RunAll | None,
+    run_all: RunAll,
 ) -> tuple[ScriptRun, ...]:
     """The second runs; a remembered first one that is recorded already stands for both."""
     edits, refused = _edits(course, chosen, first, first, frozenset())

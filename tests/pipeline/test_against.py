@@ -215,7 +215,6 @@ def test_wrong_combinations_of_arguments_give_2(make: Callable[..., Folder]) -> 
         (("--format", "sarif"), "--against cannot be combined with --format sarif"),
         (("--shard", "1/2"), "--against cannot be combined with --shard"),
         (("--write-timings", "x"), "--against cannot be combined with --write-timings"),
-        (("--executor", "dask://x:1"), "--against cannot be combined with --executor"),
         (("9.9",), "no lesson or page is called `9.9`; known: `1.1`"),
     ):
         done = against(course, *more)

@@ -94,7 +94,6 @@ WRONG_USAGE = [
     ("check --cache-size -1", "--cache-size"),
     ("check --cache gopher://x/y", "gopher"),
     ("check --cache=", "coursebuild: --cache names no place\n"),
-    ("check --executor x", "--executor: 'x' is no place to run scripts: dask://HOST:PORT"),
     ("build --out .", " is the project itself"),
     ("build --out ..", " holds the project"),
     ("build --out content/site", "content/site lies in content/ of the project"),

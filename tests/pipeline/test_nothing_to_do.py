@@ -86,7 +86,7 @@ def test_nothing_changed_counts_for_the_same_command_only(make: Make) -> None:
         assert told not in folder.main(*other).out
     for elsewhere in (["-C", str(folder.root / "content"), "check"], [], ["-C"]):
         assert told not in folder.main(*elsewhere).out
-    for wrong in (["--cache-size", "5q"], ["--cache", ""], ["--executor", "x"], ["--no-such"]):
+    for wrong in (["--cache-size", "5q"], ["--cache", ""], ["--executor", "x"]):
         assert folder.main("check", *wrong).status == 2
     # A path from another folder is another path.
     command = ("check", f"../{folder.lesson().removeprefix('content/')}")

@@ -8,7 +8,6 @@
   `notes`, and `dependencies` of that
 - `memory`: results that are kept with these (`run_record`), and found again; `model_memory` is the
   same for compiled models
-- `dask_runner` (with `dask_task`): the same on a cluster
 - `surroundings`, `packages`, `versions`: what results depend on, as it is now
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
