@@ -173,16 +173,16 @@ class _Work(Struct):
         compiled, _ = compile_models(self.course, self.options, self.progress)
         here = dict(compiled)
         models = [model for model in self.course.models if not here[model.name].error]
-        root, plain = self.options.root, [text.text for text in texts]
-        _, texts_here = mjcf.compile_all(root, (), plain)
+        root = self.options.root
+        texts_here = mjcf.compile_all(root, [(mjcf.TEXT_PATH, text.text) for text in texts])
         good = [t for t, result in zip(texts, texts_here, strict=True) if not result.error]
+        compared = [(model.source.path, model.source.text) for model in models]
+        compared += [(mjcf.TEXT_PATH, text.text) for text in good]
         with self.progress.stage(f"compiling models with MuJoCo {self.other}"):
-            there, parts = mjcf.compile_all(
-                root, models, [text.text for text in good], python=place.python
-            )
+            there = mjcf.compile_all(root, compared, python=place.python)
         places = [(model.source.path, 1) for model in models]
         places += [(text.block.span.path, text.block.span.line) for text in good]
         return tuple(
             ModelLine(path, line, mjcf.readable_error(result.error))
-            for (path, line), result in zip(places, (*there, *parts), strict=True)
+            for (path, line), result in zip(places, there, strict=True)
         )

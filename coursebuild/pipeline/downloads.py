@@ -13,7 +13,7 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import Digests
+from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
@@ -51,7 +51,7 @@ class Downloads(Struct, frozen=True):
             CachedFile(one.path, step_key("archive", one.key), one.packed)
             for one in archives.values()
         )
-        files = (*_scripts_and_models(library), *_files(library, assets, root, store), *packed)
+        files = (*_scripts_and_models(library), *_files(library, assets, root), *packed)
         return cls(files, archives, imports)
 
 
@@ -62,13 +62,12 @@ def _scripts_and_models(library: Library) -> Iterator[SiteFile]:
         yield OutputFile(urls.model_file_path(model.name), model.source.text.encode())
 
 
-def _files(library: Library, assets: Assets, root: Path, store: Memo) -> Iterator[SiteFile]:
+def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:
     """Files of the course that pages show or link to, and dark siblings of its drawings."""
-    digests = Digests(store)
     drawn = (figure for d in library.course.documents for figure in recorded_figures(d))
     dark = frozenset(figure.path for figure in drawn if figure.has_dark)
     for path in library.course.files:
-        digest = digests.file(f"{root}/{path}")
+        digest = file_state(f"{root}/{path}")
         read = functools.partial(read_bytes, root, path)
         if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
             digest = hashlib.sha256(read()).hexdigest()
@@ -76,7 +75,6 @@ def _files(library: Library, assets: Assets, root: Path, store: Memo) -> Iterato
         if path in dark:
             made = functools.partial(_dark, assets, read)
             yield CachedFile(urls.dark_path(path), step_key("dark drawing", digest), made)
-    digests.save()
 
 
 def _dark(assets: Assets, read: Callable[[], bytes]) -> bytes:

@@ -242,6 +242,6 @@ def _explained(
         reasons,
         tuple(depends),
         record.made,
-        record.seconds,
-        record.outcome.value,
+        record.kept.seconds,
+        record.kept.outcome.value,
     )

@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 
 from coursebuild.core.model import Course, Silence
 from coursebuild.core.model.results import Outcome, Results, TrialLine
+from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary
@@ -93,6 +94,7 @@ def depends_on(course: Course, results: Results) -> tuple[str, ...] | None:
         if run.trace is None or run.trace.opaque or "." in run.trace.folders:
             return None
         files |= {*run.trace.files, *run.trace.folders, *run.trace.outside}
+        files |= {file for name in run.trace.sought for file in sought_files(name)}
     for _, compiled in results.models:
         if compiled.facts is not None:
             files |= {*compiled.facts.includes}

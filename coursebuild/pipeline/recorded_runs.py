@@ -20,18 +20,16 @@ from msgspec.structs import replace
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
-    Dependency,
     Inputs,
     Kind,
-    folded,
     input_changes,
     inputs_of,
-    needs,
+    looked_at,
     state_changes,
 )
 from coursebuild.core.run.machine import machine
 from coursebuild.core.run.memory import States
-from coursebuild.core.run.run_record import RunRecord
+from coursebuild.core.run.run_record import RunRecord, record_of
 from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.reports.records import FOLDER
@@ -96,18 +94,13 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         run, path = by_path.get(extraction.path), _path(extraction.path)
         if run is None or not extraction.script.once or run.outcome is not Outcome.OK:
             continue
-        needed = [] if run.trace is None else needs(run, (), states.places)
-        looked = [Dependency(n.kind, n.name, states(n)) for n in folded(needed, states)]
-        record = RunRecord(
-            inputs=_inputs(extraction),
-            dependencies=tuple(one for one in looked if one.kind in _OF_THE_PROJECT),
-            outcome=run.outcome,
-            status=run.status,
-            seconds=round(run.seconds, 1),
-            made=int(time.time()),
-            forgotten="",
-            stdout=run.stdout,
-            divergences=() if run.trace is None else run.trace.divergences,
+        looked = looked_at(run, (), states.places, states)
+        record = record_of(
+            _inputs(extraction),
+            tuple(one for one in looked if one.kind in _OF_THE_PROJECT),
+            int(time.time()),
+            "",
+            replace(run, seconds=round(run.seconds, 1), stderr="", figures=()),
         )
         packages = tuple(one.state for one in looked if one.kind is Kind.MODULE and one.state)
         kept = RecordedRun(machine(), packages, record)

@@ -24,7 +24,7 @@ from coursebuild.core.checks.compiled import broken_model, check_scenarios, scen
 from coursebuild.core.files.read import CourseFiles, read_course
 from coursebuild.core.model import Declarations, MjcfModel, Visible
 from coursebuild.core.model.results import ModelFacts
-from coursebuild.core.run.mjcf import compile_models, model_files, readable_error
+from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -78,7 +78,7 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Scenes:
     declared, found = _declared(read.value, chosen, every=not names)
     found += [d for d in read.diagnostics if d.span.path.startswith("models/")]
     scenes: list[CourseScene] = []
-    results = compile_models(root, chosen) if chosen else ()
+    results = compile_all(root, [(model.source.path, model.source.text) for model in chosen])
     for model, result in zip(chosen, results, strict=True):
         if result.facts is None:
             found.append(broken_model(model, result, readable_error))

@@ -9,7 +9,7 @@ longest first, of which no result is remembered that still holds.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, assert_never
+from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
@@ -29,7 +29,7 @@ from coursebuild.pipeline.recorded_runs import recorded_runs
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
-    from coursebuild.core.run.runner import RunAll, RunEvent
+    from coursebuild.core.run.runner import RunAll
 
 
 class ExtractedScripts(Struct, frozen=True):
@@ -148,33 +148,28 @@ def _run(
     """Run scripts, the longest first, and remember what they did."""
     if not todo:
         return ()
-    from coursebuild.core.run.runner import RunFinished, RunStarted, run_scripts
+    from coursebuild.core.run.runner import run_scripts
 
     count = sum(not job.norun for job in todo)
     if not count:
         return run_scripts(options.root, todo, parallel=1)
     lasted = {job.path: memory.last(job.path) for job in todo}
-    seconds = {path: None if last is None else last.seconds for path, last in lasted.items()}
+    seconds = {path: None if last is None else last.kept.seconds for path, last in lasted.items()}
 
-    def note(event: RunEvent) -> None:
-        match event:
-            case RunStarted():
-                memory.started(event.path)
-                progress.started(event.path)
-            case RunFinished():
-                done = event.run
-                memory.keep(inputs[done.path], done)
-                progress.finished(done.path, done.outcome.value, done.seconds)
-            case _:
-                assert_never(event)
+    def started(path: str) -> None:
+        memory.started(path)
+        progress.started(path)
+
+    def finished(done: ScriptRun) -> None:
+        memory.keep(inputs[done.path], done)
+        progress.finished(done.path, done.outcome.value, done.seconds)
 
     memory.begin()
+    run_all = run_all or options.run_all or run_scripts
+    told = {"started": started, "finished": finished}
     with progress.stage(stage, count):
         ordered = longest_first(todo, seconds)
-        run_all = run_all or options.run_all or run_scripts
-        runs = run_all(options.root, ordered, parallel=options.jobs, on_event=note)
-    memory.close()
-    return runs
+        return run_all(options.root, ordered, parallel=options.jobs, **told)
 
 
 def recorded_outputs(course: Course, documents: Collection[str] | None = None) -> list[Recording]:

@@ -197,15 +197,13 @@ def compile_models(
     if not course.models and not texts:
         return (), ()
     from coursebuild.core.run import mjcf
-    from coursebuild.core.run.model_memory import compile_all
+    from coursebuild.core.run.model_memory import compile_kept
 
     stage = functools.partial(progress.stage, "compiling models")
-    compiled, parts = compile_all(
-        options.root, options.store, course.models, [t.text for t in texts], stage
-    )
-    models = tuple(
-        (model.name, result) for model, result in zip(course.models, compiled, strict=True)
-    )
-    made = tuple(zip(texts, parts, strict=True))
+    everything = [(model.source.path, model.source.text) for model in course.models]
+    everything += [(mjcf.TEXT_PATH, text.text) for text in texts]
+    results = compile_kept(options.root, options.store, everything, stage)
+    models = tuple(zip((model.name for model in course.models), results, strict=False))
+    made = tuple(zip(texts, results[len(models) :], strict=True))
     found = check_compiled(course, dict(models), made, mjcf.readable_error)
     return models, found

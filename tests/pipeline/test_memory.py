@@ -18,7 +18,7 @@ from coursebuild.core.run.memory import longest_first
 from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
 
 Act = Callable[[Desk], object]
-SOUGHT = Trace(("examples/json.py", "examples/json/__init__.py"), (), (), (), "")
+SOUGHT = Trace((), (), (), (), "", sought=("examples/{json}",))
 ODD = os.fsdecode(b"models/\xff.bin")
 
 
@@ -270,6 +270,13 @@ def test_result_is_not_kept_where_something_was_saved_while_the_script_ran(tmp_p
         desk.run(trace, during=lambda act=act, desk=desk: act(desk))
         assert desk.why() == why
         assert (desk.recall() is not None) is (why == ""), number
+
+
+def test_a_module_that_appeared_while_the_script_ran_was_not_seen_by_it(desk: Desk) -> None:
+    desk.run(SOUGHT, during=lambda: desk.write("examples/json.py", b""))
+    assert desk.recall() is None
+    (desk.root / "examples/json.py").unlink()
+    assert desk.recall() is not None
 
 
 EDITED = ("models/a.xml", "models/b.xml", "data.txt")

@@ -76,7 +76,6 @@ class Desk:
             during()
         made = ScriptRun(job.path, Outcome.OK, 0, "hello\n", "", 0.5, trace=trace)
         memory.keep(memory.inputs(job, text), replace(made, **fields))  # type: ignore[arg-type]
-        memory.close()
         memory.store.close()
         return memory
 

@@ -19,13 +19,13 @@ both_ways = pytest.mark.parametrize("server", ["forking", "spawning"], indirect=
 TOOL = """
 import sys
 from pathlib import Path
-from coursebuild.core.run.runner import run_scripts
+from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.model.results import ScriptJob
 jobs = [ScriptJob(f"examples/x.py", (), 60.0, (), False)] * int(sys.argv[2])
 try:
-    fork = sys.argv[3] == "True"
-    for run in run_scripts(Path(sys.argv[1]), jobs, parallel=2, fork=fork):
-        print(run.outcome, run.stdout)
+    with ScriptServer(fork=sys.argv[3] == "True") as server:
+        for run in server.run(Path(sys.argv[1]), jobs, parallel=2):
+            print(run.outcome, run.stdout)
 except KeyboardInterrupt:
     print("interrupted")
 """

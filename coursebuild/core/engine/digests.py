@@ -1,18 +1,14 @@
 """What stands at a path now, as a short text: the same text, the same content.
 
-Entry points: `Digests`; `changed_since` with a time of a `Clock`.
+Entry points: `file_state`, `folder_state`, `modules_in`; `changed_since` with a time of a `Clock`.
 
-1. A file is its SHA-256, a folder the hash of what it lists, and what is not there is `absent`.
-2. A file is read once and then again only when its size, its times or its inode differ: what was
-   read is remembered in the store. A file changed a moment before it was read is not remembered,
-   since a change within the same tick of the clock would not show in its times.
+A file is its SHA-256, a folder the hash of what it lists, and what is not there is `absent`.
 """
 
 from __future__ import annotations
 
-import contextlib
+import functools
 import hashlib
-import json
 import os
 import stat
 import time
@@ -33,113 +29,65 @@ _TICK = 2_000_000_000
 _LAG = 20_000_000
 """How far the clock of a file system may be behind, ns."""
 _LONGEST_TICK = 0.05
-_MOST = 200_000
-_KIND, _KEY = "digests", hashlib.sha256(b"digests").hexdigest()
-
-Signature = tuple[int, int, int, int, int]
-"""Size, time of content, time of change (both ns), inode, device."""
 
 
-class Digests:
-    """The states of files and folders; not for several threads."""
-
-    def __init__(self, store: Memo) -> None:
-        self._store = store
-        self._known: dict[str, tuple[Signature, str]] | None = None
-        self._seen: dict[str, tuple[Signature, str]] = {}
-        self._is_new = False
-        self._listed: dict[str, frozenset[str]] = {}
-
-    def file(self, path: str) -> str:
-        """The state of what should be a file, at an absolute path; links are followed."""
-        try:
-            status = os.stat(path)  # noqa: PTH116 - thousands of them
-        except (FileNotFoundError, NotADirectoryError):
-            return ABSENT
-        except OSError as error:
-            return f"unreadable: {reason(error)}"
-        except ValueError:  # a null character
-            return ABSENT
+def file_state(path: str) -> str:
+    """The state of what should be a file, at an absolute path; links are followed."""
+    try:
+        status = os.stat(path)  # noqa: PTH116 - thousands of them
         if stat.S_ISDIR(status.st_mode):
             return FOLDER
         if not stat.S_ISREG(status.st_mode):
             return SPECIAL
-        signature = _signature(status)
-        known = self._seen.get(path) or self._loaded().get(path)
-        if known is not None and known[0] == signature:
-            self._seen[path] = known
-            return known[1]
-        return self._read(path)
+        times = status.st_mtime_ns, status.st_ctime_ns
+        if max(times) + _TICK >= time.time_ns():  # another change may not show in its times
+            return _sha256(path)
+        return _known_sha256(path, (*times, status.st_size, status.st_ino, status.st_dev))
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # the last: a null character
+        return ABSENT
+    except OSError as error:
+        return f"unreadable: {reason(error)}"
 
-    def folder(self, path: str) -> str:
-        """The state of what should be a folder: the names in it, and which are folders."""
-        digest = hashlib.sha256()
-        try:
-            with os.scandir(path) as entries:
-                names = sorted((os.fsencode(e.name), e.is_dir()) for e in entries)
-        except FileNotFoundError:
-            return ABSENT
-        except NotADirectoryError:
-            return FILE
-        except OSError as error:
-            return f"unreadable: {reason(error)}"
-        except ValueError:
-            return ABSENT
-        for name, is_folder in names:
-            digest.update(name + (b"/\0" if is_folder else b"\0"))
-        return digest.hexdigest()
 
-    def modules(self, folder: str, names: Iterable[str]) -> str:
-        """Which modules of these names a folder has."""
-        if folder not in self._listed:
-            try:
-                self._listed[folder] = frozenset(os.listdir(folder))  # noqa: PTH208
-            except (OSError, ValueError):
-                self._listed[folder] = frozenset()
-        listed = self._listed[folder]
-        found = []
-        for name in names:
-            near = name in listed and self.file(f"{folder}/{name}/__init__.py") != ABSENT
-            if near or f"{name}.py" in listed:
-                found.append(name)
-        return " ".join(found)
+def _sha256(path: str) -> str:
+    with open(path, "rb") as file:  # noqa: PTH123
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
-    def save(self) -> None:
-        """Remember what was read, if there is anything new."""
-        if not self._is_new:
-            return
-        self._is_new = False
-        kept = {**self._loaded(), **self._seen}
-        if len(kept) > _MOST:
-            kept = dict(self._seen)
-        self._store.put(_KIND, _KEY, json.dumps(kept).encode(), local=True)
 
-    def _read(self, path: str) -> str:
-        try:
-            with open(path, "rb") as file:  # noqa: PTH123
-                before = os.fstat(file.fileno())
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
-                after = os.fstat(file.fileno())
-        except (FileNotFoundError, NotADirectoryError):
-            return ABSENT
-        except OSError as error:
-            return f"unreadable: {reason(error)}"
-        signature = _signature(before)
-        latest = max(before.st_mtime_ns, before.st_ctime_ns)
-        # A time in the future says nothing of what happens until then.
-        if signature == _signature(after) and latest + _TICK < time.time_ns():
-            self._seen[path] = (signature, digest)
-            self._is_new = True
-        return digest
+@functools.lru_cache(maxsize=10_000)
+def _known_sha256(path: str, signature: tuple[int, ...]) -> str:
+    """That of a file with these times, this size and place: large ones are parts of many models."""
+    return _sha256(path)
 
-    def _loaded(self) -> dict[str, tuple[Signature, str]]:
-        if self._known is None:
-            self._known = {}
-            found = self._store.peek(_KIND, _KEY)
-            with contextlib.suppress(ValueError, TypeError, AttributeError, RecursionError):
-                for path, (signature, digest) in json.loads(found or b"{}").items():
-                    self._known[path] = (tuple(signature), digest)
-        return self._known
+
+def folder_state(path: str) -> str:
+    """The state of what should be a folder: the names in it, and which are folders."""
+    digest = hashlib.sha256()
+    try:
+        with os.scandir(path) as entries:
+            names = sorted((os.fsencode(e.name), e.is_dir()) for e in entries)
+    except NotADirectoryError:
+        return FILE
+    except (FileNotFoundError, ValueError):
+        return ABSENT
+    except OSError as error:
+        return f"unreadable: {reason(error)}"
+    for name, is_folder in names:
+        digest.update(name + (b"/\0" if is_folder else b"\0"))
+    return digest.hexdigest()
+
+
+def modules_in(folder: str, names: Iterable[str]) -> str:
+    """Which modules of these names a folder has."""
+    try:
+        listed = frozenset(os.listdir(folder))  # noqa: PTH208
+    except (OSError, ValueError):
+        return ""
+    return " ".join(
+        name
+        for name in names
+        if f"{name}.py" in listed or (name in listed and Path(folder, name, "__init__.py").exists())
+    )
 
 
 class Clock:
@@ -182,7 +130,3 @@ def changed_since(path: str, since_ns: int) -> bool:
             place = place.parent
     # The time of content can be set to anything, also to a moment that is to come.
     return status.st_ctime_ns >= since_ns or since_ns <= status.st_mtime_ns <= time.time_ns()
-
-
-def _signature(status: os.stat_result) -> Signature:
-    return (status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino, status.st_dev)

@@ -95,9 +95,8 @@ class Trace(Struct, frozen=True):
     """
 
     files: tuple[str, ...]
-    """Files of the project that it read, or tried to read and that were not there, such as what
-    would have been imported instead of another folder's module. Its own file and files that it
-    wrote itself before are not among them; a compiled module stands as its source."""
+    """Files of the project that it read, or tried to read and that were not there. Its own file and
+    files that it wrote itself before are not among them; a compiled module stands as its source."""
     folders: tuple[str, ...]
     """Folders of the project that it listed."""
     outside: tuple[str, ...]
@@ -117,6 +116,9 @@ class Trace(Struct, frozen=True):
     """Of such a run, for each `MjData` in words: its number in the order of their first use, the
     length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest since
     its simulation began), and the `qpos` and `qvel` that it ended with, as hexadecimal numbers."""
+    sought: tuple[str, ...] = ()
+    """Modules that it looked for in vain in a folder of the project, such as those that would have
+    been imported instead of Python's own: `folder/{one,two}`."""
 
 
 class ScriptRun(Struct, frozen=True):

@@ -1,10 +1,10 @@
 """What the result of a script depends on, and in which words to say that it changed.
 
-Entry points: `group_key`, `needs`, `input_changes`, `state_changes`, `forgotten`.
+Entry points: `group_key`, `looked_at`, `input_changes`, `state_changes`, `forgotten`.
 
 1. What is known before a script runs (`Inputs`) names a group of results.
 2. What it looked at while it ran (a `Trace`) names its needs; each with its state at that time is a
-   `Dependency`. Modules sought in vain beside the script, which are many, are one of them.
+   `Dependency`.
 3. A result holds as long as every state is as it was.
 """
 
@@ -15,7 +15,7 @@ import functools
 import hashlib
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import assert_never
 
@@ -23,7 +23,7 @@ from msgspec import Struct
 
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 
-VERSION = "4"
+VERSION = "5"
 """To be changed with how scripts are run and watched: older results then count no more."""
 
 ABSENT = "absent"
@@ -132,17 +132,22 @@ def result_key(dependencies: Iterable[Dependency]) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def needs(
-    run: ScriptRun, requires: Iterable[str], places: Iterable[tuple[str, str]]
-) -> tuple[Need, ...]:
-    """All whose state the result of a traced run depends on, sorted.
+def looked_at(
+    run: ScriptRun,
+    requires: Iterable[str],
+    places: Iterable[tuple[str, str]],
+    state: Callable[[Need], str],
+) -> tuple[Dependency, ...]:
+    """All that the result of a run depends on, sorted; nothing where nobody watched.
 
     `places` are folders of this machine by name: `library` is the one that holds `mjcourse`.
     """
     trace = run.trace
-    assert trace is not None
+    if trace is None:
+        return ()
     found = {Need(Kind.FILE, path) for path in trace.files}
     found |= {Need(Kind.LISTING, path) for path in trace.folders}
+    found |= {Need(Kind.SOUGHT, name) for name in trace.sought}
     found |= {Need(Kind.MODULE, name) for name in trace.modules}
     found |= {Need(Kind.MODULE, name.partition(".")[0]) for name in requires}
     known = dict(places)
@@ -154,31 +159,12 @@ def needs(
     for name, folder in known.items():
         if len(folder) > 1 and folder in run.stdout:
             found.add(Need(Kind.PLACE, name))
-    return tuple(sorted(found, key=lambda need: (need.kind.value, need.name)))
-
-
-def folded(needed: Sequence[Need], state: Callable[[Need], str]) -> tuple[Need, ...]:
-    """The same needs, sorted, with modules that were looked for in vain as one for each folder.
-
-    An import of `json` looks for `json.py` and `json/__init__.py` beside the script, and so do all
-    the imports that this one makes: hundreds of files that are not there.
-    """
-    files = {need.name: need for need in needed if need.kind is Kind.FILE}
-    rest = {need for need in needed if need.kind is not Kind.FILE}
-    modules: dict[str, list[str]] = {}
-    vain: set[str] = set()
-    for name in sorted(files):  # a module comes before what would be in it as a package
-        package = name.removesuffix(".py")
-        pair = name, f"{package}/__init__.py"
-        folder, _, module = package.rpartition("/")
-        is_module = package != name and pair[1] in files and module.isidentifier()
-        if is_module and name not in vain and all(state(files[one]) == ABSENT for one in pair):
-            modules.setdefault(folder, []).append(module)
-            vain.update(pair)
-    rest.update(need for name, need in files.items() if name not in vain)
-    for folder, names in modules.items():
-        rest.add(Need(Kind.SOUGHT, f"{folder}/{{{','.join(sorted(names))}}}"))
-    return tuple(sorted(rest, key=lambda need: (need.kind.value, need.name)))
+    needs = sorted(found, key=lambda need: (need.kind.value, need.name))
+    # What was sought in vain was not there, whatever is there by now.
+    states = ("" if need.kind is Kind.SOUGHT else state(need) for need in needs)
+    return tuple(
+        Dependency(need.kind, need.name, now) for need, now in zip(needs, states, strict=True)
+    )
 
 
 def sought(name: str) -> tuple[str, tuple[str, ...]]:

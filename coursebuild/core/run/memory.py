@@ -20,26 +20,33 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import assert_never
 
-from coursebuild.core.engine.digests import Clock, Digests, changed_since
+from msgspec.structs import replace
+
+from coursebuild.core.engine.digests import (
+    Clock,
+    changed_since,
+    file_state,
+    folder_state,
+    modules_in,
+)
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Trace
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
     Need,
-    folded,
     forgotten,
     group_key,
     inputs_of,
     is_perturbed,
-    needs,
+    looked_at,
     result_key,
     sought,
     state_changes,
 )
 from coursebuild.core.run.packages import Installed
-from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, to_bytes
+from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, record_of, to_bytes
 from coursebuild.core.run.surroundings import OtherEnvironment, conditions, places
 
 _RESULTS, _LAST = "scripts", "last"
@@ -58,12 +65,11 @@ class States:
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, None if place is None else place.prefix)
         self.around = conditions(os.environ)
-        self._digests = Digests(store)
         folders = None
         if place is not None:
             self.around = tuple(sorted((*self.around, ("environment", place.name))))
             folders = (place.packages,)
-        self._installed = Installed(store, self._digests, folders)
+        self._installed = Installed(store, folders)
         self._known: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -76,24 +82,20 @@ class States:
         """The state of something at this moment."""
         match need.kind:
             case Kind.FILE:
-                return self._digests.file(self._inside + need.name)  # of hundreds for each script
+                return file_state(self._inside + need.name)
             case Kind.LISTING:
-                return self._digests.folder(str(self.root / need.name))
+                return folder_state(self._inside + need.name)
             case Kind.SOUGHT:
                 folder, modules = sought(need.name)
-                return self._digests.modules(str(self.root / folder), modules)
+                return modules_in(self._inside + folder, modules)
             case Kind.OUTSIDE:
-                return self._digests.file(need.name)
+                return file_state(need.name)
             case Kind.MODULE:
                 return self._installed.version(need.name)
             case Kind.PLACE:
                 return dict(self.places).get(need.name, "")
             case _:
                 assert_never(need.kind)
-
-    def save(self) -> None:
-        """Remember what was read of the disk."""
-        self._digests.save()
 
 
 class Memory:
@@ -138,7 +140,6 @@ class Memory:
                 found[inputs.path] = record.run(self.states.places)
         for record in self._fetch(missing):
             found[record.inputs.path] = record.run(self.states.places)
-        self.states.save()
         return found
 
     def remembered(self, inputs: Inputs) -> RunRecord | None:
@@ -178,16 +179,11 @@ class Memory:
         `lasting`: whether its result can be used again. `made`: when, in seconds since 1970.
         """
         needed = [Need(Kind.FILE, path) for path in sorted(files)]
-        record = RunRecord(
-            inputs,
-            tuple(Dependency(n.kind, n.name, self.states(n)) for n in needed),
-            Outcome.OK if ok else Outcome.FAILED,
-            0,
-            seconds,
-            made,
-            "" if lasting else "it may end in another way the next time",
-        )
-        self._note(record)
+        looked = tuple(Dependency(n.kind, n.name, self.states(n)) for n in needed)
+        why = "" if lasting else "it may end in another way the next time"
+        outcome = Outcome.OK if ok else Outcome.FAILED
+        run = ScriptRun(inputs.path, outcome, 0, "", "", seconds)
+        self._note(record_of(inputs, looked, made, why, run))
 
     def started(self, path: str) -> None:
         """A script is about to run."""
@@ -199,26 +195,10 @@ class Memory:
 
     def keep(self, inputs: Inputs, run: ScriptRun) -> None:
         """Remember the result of a run, or why it is not remembered."""
-        why = forgotten(run)
-        dependencies: tuple[Dependency, ...] = ()
-        if run.trace is not None:
-            needed = needs(run, inputs.requires, self.states.places)
-            needed = folded(needed, self.states.now)
-            dependencies = tuple(Dependency(n.kind, n.name, self.states.now(n)) for n in needed)
-            why = why or self._disturbed(inputs, needed)
-        record = RunRecord(
-            inputs,
-            dependencies,
-            run.outcome,
-            run.status,
-            run.seconds,
-            int(time.time()),
-            why,
-            run.stdout,
-            run.stderr,
-            *(_watched(run.trace) if run.trace is not None else ((), False, ())),
-            run.figures,
-        )
+        states = self.states
+        dependencies = looked_at(run, inputs.requires, states.places, states.now)
+        why = forgotten(run) or self._disturbed(inputs, dependencies)
+        record = record_of(inputs, dependencies, int(time.time()), why, run)
         key = ""
         if not why:
             assert run.outcome in REMEMBERED
@@ -228,24 +208,19 @@ class Memory:
             self.store.put(_RESULTS, key, to_bytes(record, self.states.places))
         self._note(record, key)
 
-    def close(self) -> None:
-        """Nothing more is run."""
-        self.states.save()
-
-    def _disturbed(self, inputs: Inputs, needed: Iterable[Need]) -> str:
+    def _disturbed(self, inputs: Inputs, looked: Iterable[Dependency]) -> str:
         """What may have changed between the moment a script saw it and now."""
         if self.states.now(Need(Kind.FILE, inputs.path)) != inputs.text:
             return _REASON.format("its file")
         since = self._started.get(inputs.path)
         if since is None:
             return "nobody knows when it began"
-        for need in needed:
+        for need in looked:
             match need.kind:
                 case Kind.FILE | Kind.LISTING:
                     path = str(self.states.root / need.name)
                 case Kind.OUTSIDE:
                     path = need.name
-                # Of folders in which modules are sought other scripts may make use meanwhile.
                 case Kind.SOUGHT | Kind.MODULE | Kind.PLACE:
                     continue
                 case _:
@@ -266,7 +241,7 @@ class Memory:
             record is not None
             and record.inputs == inputs
             and not record.forgotten
-            and record.outcome in REMEMBERED
+            and record.kept.outcome in REMEMBERED
         )
         return record if fits else None
 
@@ -306,16 +281,8 @@ class Memory:
         before = self.store.peek(_LAST, key)
         if result and before is not None and before.startswith(head):
             return
-        bare = RunRecord(
-            record.inputs,
-            record.dependencies,
-            record.outcome,
-            record.status,
-            record.seconds,
-            record.made,
-            record.forgotten,
-        )
-        data = head + to_bytes(bare, ())
+        run = replace(record.kept, stdout="", stderr="", trace=None, figures=())
+        data = head + to_bytes(replace(record, kept=run), ())
         if before != data:
             self.store.put(_LAST, key, data, local=True)
 
@@ -339,11 +306,6 @@ def longest_first(
         return unknown if known is None else known
 
     return sorted(jobs, key=lambda job: -length(job))
-
-
-def _watched(trace: Trace) -> tuple[tuple[Divergence, ...], bool, tuple[str, ...]]:
-    """What of a trace is no dependency."""
-    return trace.divergences, trace.moved, trace.states
 
 
 def _last_key(path: str) -> str:

@@ -1,7 +1,6 @@
 """Compiling MJCF with MuJoCo itself, in a child process.
 
-Entry points: `compile_all`, `compile_models`, `compile_texts`; `model_files`, what a model is made
-of; `readable_error`, for people.
+Entry points: `compile_all`; `model_files`, what a model is made of; `readable_error`, for people.
 
 1. One child compiles everything; it starts again if a model crashes it or holds it up too long.
 2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
@@ -13,10 +12,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from coursebuild.core.model import MjcfModel
+import msgspec
+
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mjcf_worker
 from coursebuild.core.run.child import JsonChild
@@ -31,44 +31,26 @@ TEXT_PATH = f"models/{_TEXT_NAME}"
 
 def compile_all(
     root: Path,
-    models: Sequence[MjcfModel],
-    texts: Sequence[str],
+    texts: Sequence[tuple[str, str]],
     *,
     timeout: float = TIMEOUT,
     python: str | None = None,
-) -> tuple[tuple[CompileResult, ...], tuple[CompileResult, ...]]:
-    """Compile models of the course and texts as if they stood in `models/`, all in one child.
+) -> tuple[CompileResult, ...]:
+    """Compile models, all in one child; a result for each.
 
-    `python` is another interpreter than the one that runs this, with a MuJoCo of its own.
-
-    Returns:
-        A result for each model, and one for each text.
+    Args:
+        root: the course folder.
+        texts: each with the path where it stands, or would (`TEXT_PATH`).
+        timeout: seconds that one may take.
+        python: another interpreter than the one that runs this, with a MuJoCo of its own.
 
     Raises:
         EffectError: MuJoCo cannot be loaded.
     """
-    root = root.resolve()
-    jobs = [(model.source.path, model.source.text) for model in models]
-    jobs += [(TEXT_PATH, text) for text in texts]
-    if not jobs:
-        return (), ()
-    with _Compiler(root, timeout, python) as compiler:
-        results = tuple(compiler.compile(*job) for job in jobs)
-    return results[: len(models)], results[len(models) :]
-
-
-def compile_models(
-    root: Path, models: Sequence[MjcfModel], *, timeout: float = TIMEOUT
-) -> tuple[CompileResult, ...]:
-    """See `compile_all`."""
-    return compile_all(root, models, (), timeout=timeout)[0]
-
-
-def compile_texts(
-    root: Path, texts: Sequence[str], *, timeout: float = TIMEOUT
-) -> tuple[CompileResult, ...]:
-    """See `compile_all`."""
-    return compile_all(root, (), texts, timeout=timeout)[1]
+    if not texts:
+        return ()
+    with _Compiler(root.resolve(), timeout, python) as compiler:
+        return tuple(compiler.compile(*text) for text in texts)
 
 
 class _Compiler(JsonChild):
@@ -88,9 +70,9 @@ class _Compiler(JsonChild):
         reply: mjcf_worker.CompileReply | None = self.ask(request)
         if reply is None:
             return CompileResult(f"MuJoCo's compiler {self.death()}")
-        facts = reply["facts"]
-        if facts is not None:
-            return CompileResult("", facts=_facts(facts, parts(self.root, path, text)))
+        if reply["facts"] is not None:
+            facts = reply["facts"] | {"includes": parts(self.root, path, text)}
+            return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
         message = self._without_paths(reply["error"].strip())
         return CompileResult(message, error_line(message, text))
 
@@ -98,25 +80,6 @@ class _Compiler(JsonChild):
         """The message as it would be on any machine."""
         message = message.replace(f"{self.root}/", "").replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
         return message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
-
-
-def _facts(facts: mjcf_worker.CompiledFacts, parts: Iterable[str]) -> ModelFacts:
-    return ModelFacts(
-        bodies=facts["bodies"],
-        geoms=facts["geoms"],
-        joints=facts["joints"],
-        nq=facts["nq"],
-        nv=facts["nv"],
-        nu=facts["nu"],
-        timestep=facts["timestep"],
-        integrator=facts["integrator"],
-        total_mass=facts["total_mass"],
-        keyframes=tuple(facts["keyframes"]),
-        sites=tuple(facts["sites"]),
-        body_names=tuple(facts["body_names"]),
-        includes=tuple(parts),
-        sensors=tuple(facts["sensors"]),
-    )
 
 
 def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:

@@ -1,60 +1,46 @@
-"""From the records of a `Tracer` to what a script depends on.
+"""From the records of a `Tracer` to a `Trace`.
 
 Entry point: `read_notes`.
 """
 
 from __future__ import annotations
 
-import _imp
 import contextlib
 import os
-from collections.abc import Iterable
-from pathlib import Path
-from typing import TypedDict
+
+from coursebuild.core.model.results import Divergence, Sign, Trace
 
 _FIELDS = 6
 """Of a record that says that a simulation was lost."""
 
 
-class Notes(TypedDict):
-    """The fields of `coursebuild.core.model.results.Trace`."""
-
-    files: list[str]
-    folders: list[str]
-    outside: list[str]
-    modules: list[str]
-    opaque: str
-    divergences: list[list[str]]
-    """Of each its sign, detail, time, model, path and line."""
-    moved: bool
-    states: list[str]
-
-
-def read_notes(data: bytes, overflow: str, root: str, script: str) -> Notes:
-    """What the records say.
+def read_notes(records: bytes, root: str, script: str) -> Trace:
+    """What the records say, each of which ends with a null byte.
 
     Args:
-        data: records, each ended by a null byte.
-        overflow: a folder that may hold more, in files.
+        records: those of one script.
         root: the project's folder, resolved.
         script: the script's path relative to it.
     """
     collected = _Collected(root)
-    for part in (data, *_spilled(overflow)):
-        for record in part.split(b"\0"):
-            if record:
-                collected.take(record.decode("utf-8", "surrogateescape"))
-    collected.files.discard(script)
-    return {
-        "files": sorted(collected.files),
-        "folders": sorted(collected.folders),
-        "outside": sorted(collected.outside),
-        "modules": sorted(collected.modules),
-        "opaque": collected.opaque,
-        "divergences": collected.divergences,
-        "moved": collected.moved,
-        "states": collected.states,
-    }
+    for record in records.split(b"\0"):
+        if record:
+            collected.take(record.decode("utf-8", "surrogateescape"))
+    collected.files.discard(os.path.normpath(script))
+    return Trace(
+        files=tuple(sorted(collected.files)),
+        folders=tuple(sorted(collected.folders)),
+        outside=tuple(sorted(collected.outside)),
+        modules=tuple(sorted(collected.modules)),
+        opaque=collected.opaque,
+        divergences=tuple(dict.fromkeys(collected.divergences)),
+        moved=collected.moved,
+        states=tuple(collected.states),
+        sought=tuple(
+            f"{folder}/{{{','.join(sorted(names))}}}"
+            for folder, names in sorted(collected.sought.items())
+        ),
+    )
 
 
 class _Collected:
@@ -63,8 +49,9 @@ class _Collected:
         self.folders: set[str] = set()
         self.outside: set[str] = set()
         self.modules: set[str] = set()
+        self.sought: dict[str, set[str]] = {}
         self.opaque = ""
-        self.divergences: list[list[str]] = []
+        self.divergences: list[Divergence] = []
         self.moved = False
         self.states: list[str] = []
         self._root = root.rstrip("/") + "/"
@@ -74,22 +61,31 @@ class _Collected:
         if kind == "r":
             self._file(about)
         elif kind == "l":
-            self.folders.add(about.removeprefix(self._root[:-1]).lstrip("/") or ".")
+            self.folders.add(self._inside(about) or ".")
         elif kind == "m":
             self.modules.add(about)
-        elif kind == "n":
+        elif kind == "v":
             folder, _, names = about.partition("\t")
-            self._not_looked_for(f"{folder}/".removeprefix(self._root), names.split(","))
+            self.sought.setdefault(self._inside(folder), set()).update(names.split(","))
         elif kind == "d":
-            fields = about.split("\t")
-            if len(fields) == _FIELDS and fields not in self.divergences:
-                self.divergences.append(fields)
+            self._divergence(about.split("\t"))
         elif kind == "p":
             self.moved = True
         elif kind == "s":
             self.states.append(about)
         elif kind == "o" and not self.opaque:
             self.opaque = about
+
+    def _inside(self, folder: str) -> str:
+        """A folder relative to the project's; empty for that itself."""
+        return folder.removeprefix(self._root[:-1]).lstrip("/")
+
+    def _divergence(self, fields: list[str]) -> None:
+        if len(fields) == _FIELDS:
+            sign, detail, time, model, path, line = fields
+            depth, *geoms = detail.split("\x1f")
+            lost = Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
+            self.divergences.append(lost)
 
     def _file(self, path: str) -> None:
         folder, _, name = path.rpartition("/")
@@ -103,15 +99,3 @@ class _Collected:
             self.files.add(path.removeprefix(self._root))
         else:
             self.outside.add(path)
-
-    def _not_looked_for(self, folder: str, names: Iterable[str]) -> None:
-        for name in names:
-            if not _imp.is_frozen(name):
-                self.files |= {f"{folder}{name}/__init__.py", f"{folder}{name}.py"}
-
-
-def _spilled(overflow: str) -> Iterable[bytes]:
-    with contextlib.suppress(OSError):
-        for path in sorted(Path(overflow).iterdir()):
-            with contextlib.suppress(OSError):
-                yield path.read_bytes()

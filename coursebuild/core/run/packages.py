@@ -20,7 +20,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coursebuild.core.engine.digests import Digests
+from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import OutputFile
 
@@ -43,8 +43,7 @@ def site_folders() -> tuple[str, ...]:
 class Installed:
     """What is installed for the interpreter that runs the scripts."""
 
-    def __init__(self, store: Memo, digests: Digests, folders: Sequence[str] | None = None) -> None:
-        self._digests = digests
+    def __init__(self, store: Memo, folders: Sequence[str] | None = None) -> None:
         self._folders = site_folders() if folders is None else tuple(folders)
         self._store = store
         self._map: Mapping[str, str] | None = None
@@ -68,12 +67,12 @@ class Installed:
     def _content(self, spec: ModuleSpec) -> str:
         """A hash of a module's files."""
         if not spec.submodule_search_locations:
-            return self._digests.file(spec.origin or "")[:16]
+            return file_state(spec.origin or "")[:16]
         digest = hashlib.sha256()
         for top in sorted(spec.submodule_search_locations):
             for file in sorted(Path(top).rglob("*")):
                 if "__pycache__" not in file.parts and file.is_file():
-                    state = self._digests.file(str(file))
+                    state = file_state(str(file))
                     digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
         return digest.hexdigest()[:16]
 

@@ -16,11 +16,12 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model.results import Divergence, Outcome, ScriptRun, Trace
-from coursebuild.core.run.dependencies import Dependency, Inputs, Kind, sought_files
+from coursebuild.core.model.results import Outcome, ScriptRun, Trace
+from coursebuild.core.run.dependencies import Dependency, Inputs, Kind
 
 REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
 _MARK = "\0"
+_NOTHING = Trace((), (), (), (), "")
 
 
 class RunRecord(Struct, frozen=True):
@@ -28,56 +29,44 @@ class RunRecord(Struct, frozen=True):
 
     inputs: Inputs
     dependencies: tuple[Dependency, ...]
-    outcome: Outcome
-    status: int
-    seconds: float
     made: int
     """When, in seconds since 1970."""
     forgotten: str
     """Why it is not remembered, as the end of a sentence; empty where it is."""
-    stdout: str = ""
-    stderr: str = ""
-    """Of one that is not remembered both are left out."""
-    divergences: tuple[Divergence, ...] = ()
-    moved: bool = False
-    states: tuple[str, ...] = ()
-    figures: tuple[tuple[str, bytes], ...] = ()
+    kept: ScriptRun
+    """What it did; of its trace only what is no dependency."""
 
     def run(self, places: Iterable[tuple[str, str]]) -> ScriptRun:
         """The run as if it had been made here; see `to_bytes` for the places."""
         names: dict[Kind, list[str]] = {kind: [] for kind in Kind}
         for one in self.dependencies:
             names[one.kind].append(one.name)
-        for name in names[Kind.SOUGHT]:
-            names[Kind.FILE] += sought_files(name)
-        return ScriptRun(
-            self.inputs.path,
-            self.outcome,
-            self.status,
-            self.stdout,
-            _put_in(self.stderr, places),
-            self.seconds,
-            cached=True,
-            trace=Trace(
-                files=tuple(sorted(names[Kind.FILE])),
-                folders=tuple(sorted(names[Kind.LISTING])),
-                outside=tuple(sorted(names[Kind.OUTSIDE])),
-                modules=tuple(sorted(names[Kind.MODULE])),
-                opaque="",
-                divergences=self.divergences,
-                moved=self.moved,
-                states=self.states,
-            ),
-            figures=self.figures,
+        trace = replace(
+            self.kept.trace or _NOTHING,
+            files=tuple(names[Kind.FILE]),
+            folders=tuple(names[Kind.LISTING]),
+            outside=tuple(names[Kind.OUTSIDE]),
+            modules=tuple(names[Kind.MODULE]),
+            sought=tuple(names[Kind.SOUGHT]),
         )
+        stderr = _put_in(self.kept.stderr, places)
+        return replace(self.kept, stderr=stderr, cached=True, trace=trace)
+
+
+def record_of(
+    inputs: Inputs, dependencies: tuple[Dependency, ...], made: int, forgotten: str, run: ScriptRun
+) -> RunRecord:
+    """The record of a run."""
+    bare = run.trace and replace(run.trace, files=(), folders=(), outside=(), modules=(), sought=())
+    return RunRecord(inputs, dependencies, made, forgotten, replace(run, trace=bare))
 
 
 def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
     """As JSON; `places` are folders of this machine, each with a name, the longer ones first."""
-    stderr = _take_out(record.stderr, places)
-    kept = replace(record, seconds=round(record.seconds, 4), stderr=stderr)
+    run = record.kept
+    run = replace(run, seconds=round(run.seconds, 4), stderr=_take_out(run.stderr, places))
     # Names of files may hold bytes that are no text; only escapes can carry them.
-    return json.dumps(msgspec.to_builtins(kept), ensure_ascii=True).encode()
+    return json.dumps(msgspec.to_builtins(replace(record, kept=run)), ensure_ascii=True).encode()
 
 
 def from_bytes(data: bytes) -> RunRecord | None:

@@ -25,12 +25,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
 
-from msgspec import Struct
-
 from coursebuild.core.files.errors import EffectError, reason
-from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Sign, Trace
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import supervisor
-from coursebuild.core.run.notes import Notes
+from coursebuild.core.run.notes import read_notes
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.script_process import Job
 from coursebuild.core.run.surroundings import OtherEnvironment, library_folder, wanted_packages
@@ -38,31 +36,20 @@ from coursebuild.core.run.surroundings import clean_environment as clean_environ
 from coursebuild.core.run.watching import STDERR_KEPT
 from coursebuild.core.run.workers import Worker
 
-
-class RunStarted(Struct, frozen=True):
-    """A script was handed to a supervisor."""
-
-    path: str
-    total: int
-    """How many scripts are run in all."""
-
-
-class RunFinished(Struct, frozen=True):
-    """A script is through, one way or another."""
-
-    run: ScriptRun
-    done: int
-    """How many are through, with this one."""
-    total: int
-
-
-RunEvent: TypeAlias = RunStarted | RunFinished
+Started: TypeAlias = Callable[[str], object]
+"""Is told of the path of a script that begins."""
+Finished: TypeAlias = Callable[[ScriptRun], object]
+"""Is told of a script that is through, one way or another."""
 RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
 """Runs scripts, as `run_scripts` does."""
 
 
 class RunStoppedError(Exception):
     """Whoever asked for scripts to be run wants them no more; what ran was ended."""
+
+
+def _ignore(what: object) -> None:
+    pass
 
 
 _PATIENCE = 0.1
@@ -77,19 +64,17 @@ def run_scripts(
     jobs: Sequence[ScriptJob],
     *,
     parallel: int,
-    on_event: Callable[[RunEvent], None] | None = None,
-    order: Sequence[int] | None = None,
-    fork: bool = True,
+    started: Started = _ignore,
+    finished: Finished = _ignore,
 ) -> tuple[ScriptRun, ...]:
-    """Run scripts; those marked `norun` are not, and cause no event.
+    """Run scripts; those marked `norun` are not, and nothing is told of them.
 
     Args:
         root: the course folder, which becomes the working directory.
-        jobs: what to run.
+        jobs: what to run, in the order of their start.
         parallel: how many at a time, at least 1.
-        on_event: is told of every start and end, in this thread. What it raises ends the run.
-        order: indices of jobs in the order of their start; without it they start as they stand.
-        fork: let scripts be copies of their supervisor, where they can.
+        started: is called in this thread; what it raises ends the run.
+        finished: likewise.
 
     Returns:
         What each did, in the order of the jobs.
@@ -97,8 +82,8 @@ def run_scripts(
     Raises:
         EffectError: there is no place for temporary files.
     """
-    with ScriptServer(fork=fork) as server:
-        return server.run(root, jobs, parallel=parallel, on_event=on_event, order=order)
+    with ScriptServer() as server:
+        return server.run(root, jobs, parallel=parallel, started=started, finished=finished)
 
 
 class ScriptServer:
@@ -139,8 +124,8 @@ class ScriptServer:
         jobs: Sequence[ScriptJob],
         *,
         parallel: int,
-        on_event: Callable[[RunEvent], None] | None = None,
-        order: Sequence[int] | None = None,
+        started: Started = _ignore,
+        finished: Finished = _ignore,
         unwanted: Callable[[frozenset[str]], bool] | None = None,
     ) -> tuple[ScriptRun, ...]:
         """As `run_scripts`; one run at a time.
@@ -150,7 +135,7 @@ class ScriptServer:
         Raises:
             RunStoppedError: it said so.
         """
-        work = _Work(root.resolve(), jobs, on_event or (lambda event: None), order, self._place)
+        work = _Work(root.resolve(), jobs, started, finished, self._place)
         if not work.waiting:
             return work.results()
         busy: set[Worker] = set()
@@ -221,13 +206,14 @@ class _Work:
         self,
         root: Path,
         jobs: Sequence[ScriptJob],
-        tell: Callable[[RunEvent], None],
-        order: Sequence[int] | None,
+        started: Started,
+        finished: Finished,
         place: OtherEnvironment | None,
     ) -> None:
         self.root = root
         self.jobs = jobs
-        self.tell = tell
+        self.started = started
+        self.finished = finished
         self.environment = _environment(place) | dict(jobs[0].environment if jobs else ())
         self.library = library_folder() if place is None else place.packages
         self.scratch = ""
@@ -236,9 +222,7 @@ class _Work:
             for i, job in enumerate(jobs)
             if job.norun
         }
-        self.waiting = [i for i in order or range(len(jobs)) if i not in self.runs]
-        self.total = len(self.waiting)
-        self.done = 0
+        self.waiting = [i for i in range(len(jobs)) if i not in self.runs]
         self.told: set[int] = set()
         """The jobs whose start was told."""
         folders = {self.root / folder for job in jobs for folder in job.packages}
@@ -253,7 +237,7 @@ class _Work:
         index = self.waiting.pop(0)
         if index not in self.told:
             self.told.add(index)
-            self.tell(RunStarted(self.jobs[index].path, self.total))
+            self.started(self.jobs[index].path)
         worker.give(index, self._message(self.jobs[index]))
 
     def hear(self, worker: Worker) -> bool:
@@ -269,7 +253,7 @@ class _Work:
         if worker.job is not None and (report := worker.take_report()) is not None:
             index, worker.job = worker.job, None
             worker.rested = False
-            self._finish(index, _script_run(self.jobs[index], *report))
+            self._finish(index, _script_run(str(self.root), self.jobs[index], *report))
             self.next(worker)
         return True
 
@@ -300,8 +284,7 @@ class _Work:
 
     def _finish(self, index: int, run: ScriptRun) -> None:
         self.runs[index] = run
-        self.done += 1
-        self.tell(RunFinished(run, self.done, self.total))
+        self.finished(run)
 
 
 def _environment(place: OtherEnvironment | None) -> dict[str, str]:
@@ -319,70 +302,28 @@ def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
 
 
 def _script_run(
-    job: ScriptJob,
-    report: supervisor.ChildReport,
-    out: bytes,
-    err: bytes,
-    trace: bytes,
-    drawn: bytes,
+    root: str, job: ScriptJob, report: supervisor.ChildReport, parts: Sequence[bytes | None]
 ) -> ScriptRun:
+    out, err, trace, *figures = parts
+    assert out is not None and err is not None
     stdout, is_text = _decode(out)
-    outcome, status = _outcome(report)
+    outcome = Outcome(report["outcome"])
     if outcome is Outcome.OK and not is_text:
         outcome = Outcome.ENCODING
     if len(err) == STDERR_KEPT:
         err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]  # a letter cut in two
-    figures, at = [], 0
-    for name, size in zip(job.figures, report["figures"], strict=False):
-        if size >= 0:
-            figures.append((name, drawn[at : at + size]))
-            at += size
+    drawn = zip(job.figures, figures, strict=False)
     return ScriptRun(
         job.path,
         outcome,
-        status,
+        report["status"],
         stdout,
         _decode(err)[0],
         report["seconds"],
         missing=tuple(report["missing"]),
-        trace=_trace(json.loads(trace)) if trace else None,
-        figures=tuple(figures),
+        trace=read_notes(trace, root, job.path) if trace else None,
+        figures=tuple((name, data) for name, data in drawn if data is not None),
     )
-
-
-def _trace(notes: Notes) -> Trace:
-    return Trace(
-        files=tuple(notes["files"]),
-        folders=tuple(notes["folders"]),
-        outside=tuple(notes["outside"]),
-        modules=tuple(notes["modules"]),
-        opaque=notes["opaque"],
-        divergences=tuple(_divergence(*fields) for fields in notes["divergences"]),
-        moved=notes["moved"],
-        states=tuple(notes["states"]),
-    )
-
-
-def _divergence(sign: str, detail: str, time: str, model: str, path: str, line: str) -> Divergence:
-    depth, *geoms = detail.split("\x1f")
-    return Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
-
-
-def _outcome(report: supervisor.ChildReport) -> tuple[Outcome, int]:
-    status = report["status"]
-    match report["end"]:
-        case "missing":
-            return Outcome.SKIPPED, 0
-        case "timeout":
-            return Outcome.TIMEOUT, -status
-        case "output-limit":
-            return Outcome.OUTPUT_LIMIT, -status
-        case "unstartable":
-            return Outcome.FAILED, status
-        case "exit":
-            if status < 0:
-                return Outcome.KILLED, -status
-            return (Outcome.FAILED if status else Outcome.OK), status
 
 
 def _decode(data: bytes) -> tuple[str, bool]:

@@ -14,8 +14,7 @@ scripts are copies of it. Where that cannot be, it starts this program anew for 
 one thread, so that it may fork.
 
 The protocol: from the tool JSON objects (`Job`), each after its length in 4 bytes; to it for each
-one JSON object (`ChildReport`) after its length, and then the bytes of the script's output, of the
-end of its error output, of its trace and of the figures that it drew.
+one JSON object (`ChildReport`) after its length, and then the bytes of which it has the lengths.
 """
 
 from __future__ import annotations
@@ -40,9 +39,8 @@ import time
 import traceback
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import Literal, TypeAlias, TypedDict
+from typing import TypedDict
 
-from coursebuild.core.run.notes import Notes, read_notes
 from coursebuild.core.run.script_process import Job, Preloaded, ScriptProcess, figure_path
 from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched, has_ended
 
@@ -90,8 +88,7 @@ def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
     except SystemExit as end:
         script, status = None, end.code
     except Exception:  # a bug: the tool shows it as what the script has said
-        answer = _unstartable(traceback.format_exc())
-        _answer(reports, answer)
+        _send(reports, _unstartable(traceback.format_exc()))
         script, status = None, 70
     else:
         status = 0
@@ -107,22 +104,15 @@ def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
 class ChildReport(TypedDict):
     """What happened."""
 
-    end: Literal["exit", "timeout", "output-limit", "missing", "unstartable"]
+    outcome: str
+    """The value of an `Outcome`."""
     status: int
-    """Exit status; minus the signal's number where one ended it."""
+    """Exit status; the signal's number where one ended it."""
     seconds: float
     missing: list[str]
-    stdout: int
-    """Length in bytes."""
-    stderr: int
-    trace: int
-    """Length in bytes of the `Notes` as JSON; 0 where nobody watched."""
-    figures: list[int]
-    """Lengths in bytes of the figures of the job; -1 of one that it did not draw."""
-
-
-_Answer: TypeAlias = tuple[ChildReport, bytes, bytes, bytes, list[bytes]]
-"""A report, with the script's output, error output, trace and figures."""
+    lengths: list[int]
+    """In bytes: of its output, of the end of its error output, of its trace (empty where nobody
+    watched), of each figure of the job; -1 of one that it did not draw."""
 
 
 def _alone(start: _Start, bare: Collection[str]) -> ScriptProcess:
@@ -167,15 +157,16 @@ class _Supervisor:
             answer = self._serve(job)
             if isinstance(answer, ScriptProcess):
                 return answer
-            _answer(self.reports, answer)
+            _send(self.reports, answer)
         return None
 
-    def _serve(self, job: Job) -> _Answer | ScriptProcess:
+    def _serve(self, job: Job) -> bytes | ScriptProcess:
+        """The report on a script, or the script itself in the process that is to become it."""
         folder_of_script = Path(job["root"], job["path"]).parent
         path = [str(folder_of_script), *job["folders"]]
         missing = missing_modules(job["requires"], path, job["library"])
         if missing:
-            return _report("missing", missing=missing), b"", b"", b"", []
+            return _report("skipped", missing=missing)
         if not os.path.isfile(f"{job['root']}/{job['path']}"):  # noqa: PTH113 (here time counts)
             return _unstartable(f"there is no file {job['path']}\n")
         environment = dict(job["environment"])
@@ -201,7 +192,8 @@ class _Supervisor:
                 run.watch(self.jobs, parent)
             finally:
                 run.end()
-            return _finished(run, launched.notes, _drawn(folder, job["figures"]))
+            trace = _notes(launched.shared, folder + _NOTES)
+            return _finished(run, trace, _drawn(folder, job["figures"]))
         finally:
             if folder and not isinstance(launched, ScriptProcess):
                 remove_folder(folder)
@@ -217,8 +209,7 @@ class _Supervisor:
         try:
             prepare = functools.partial(self._prepare_script, job, stdout, stderr, os.getpid())
             if not self._can_fork(job):
-                pid = _spawn(start, prepare)
-                return Launched(pid, out, err, functools.partial(_notes, None, start))
+                return Launched(_spawn(start, prepare), out, err, None)
             shared = mmap.mmap(-1, _NOTES_BYTES)
             gc.freeze()  # a script's collector shall not look at, and so copy, what is here
             pid = os.fork()
@@ -227,7 +218,7 @@ class _Supervisor:
                 signal.set_wakeup_fd(-1)
                 os.closerange(3, max(self.awake, stderr, self.reports) + 16)
                 return ScriptProcess(job, environment, notes, shared, self.preloaded)
-            return Launched(pid, out, err, functools.partial(_notes, shared, start))
+            return Launched(pid, out, err, shared)
         except BaseException:
             os.close(out)
             os.close(err)
@@ -280,16 +271,18 @@ def _spawn(start: _Start, prepare: Callable[[], None]) -> int:
     return process.pid
 
 
-def _notes(shared: mmap.mmap | None, start: _Start) -> Notes | None:
-    """What a script has noted; `None` where it was ended before it took notes."""
-    data, job = b"", start["job"]
+def _notes(shared: mmap.mmap | None, overflow: str) -> bytes:
+    """What a script has noted, in shared memory and in files of a folder."""
+    parts = []
     if shared is not None:
         end = shared.find(b"\0\0")
-        data = shared[: end if end >= 0 else len(shared)]
+        parts.append(shared[: end if end >= 0 else len(shared)])
         shared.close()
-    elif not Path(start["notes"]).is_dir():
-        return None
-    return read_notes(data, start["notes"], job["root"], os.path.normpath(job["path"]))
+    with contextlib.suppress(OSError):
+        for path in sorted(Path(overflow).iterdir()):
+            with contextlib.suppress(OSError):
+                parts.append(path.read_bytes())
+    return b"\0".join(parts)
 
 
 def _has_threads() -> bool:
@@ -356,47 +349,35 @@ def _drawn(folder: str, names: Sequence[str]) -> list[bytes | None]:
     return found
 
 
-def _finished(
-    run: Watched, notes: Callable[[], Notes | None], figures: Sequence[bytes | None]
-) -> _Answer:
+def _finished(run: Watched, trace: bytes, figures: Sequence[bytes | None]) -> bytes:
     stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
-    stderr = _OUR_FRAME.sub(b"", stderr)
-    noted = notes()
-    trace = b"" if noted is None else json.dumps(noted).encode()
-    report: ChildReport = {
-        "end": run.over,
-        "status": run.exit_status(),
-        "seconds": run.seconds,
-        "missing": [],
-        "stdout": len(stdout),
-        "stderr": len(stderr),
-        "trace": len(trace),
-        "figures": [-1 if data is None else len(data) for data in figures],
-    }
-    return report, stdout, stderr, trace, [data for data in figures if data is not None]
+    status = run.exit_status()
+    outcome = run.limit or ("killed" if status < 0 else "failed" if status else "ok")
+    parts = stdout, _OUR_FRAME.sub(b"", stderr), trace, *figures
+    return _report(outcome, abs(status), run.seconds, parts=parts)
 
 
-def _unstartable(text: str) -> _Answer:
-    return _report("unstartable", status=2, stderr=text), b"", text.encode(), b"", []
+def _unstartable(text: str) -> bytes:
+    return _report("failed", 2, parts=(b"", text.encode(), b""))
 
 
 def _report(
-    end: Literal["missing", "unstartable"],
-    *,
+    outcome: str,
     status: int = 0,
-    missing: list[str] | None = None,
-    stderr: str = "",
-) -> ChildReport:
-    return {
-        "end": end,
+    seconds: float = 0.0,
+    missing: Sequence[str] = (),
+    parts: Sequence[bytes | None] = (b"", b"", b""),
+) -> bytes:
+    """A report as it is sent, with its parts."""
+    report: ChildReport = {
+        "outcome": outcome,
         "status": status,
-        "seconds": 0.0,
-        "missing": missing or [],
-        "stdout": 0,
-        "stderr": len(stderr.encode()),
-        "trace": 0,
-        "figures": [],
+        "seconds": seconds,
+        "missing": list(missing),
+        "lengths": [-1 if part is None else len(part) for part in parts],
     }
+    header = json.dumps(report).encode()
+    return b"".join((LENGTH.pack(len(header)), header, *filter(None, parts)))
 
 
 def remove_folder(folder: str) -> None:
@@ -432,12 +413,7 @@ def _read_exactly(fd: int, count: int) -> bytes | None:
     return data
 
 
-def _answer(fd: int, answer: _Answer) -> None:
-    report, stdout, stderr, trace, figures = answer
-    _send(fd, json.dumps(report).encode(), stdout, stderr, trace, *figures)
-
-
-def _send(fd: int, header: bytes, *blobs: bytes) -> None:
-    rest = memoryview(b"".join((LENGTH.pack(len(header)), header, *blobs)))
+def _send(fd: int, data: bytes) -> None:
+    rest = memoryview(data)
     while rest:
         rest = rest[os.write(fd, rest) :]

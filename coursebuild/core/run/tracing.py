@@ -15,8 +15,8 @@ A record is a letter and what it is about, in bytes:
 - `r` and a path: a file was read, or was to be and was not there
 - `l` and a path: a folder was listed
 - `m` and a name: a module was imported that is not Python's own, nor of the project
-- `n`, a folder, a tab and names: modules that were imported before the script began, and that it
-  would have found in this folder first
+- `v`, a folder of the project, a tab and names: modules that were looked for there in vain, or were
+  imported before the script began, which would have found them there first
 - `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
 - `p`: an initial state was moved, or a step halved; `s` and numbers: a state at its end (see
   `initial_state_perturbation`)
@@ -167,7 +167,8 @@ class Tracer:
         """Take notes; these modules are there already, and are looked for nowhere."""
         folder = self._project_folder(sys.path[0])
         if folder is not None:
-            self._note(f"n{folder}\t{','.join(sorted(modules))}")
+            names = sorted(name for name in modules if not self._is_frozen(name))
+            self._note(f"v{folder}\t{','.join(names)}")
         self._note("b")
 
     def read(self, path: object) -> None:
@@ -191,10 +192,17 @@ class Tracer:
             at = self._project_folder(folder)
             if at is None:
                 continue
-            for candidate in (f"{at}/{last}/__init__.py", f"{at}/{last}.py"):
-                self._note(f"r{candidate}")
-                if _exists(candidate):
-                    return
+            package, module = f"{at}/{last}/__init__.py", f"{at}/{last}.py"
+            is_package = _exists(package)
+            if last.isidentifier() and not is_package and not _exists(module):
+                self._note(f"v{at}\t{last}")
+                continue
+            self._note(f"r{package}")
+            if is_package:
+                return
+            self._note(f"r{module}")
+            if _exists(module):
+                return
         if not dot and name not in self._standard:
             self._note(f"m{name}")
             if name == "mujoco" and not self.has_mujoco:

@@ -7,16 +7,15 @@ orphans of the script become children of.
 from __future__ import annotations
 
 import contextlib
+import mmap
 import os
 import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
-
-from coursebuild.core.run.notes import Notes
 
 _EXITING = 0x4
 """A flag of a process, see proc_pid_stat(5): `PF_EXITING`."""
@@ -36,8 +35,8 @@ class Launched(NamedTuple):
     pid: int
     stdout: int
     stderr: int
-    notes: Callable[[], Notes | None]
-    """What it looked at, once it has ended; `None` where nobody took notes."""
+    shared: mmap.mmap | None
+    """Where it notes what it looks at, if that is shared with this process."""
 
 
 def has_ended(parent: int) -> bool:
@@ -64,7 +63,8 @@ class Watched:
         self.awake = awake
         self.stdout = bytearray()
         self.stderr = bytearray()
-        self.over: Literal["exit", "timeout", "output-limit"] = "exit"
+        self.limit: Literal["", "timeout", "output-limit"] = ""
+        """The limit that it has reached."""
         self.seconds = 0.0
         self.start = start
         self.deadline = start + timeout
@@ -89,7 +89,7 @@ class Watched:
             if tool in ready or os.getppid() != parent:
                 sys.exit(0)  # `end` and the removal of the folder happen on the way out
             if len(self.stdout) > STDOUT_LIMIT:
-                self.over = "output-limit"
+                self.limit = "output-limit"
                 return
 
     def end(self) -> None:
@@ -101,20 +101,20 @@ class Watched:
         for fd in list(self.pipes):
             while self._read(fd):
                 pass
-        if self.over == "exit" and len(self.stdout) > STDOUT_LIMIT:
-            self.over = "output-limit"
+        if not self.limit and len(self.stdout) > STDOUT_LIMIT:
+            self.limit = "output-limit"
         for fd in self._opened:
             os.close(fd)
 
     def exit_status(self) -> int:
         """Minus the signal's number where one ended it, which it does where a limit was reached."""
-        if self.status is None or self.over != "exit":
+        if self.status is None or self.limit:
             return -signal.SIGKILL
         return self.status
 
     def _ask_where(self) -> None:
         """Let the script say where it hangs: Python's fault handler answers SIGABRT."""
-        self.over = "timeout"
+        self.limit = "timeout"
         with contextlib.suppress(OSError):
             os.kill(self.pid, signal.SIGABRT)
         until = time.monotonic() + GRACE

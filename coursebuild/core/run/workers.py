@@ -6,7 +6,7 @@ Entry point: `Worker`.
 from __future__ import annotations
 
 import contextlib
-import itertools
+import io
 import json
 import os
 import select
@@ -91,8 +91,8 @@ class Worker:
         self._buffer += data
         return bool(data)
 
-    def take_report(self) -> tuple[supervisor.ChildReport, bytes, bytes, bytes, bytes] | None:
-        """A whole report with output, error output, trace and figures, if it is here."""
+    def take_report(self) -> tuple[supervisor.ChildReport, list[bytes | None]] | None:
+        """A whole report with its parts, if it is here."""
         size = supervisor.LENGTH.size
         if len(self._buffer) < size:
             return None
@@ -101,16 +101,11 @@ class Worker:
         if len(self._buffer) < at:
             return None
         report: supervisor.ChildReport = json.loads(self._buffer[size:at])
-        ends = [at + report["stdout"]]
-        ends += [ends[-1] + report["stderr"]]
-        ends += [ends[-1] + report["trace"]]
-        ends += [ends[-1] + sum(max(size, 0) for size in report["figures"])]
-        if len(self._buffer) < ends[-1]:
+        if len(self._buffer) < at + sum(max(length, 0) for length in report["lengths"]):
             return None
-        data = bytes(self._buffer)
+        rest = io.BytesIO(self._buffer[at:])
         self._buffer.clear()
-        out, err, trace, figures = (data[a:b] for a, b in itertools.pairwise([at, *ends]))
-        return report, out, err, trace, figures
+        return report, [None if length < 0 else rest.read(length) for length in report["lengths"]]
 
     def status(self) -> int:
         """What ended it, once it is gone: minus a signal's number, or an exit status."""

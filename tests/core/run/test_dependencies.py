@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from random import Random
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
@@ -19,10 +15,9 @@ from coursebuild.core.run.dependencies import (
     Kind,
     Need,
     described,
-    folded,
     forgotten,
     input_changes,
-    needs,
+    looked_at,
     sought,
     sought_files,
     state_changes,
@@ -30,8 +25,13 @@ from coursebuild.core.run.dependencies import (
 
 AROUND = (("Python", "CPython 3.11.7"), ("platform", "linux x86_64"))
 INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), AROUND)
-PLACES = (("course", "/home/me/course"), ("library", "/opt/tool"), ("home", "/home/me"))
+Places = tuple[tuple[str, str], ...]
+PLACES: Places = (("course", "/home/me/course"), ("library", "/opt/tool"), ("home", "/home/me"))
 NOTHING = Trace((), (), (), (), "")
+
+
+def state(need: Need) -> str:
+    return f"of {need.name}"
 
 
 def run(
@@ -41,12 +41,6 @@ def run(
     return replace(base, **fields)  # type: ignore[arg-type]
 
 
-# --- keys
-
-
-# --- needs
-
-
 def test_needs_of_a_run() -> None:
     trace = Trace(
         files=("models/a.xml", "models/b.xml"),
@@ -54,25 +48,30 @@ def test_needs_of_a_run() -> None:
         outside=("/etc/hosts", "/opt/tool/mjcourse/spatial.py", "/opt/tool/mjcourse/__init__.py"),
         modules=("numpy",),
         opaque="",
+        sought=("examples/{ast,json}",),
     )
-    found = needs(run(trace=trace), ("scipy.optimize", "numpy"), PLACES)
+    found = looked_at(run(trace=trace), ("scipy.optimize", "numpy"), PLACES, state)
     assert found == (
-        Need(Kind.FILE, "models/a.xml"),
-        Need(Kind.FILE, "models/b.xml"),
-        Need(Kind.LISTING, "models"),
-        Need(Kind.MODULE, "mjcourse"),
-        Need(Kind.MODULE, "numpy"),
-        Need(Kind.MODULE, "scipy"),
-        Need(Kind.OUTSIDE, "/etc/hosts"),
+        Dependency(Kind.FILE, "models/a.xml", "of models/a.xml"),
+        Dependency(Kind.FILE, "models/b.xml", "of models/b.xml"),
+        Dependency(Kind.LISTING, "models", "of models"),
+        Dependency(Kind.MODULE, "mjcourse", "of mjcourse"),
+        Dependency(Kind.MODULE, "numpy", "of numpy"),
+        Dependency(Kind.MODULE, "scipy", "of scipy"),
+        Dependency(Kind.OUTSIDE, "/etc/hosts", "of /etc/hosts"),
+        Dependency(Kind.SOUGHT, "examples/{ast,json}", ""),  # it was not there, whatever is now
     )
+    assert looked_at(run(trace=None), (), PLACES, state) == ()
 
 
 def test_who_prints_a_path_of_this_machine_depends_on_it() -> None:
-    found = needs(run(stdout="read /home/me/course/models/a.xml\n"), (), PLACES)
-    assert found == (Need(Kind.PLACE, "course"), Need(Kind.PLACE, "home"))
-    assert needs(run(stdout="nothing\n", stderr="/home/me/course"), (), PLACES) == ()
-    short = (("course", "/"), ("library", "/opt/tool"), ("home", ""))
-    assert needs(run(stdout="1/2 of it\n"), (), short) == ()
+    def places(stdout: str, places: Places = PLACES, stderr: str = "") -> list[str]:
+        found = looked_at(run(stdout=stdout, stderr=stderr), (), places, state)
+        return [one.name for one in found if one.kind is Kind.PLACE]
+
+    assert places("read /home/me/course/models/a.xml\n") == ["course", "home"]
+    assert places("nothing\n", stderr="/home/me/course") == []
+    assert places("1/2 of it\n", (("course", "/"), ("library", "/opt/tool"), ("home", ""))) == []
 
 
 # --- what is not remembered
@@ -187,24 +186,7 @@ def test_dependencies_as_lines() -> None:
     ]
 
 
-def test_modules_sought_in_vain_are_one_need_a_folder() -> None:
-    def pair(package: str) -> list[Need]:
-        return [Need(Kind.FILE, f"{package}{end}") for end in (".py", "/__init__.py")]
-
-    there = Need(Kind.FILE, "examples/helper.py")
-    lone = Need(Kind.FILE, "examples/data.py")
-    odd = pair("examples/no-module") + pair("examples/a,b")
-    vain = [*pair("examples/json"), *pair("examples/ast"), *pair("lib/x{y/re")]
-    here = [*pair("examples/helper"), Need(Kind.MODULE, "numpy")]
-    states = {there: "1"}
-    found = folded([*vain, *here, lone, *odd], lambda need: states.get(need, ABSENT))
-    assert set(found) == {
-        Need(Kind.SOUGHT, "examples/{ast,json}"),
-        Need(Kind.SOUGHT, "lib/x{y/{re}"),
-        *here,
-        lone,
-        *odd,
-    }
+def test_files_of_modules_that_were_sought() -> None:
     assert sought("lib/x{y/{re}") == ("lib/x{y", ("re",))
     assert sought_files("examples/{ast,json}") == (
         "examples/ast.py",
@@ -212,31 +194,4 @@ def test_modules_sought_in_vain_are_one_need_a_folder() -> None:
         "examples/json.py",
         "examples/json/__init__.py",
     )
-
-
-PARTS = st.lists(st.sampled_from(("a", "b-c", "__init__", "é")), min_size=1, max_size=3)
-NAMED = st.builds(
-    lambda parts, end: "/".join(parts) + end,
-    PARTS,
-    st.sampled_from((".py", "/__init__.py", "", ".txt")),
-)
-
-
-@given(st.sets(NAMED), st.sets(NAMED), st.randoms())
-def test_folding_leaves_nothing_out(names: set[str], there: set[str], random: Random) -> None:
-    def state(need: Need) -> str:
-        return "1" if need.name in there else ABSENT
-
-    needed = [Need(Kind.FILE, name) for name in sorted(names)] + [Need(Kind.MODULE, "a.py")]
-    found = folded(needed, state)
-    random.shuffle(needed)
-    assert folded(needed, state) == found
-    left = {need.name for need in found if need.kind is Kind.FILE}
-    hidden = [one for need in found if need.kind is Kind.SOUGHT for one in sought_files(need.name)]
-    assert sorted([*left, *hidden]) == sorted(names)
-    assert not there.intersection(hidden)
-    folders = [sought(need.name)[0] for need in found if need.kind is Kind.SOUGHT]
-    assert len(folders) == len(set(folders))
-    modules = (name.removesuffix(".py") for name in left if name.endswith(".py"))
-    pairs = [(f"{m}.py", f"{m}/__init__.py") for m in modules if m.split("/")[-1].isidentifier()]
-    assert all(pair[1] not in left or there.intersection(pair) for pair in pairs)
+    assert sought_files("/{ast}") == ("ast.py", "ast/__init__.py")

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mjcf, mjcf_worker
 from coursebuild.core.run.mjcf import (
-    compile_models,
-    compile_texts,
+    TEXT_PATH,
+    TIMEOUT,
+    compile_all,
     error_line,
     model_files,
     readable_error,
 )
-from coursebuild.core.text.source import Source
 
 pytestmark = pytest.mark.site
 
@@ -68,16 +68,21 @@ def root(tmp_path: Path) -> Path:
     return root
 
 
-def model(root: Path, name: str, text: str) -> MjcfModel:
+def model(root: Path, name: str, text: str) -> CompileResult:
     path = root / "models" / f"{name}.xml"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
-    return MjcfModel(name, Source(f"models/{name}.xml", text))
+    (result,) = compile_all(root, [(f"models/{name}.xml", text)])
+    return result
 
 
 def text(root: Path, xml: str) -> CompileResult:
-    (result,) = compile_texts(root, [xml])
+    (result,) = texts(root, [xml])
     return result
+
+
+def texts(root: Path, xmls: Sequence[str], timeout: float = TIMEOUT) -> tuple[CompileResult, ...]:
+    return compile_all(root, [(TEXT_PATH, xml) for xml in xmls], timeout=timeout)
 
 
 MAIN = """<mujoco>
@@ -91,7 +96,7 @@ MAIN = """<mujoco>
 
 class TestFacts:
     def test_facts(self, root: Path) -> None:
-        (result,) = compile_models(root, [model(root, "robots/arm", ARM)])
+        result = model(root, "robots/arm", ARM)
         assert result == CompileResult(
             "",
             None,
@@ -118,7 +123,7 @@ class TestFacts:
         assert facts is not None and facts.integrator == name
 
     def test_everything_that_is_pulled_in(self, root: Path) -> None:
-        (result,) = compile_models(root, [model(root, "main", MAIN)])
+        result = model(root, "main", MAIN)
         assert result.facts is not None, result.error
         assert result.facts.includes == (
             "models/child.xml",
@@ -166,14 +171,13 @@ class TestFacts:
     def test_a_link_is_a_part_by_its_own_name(self, root: Path) -> None:
         """It may lead elsewhere the next time."""
         (root / "models/link.xml").symlink_to("child.xml")
-        (result,) = compile_models(root, [model(root, "m", MAIN.replace("child.xml", "link.xml"))])
+        result = model(root, "m", MAIN.replace("child.xml", "link.xml"))
         assert result.facts is not None, result.error
         assert "models/link.xml" in result.facts.includes
 
     def test_a_model_is_compiled_as_it_was_read(self, root: Path) -> None:
-        read = model(root, "m", "<mujoco/>")
         (root / "models/m.xml").write_text("<broken")
-        (result,) = compile_models(root, [read])
+        (result,) = compile_all(root, [("models/m.xml", "<mujoco/>")])
         assert result.error == ""
 
     def test_byte_order_mark(self, root: Path) -> None:
@@ -272,10 +276,8 @@ class TestMessages:
         assert text(root, xml.format("none")).line == 4
 
     def test_a_file_that_includes_itself(self, root: Path) -> None:
-        result = compile_models(
-            root, [model(root, "m", '<mujoco><include file="m.xml"/></mujoco>')]
-        )
-        assert "already included" in result[0].error
+        result = model(root, "m", '<mujoco><include file="m.xml"/></mujoco>')
+        assert "already included" in result.error
 
     @pytest.mark.parametrize(
         ("message", "line"),
@@ -307,7 +309,7 @@ class TestNothingStaysBehind:
             "</worldbody></mujoco>"
         )
         for limit in (0.5, 8.0, 120.0):  # what comes to an end may take its time
-            first, second = compile_texts(root, [endless, "<mujoco/>"], timeout=limit)
+            first, second = texts(root, [endless, "<mujoco/>"], timeout=limit)
             assert first.facts is None
             assert first.error == f"MuJoCo's compiler took longer than {limit:g} s"
             if second.error == "":
@@ -315,9 +317,7 @@ class TestNothingStaysBehind:
         assert second.error == ""
 
     def test_a_model_of_any_size(self, root: Path) -> None:
-        first, second = compile_texts(
-            root, ['<mujoco><size memory="90000G"/></mujoco>', "<mujoco/>"]
-        )
+        first, second = texts(root, ['<mujoco><size memory="90000G"/></mujoco>', "<mujoco/>"])
         assert "allocate memory" in first.error
         assert second.error == ""
 
@@ -343,14 +343,14 @@ class TestNothingStaysBehind:
 
     @pytest.mark.usefixtures("bad_worker")
     def test_a_compiler_that_crashes(self, root: Path) -> None:
-        texts = [
+        xmls = [
             "<mujoco/>",
             "<!-- crash -->",
             "<mujoco/>",
             "<!-- exit -->",
             "<mujoco model='noise'/>",
         ]
-        results = compile_texts(root, texts)
+        results = texts(root, xmls)
         assert [r.error for r in results] == [
             "",
             "MuJoCo's compiler crashed (SIGSEGV)",

@@ -9,11 +9,9 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf
-from coursebuild.core.run.model_memory import compile_all
-from coursebuild.core.text.source import Source
+from coursebuild.core.run.model_memory import compile_kept
 
 pytestmark = pytest.mark.site
 
@@ -41,28 +39,22 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     asked: list[str] = []
     real = mjcf.compile_all
 
-    def compile(root: Path, models: list[MjcfModel], texts: list[str]) -> object:
-        asked.extend([model.name for model in models] + texts)
-        return real(root, models, texts)
+    def compile(root: Path, texts: list[tuple[str, str]]) -> object:
+        asked.extend(text if path == mjcf.TEXT_PATH else Path(path).stem for path, text in texts)
+        return real(root, texts)
 
     monkeypatch.setattr(mjcf, "compile_all", compile)
     return asked
 
 
-def models(root: Path) -> list[MjcfModel]:
-    found = []
-    for path in sorted((root / "models").glob("*.xml")):
-        found.append(MjcfModel(path.stem, Source(f"models/{path.name}", path.read_text())))
-    return found
-
-
 def run(
     root: Path, texts: tuple[str, ...] = (), *, fresh: bool = False
 ) -> dict[str, CompileResult]:
-    read = models(root)
-    of_models, of_texts = compile_all(root, Memo(root, fresh=fresh), read, texts)
-    named = {model.name: result for model, result in zip(read, of_models, strict=True)}
-    return named | dict(zip(texts, of_texts, strict=True))
+    found = {path.stem: path.read_text() for path in sorted((root / "models").glob("*.xml"))}
+    given = [(f"models/{name}.xml", text) for name, text in found.items()]
+    given += [(mjcf.TEXT_PATH, text) for text in texts]
+    results = compile_kept(root, Memo(root, fresh=fresh), given)
+    return dict(zip([*found, *texts], results, strict=True))
 
 
 def test_nothing_is_compiled_twice(root: Path, compiled: list[str]) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from coursebuild.core.engine.digests import Digests
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.run.packages import ABSENT, Installed
 
@@ -43,8 +42,7 @@ def later(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def ask(tmp_path: Path, site: Path) -> Installed:
-    store = Memo(tmp_path)
-    return Installed(store, Digests(store), [str(site)])
+    return Installed(Memo(tmp_path), [str(site)])
 
 
 def test_versions(tmp_path: Path, site: Path) -> None:
@@ -108,6 +106,5 @@ def test_the_first_on_the_path_counts(tmp_path: Path, site: Path) -> None:
     user = tmp_path / "user/site-packages"
     user.mkdir(parents=True)
     install(user, "Some-Tool", "9", ["tool/__init__.py"])
-    store = Memo(tmp_path)
-    found = Installed(store, Digests(store), [str(user), str(site), str(tmp_path / "none")])
+    found = Installed(Memo(tmp_path), [str(user), str(site), str(tmp_path / "none")])
     assert found.version("tool") == "Some-Tool 9"

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from msgspec.structs import replace
-
-from coursebuild.core.model.results import Outcome
+from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.dependencies import Inputs
-from coursebuild.core.run.run_record import RunRecord, from_bytes, to_bytes
+from coursebuild.core.run.run_record import from_bytes, record_of, to_bytes
 
 HERE = (("course", "/home/me/course"), ("prefix", "/opt/venv"), ("home", "/home/me"))
 THERE = (("course", "/ci/build"), ("prefix", "/usr"), ("home", "/root"))
 INPUTS = Inputs("examples/a.py", "0" * 64, (), 10.0, (), (("Python", "3.11"),))
-RECORD = RunRecord(INPUTS, (), Outcome.OK, 0, 0.25, 1_700_000_000, "", "out\n", "")
 
 
 def test_a_traceback_is_moved_to_another_machine() -> None:
@@ -21,8 +18,8 @@ def test_a_traceback_is_moved_to_another_machine() -> None:
         "/home/me/course/examples/a.py:3: UserWarning: ~ is /home/me and /home/mexico\n"
         "a/home/me/course stays, /home/me/courses is in the home folder\n"
     )
-    record = replace(RECORD, outcome=Outcome.FAILED, status=1, stderr=stderr)
-    kept = to_bytes(record, HERE)
+    run = ScriptRun("examples/a.py", Outcome.FAILED, 1, "out\n", stderr, 0.25)
+    kept = to_bytes(record_of(INPUTS, (), 1_700_000_000, "", run), HERE)
     assert b"/home/me/course/" not in kept and b"/opt/venv" not in kept
     found = from_bytes(kept)
     assert found is not None

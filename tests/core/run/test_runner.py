@@ -14,13 +14,7 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome
-from coursebuild.core.run.runner import (
-    RunEvent,
-    RunFinished,
-    RunStarted,
-    ScriptServer,
-    clean_environment,
-)
+from coursebuild.core.run.runner import ScriptServer, clean_environment
 from support.runners import SOURCE_TREE, TOOL, Run, both_ways, hangs, job
 
 pytestmark = pytest.mark.site
@@ -91,16 +85,18 @@ class TestOutcomes:
 
     def test_skipped_and_norun(self, server: ScriptServer, root: Path) -> None:
         (root / "examples/x.py").write_text("print(1)")
-        events: list[RunEvent] = []
+        told: list[object] = []
         jobs = [
             job(requires=["no_such_module", "json", "json.no_such", "no_such_module.sub"]),
             job("examples/none.py", norun=True),
         ]
-        skipped, norun = server.run(root, jobs, parallel=4, on_event=events.append)
+        skipped, norun = server.run(
+            root, jobs, parallel=4, started=told.append, finished=told.append
+        )
         assert skipped.outcome is Outcome.SKIPPED
         assert skipped.missing == ("no_such_module", "json.no_such", "no_such_module.sub")
         assert (norun.outcome, norun.stdout) == (Outcome.NORUN, "")
-        assert events == [RunStarted("examples/x.py", 1), RunFinished(skipped, 1, 1)]
+        assert told == ["examples/x.py", skipped]
 
     def test_what_is_required_is_found_and_not_imported(self, run: Run, root: Path) -> None:
         (root / "examples/sibling.py").write_text("raise SystemExit('imported')")

@@ -9,15 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.model.results import Outcome
-from coursebuild.core.run.runner import (
-    RunEvent,
-    RunFinished,
-    RunStarted,
-    RunStoppedError,
-    ScriptServer,
-    run_scripts,
-)
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.run.runner import RunStoppedError, ScriptServer
 from support.runners import (
     SOURCE_TREE,
     TOOL,
@@ -103,7 +96,8 @@ class TestNothingStaysBehind:
         ):
             (root / f"examples/{name}.py").write_text(code)
         jobs = [job("examples/a.py"), job("examples/b.py"), job("examples/b.py")]
-        a, *others = run_scripts(root, jobs, parallel=1, fork=fork)
+        with ScriptServer(fork=fork) as server:
+            a, *others = server.run(root, jobs, parallel=1)
         assert (a.outcome, a.status) == (Outcome.KILLED, 9)
         assert "the process that supervises this script was ended by SIGKILL" in a.stderr
         assert [r.stdout for r in others] == ["b\n", "b\n"]
@@ -172,12 +166,11 @@ class TestNothingStaysBehind:
             "import os, time\nwhile not os.path.exists('examples/me'): time.sleep(0.01)\n"
         )
 
-        def listen(event: RunEvent) -> None:
-            if isinstance(event, RunFinished):
-                raise RuntimeError("listener")
+        def listen(run: ScriptRun) -> None:
+            raise RuntimeError("listener")
 
         with pytest.raises(RuntimeError, match="listener"):
-            server.run(root, [job(), job("examples/y.py")], parallel=2, on_event=listen)
+            server.run(root, [job(), job("examples/y.py")], parallel=2, finished=listen)
         assert not alive(wait_for(root / "examples/me"))
 
 
@@ -190,16 +183,13 @@ class TestMany:
         for i in (1, 2):
             (root / f"examples/{i}.py").write_text(f"print({i})")
         (root / "examples/3.py").write_text("print(3)\nopen('examples/met', 'w').close()")
-        events: list[RunEvent] = []
+        started: list[str] = []
+        finished: list[ScriptRun] = []
         jobs = [job(f"examples/{i}.py") for i in range(4)]
-        runs = server.run(root, jobs, parallel=2, on_event=events.append)
+        runs = server.run(root, jobs, parallel=2, started=started.append, finished=finished.append)
         assert [r.stdout for r in runs] == ["0\n", "1\n", "2\n", "3\n"]
-        started = [e.path for e in events if isinstance(e, RunStarted)]
-        finished = [e.run for e in events if isinstance(e, RunFinished)]
         assert started == [j.path for j in jobs]
         assert sorted(finished, key=lambda r: r.path) == list(runs)
-        assert [e.done for e in events if isinstance(e, RunFinished)] == [1, 2, 3, 4]
-        assert {e.total for e in events} == {4}
 
     @pytest.mark.parametrize("parallel", [1, 3])
     def test_so_many_at_a_time_and_no_more(
@@ -214,19 +204,17 @@ class TestMany:
         (root / "examples/x.py").write_text(code)
         running = [0]
 
-        def listen(event: RunEvent) -> None:
-            running.append(running[-1] + (1 if isinstance(event, RunStarted) else -1))
-
         jobs = [job(args=[str(parallel)])] * 6
-        runs = server.run(root, jobs, parallel=parallel, on_event=listen)
+        runs = server.run(
+            root,
+            jobs,
+            parallel=parallel,
+            started=lambda path: running.append(running[-1] + 1),
+            finished=lambda run: running.append(running[-1] - 1),
+        )
         assert {run.outcome for run in runs} == {Outcome.OK}
         assert max(running) == parallel
 
     def test_nothing_to_do(self, server: ScriptServer, root: Path) -> None:
         assert server.run(root, [], parallel=4) == ()
         assert server.run(root, [job(norun=True)] * 2, parallel=4)[1].outcome is Outcome.NORUN
-
-    def test_supervisors_serve_many(self, server: ScriptServer, root: Path) -> None:
-        (root / "examples/x.py").write_text("import os\nprint(os.getppid())")
-        runs = server.run(root, [job()] * 8, parallel=2)
-        assert len({r.stdout for r in runs}) == 2

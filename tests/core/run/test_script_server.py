@@ -9,12 +9,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run.runner import (
-    RunEvent,
-    RunStarted,
-    ScriptServer,
-    run_scripts,
-)
+from coursebuild.core.run.runner import ScriptServer
 from support.runners import gone
 
 pytestmark = pytest.mark.site
@@ -91,16 +86,3 @@ class TestServer:
         runs = forking.run(root, [soil, look, soil, look], parallel=1)
         expected = "3.141592653589793 warn None False True True True 1000 0.6666666666666666\n"
         assert [run.stdout for run in runs] == ["", expected] * 2
-
-    def test_order(self, root: Path) -> None:
-        jobs = [self.script(root, f"print({i})", f"examples/{i}.py") for i in range(4)]
-        started: list[str] = []
-
-        def listen(event: RunEvent) -> None:
-            if isinstance(event, RunStarted):
-                started.append(event.path)
-
-        order = [2, 0, 3, 1]
-        runs = run_scripts(root, jobs, parallel=1, order=order, on_event=listen)
-        assert started == [jobs[i].path for i in order]
-        assert [run.stdout for run in runs] == ["0\n", "1\n", "2\n", "3\n"]

@@ -169,7 +169,7 @@ def test_the_labs_of_lesson_4_2_are_exported(tmp_path: Path) -> None:
     assert loaded.course is not None
     lesson = next(lesson for lesson in loaded.course.lessons if lesson.id == "4.2")
     models = loaded.course.models
-    compiled, _ = compile_all(root, models, [])
+    compiled = compile_all(root, [(model.source.path, model.source.text) for model in models])
     facts = {model.name: result for model, result in zip(models, compiled, strict=True)}
     options = Options(root=root, jobs=1, quiet=True)
     documents = frozenset({lesson.path})

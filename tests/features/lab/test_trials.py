@@ -144,7 +144,7 @@ def test_failure_of_a_lab_is_kept_and_one_that_took_too_long_is_not(tmp_path: Pa
     lab = '{{"model": "ball", "verify": {{"seconds": {}}}, "setup": "{}"}}'
     fences = fence(lab.format(0.1, "null.x")) + fence(lab.format(20, ""))
     course = make_course(fences, models={"ball": BALL})
-    models = {"ball": compile_all(tmp_path, course.models, [])[0][0]}
+    models = {"ball": compile_all(tmp_path, [("models/ball.xml", BALL)])[0]}
     options = Options(root=tmp_path, jobs=1, quiet=True)
     found = []
     with closing(OpenEngines(tmp_path)) as engines:
