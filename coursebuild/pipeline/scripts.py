@@ -166,10 +166,14 @@ def _run(
 
     memory.begin()
     run_all = run_all or options.run_all or run_scripts
-    told = {"started": started, "finished": finished}
     with progress.stage(stage, count):
-        ordered = longest_first(todo, seconds)
-        return run_all(options.root, ordered, parallel=options.jobs, **told)
+        return run_all(
+            options.root,
+            longest_first(todo, seconds),
+            parallel=options.jobs,
+            started=started,
+            finished=finished,
+        )
 
 
 def recorded_outputs(course: Course, documents: Collection[str] | None = None) -> list[Recording]:

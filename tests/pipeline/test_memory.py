@@ -43,7 +43,7 @@ def test_a_result_is_remembered_whole(desk: Desk) -> None:
     fields = found.outcome, found.status, found.stdout, found.stderr, found.seconds, found.cached
     assert fields == (Outcome.OK, 0, "hello\n", "a warning\n", 2.5, True)
     last = desk.memory().last(PATH)
-    assert last is not None and last.seconds == 2.5
+    assert last is not None and last.kept.seconds == 2.5
 
 
 def test_failures_are_remembered_and_stopped_or_unwatched_runs_are_not(desk: Desk) -> None:
@@ -59,7 +59,7 @@ def test_failures_are_remembered_and_stopped_or_unwatched_runs_are_not(desk: Des
         desk.run(outcome=outcome, status=9)
         assert desk.recall() is None
         last = desk.memory().last(PATH)
-        assert last is not None and last.outcome is outcome and last.forgotten
+        assert last is not None and last.kept.outcome is outcome and last.forgotten
     desk.run(replace(NOTHING, opaque="it starts other programs"))
     assert (desk.recall(), desk.why()) == (None, "it starts other programs")
     desk.run(None)

@@ -14,7 +14,6 @@ What a script integrates itself, without a function of MuJoCo's that makes a ste
 from __future__ import annotations
 
 import contextlib
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from types import ModuleType
@@ -37,7 +36,7 @@ class _HalfSteps:
         self._numpy = numpy
         self._step, self._forward = mujoco.mj_step, mujoco.mj_forward
         self._lock = threading.RLock()  # threads may share a model
-        self._rollout = self._has_halved = False
+        self._has_halved = False
 
     def install(self) -> None:
         self._replace("mj_step", self._whole)
@@ -45,7 +44,7 @@ class _HalfSteps:
         self._replace("mj_step2", self._second)
         for name in _OWN:
             self._replace(name, self._own)
-        mujoco_tracing.wrap_functions(self._mujoco, ("mj_stateSize",), self._look_for)
+        mujoco_tracing.replace_rollout(self._mujoco, self._rollout)
 
     def _replace(self, name: str, halved: Callable[..., None]) -> None:
         """Put what makes two half steps in the place of a function that makes one."""
@@ -104,16 +103,8 @@ class _HalfSteps:
             self._has_halved = True
             mujoco_tracing.tracer.moved("p")
 
-    # --- rollouts
-
-    def _look_for(self, *_: object) -> None:
-        """Put another in the place of rollouts, which first ask for a size."""
-        module = None if self._rollout else sys.modules.get("mujoco._rollout")
-        owner: Any = getattr(module, "Rollout", None)
-        if owner is None:
-            return
-        self._rollout = True
-        real, numpy = owner.__dict__["rollout"].__get__(None, owner), self._numpy
+    def _rollout(self, real: Callable[..., None]) -> Callable[..., None]:
+        numpy = self._numpy
 
         def rollout(of: Any, models: Any, data: Any, nstep: int, spec: int, *rest: Any) -> None:
             """As MuJoCo's, in half steps."""
@@ -127,4 +118,4 @@ class _HalfSteps:
                     output[:] = halves[:, 1::2]
             self._note()
 
-        owner.rollout = rollout
+        return rollout

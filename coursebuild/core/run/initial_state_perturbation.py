@@ -22,9 +22,8 @@ The model, the time, controls and forces stay as they are.
 from __future__ import annotations
 
 import contextlib
-import sys
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -86,15 +85,13 @@ class _Perturbation:
         self._plans: dict[int, tuple[Any, _Plan]] = {}
         self._count = 0
         self._numbers = 0
-        self._rollout = False
         self._has_moved = False
 
     def install(self) -> None:
         wrap, mujoco = mujoco_tracing.wrap_functions, self._mujoco
         wrap(mujoco, _COMPUTING, self._before, self._after)
         wrap(mujoco, _INTEGRATING, None, self._after)
-        wrap(mujoco, ("mj_stateSize", "mj_getState"), self._look_for)
-        mujoco_tracing.wrap_method(mujoco.MjData, "__init__", self._look_for)
+        mujoco_tracing.replace_rollout(mujoco, self._rollout)
 
     # --- before and after MuJoCo computes
 
@@ -165,22 +162,14 @@ class _Perturbation:
 
     # --- rollouts
 
-    def _look_for(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        """Wrap the module of rollouts, once the script has imported it."""
-        module = None if self._rollout else sys.modules.get("mujoco._rollout")
-        owner: Any = getattr(module, "Rollout", None)
-        if owner is None:
-            return
-        self._rollout = True
-        real = owner.__dict__["rollout"].__get__(None, owner)
-
+    def _rollout(self, real: Callable[..., Any]) -> Callable[..., Any]:
         def rollout(*args: Any, **keywords: Any) -> Any:
             """As MuJoCo's, from states that were moved."""
             with contextlib.suppress(Exception):  # MuJoCo says what is wrong with its arguments
                 args = self._moved_rollout(args)
             return real(*args, **keywords)
 
-        owner.rollout = rollout
+        return rollout
 
     def _moved_rollout(self, args: tuple[Any, ...]) -> tuple[Any, ...]:
         models, initial = args[1], args[5]

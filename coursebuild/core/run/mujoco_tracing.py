@@ -164,6 +164,24 @@ def replace_function(mujoco: ModuleType, name: str, new: Callable[..., Any]) -> 
             setattr(module, name, new)
 
 
+def replace_rollout(mujoco: Any, new: Callable[[Callable[..., Any]], Callable[..., Any]]) -> None:
+    """Put what `new` makes of it in the place of MuJoCo's rollout, once a script has imported that.
+
+    Before a rollout it is asked for the size of a state, or data is made.
+    """
+    replaced = False
+
+    def look_for(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        nonlocal replaced
+        owner: Any = getattr(sys.modules.get("mujoco._rollout"), "Rollout", None)
+        if owner is not None and not replaced:
+            replaced = True
+            owner.rollout = new(owner.__dict__["rollout"].__get__(None, owner))
+
+    wrap_functions(mujoco, ("mj_stateSize", "mj_getState"), look_for)
+    wrap_method(mujoco.MjData, "__init__", look_for)
+
+
 def _read(path: str) -> None:
     if tracer is not None:
         tracer.read(path)

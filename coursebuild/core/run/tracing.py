@@ -192,17 +192,14 @@ class Tracer:
             at = self._project_folder(folder)
             if at is None:
                 continue
-            package, module = f"{at}/{last}/__init__.py", f"{at}/{last}.py"
-            is_package = _exists(package)
-            if last.isidentifier() and not is_package and not _exists(module):
+            candidates = f"{at}/{last}/__init__.py", f"{at}/{last}.py"
+            if last.isidentifier() and not any(map(_exists, candidates)):
                 self._note(f"v{at}\t{last}")
                 continue
-            self._note(f"r{package}")
-            if is_package:
-                return
-            self._note(f"r{module}")
-            if _exists(module):
-                return
+            for candidate in candidates:
+                self._note(f"r{candidate}")
+                if _exists(candidate):
+                    return
         if not dot and name not in self._standard:
             self._note(f"m{name}")
             if name == "mujoco" and not self.has_mujoco:
