@@ -29,6 +29,7 @@ export async function mountLab(element, texts) {
     const config = await response.json()
     const Kind = { simlab: Instrument, mjcf: Workbench }[config.kind ?? 'simlab']
     const instrument = await (Kind ? new Kind(element, config, base, words) : mountCustom(element, config, base, words))
+    moveFocus(element)
     const link = await readLink(window.location.hash)
     if (link?.id === config.id && link.state !== null) instrument.restore?.(link.state)
     return instrument
@@ -36,4 +37,10 @@ export async function mountLab(element, texts) {
     element.querySelector('.lab-title').after(h('p', { class: 'lab-message lab-is-wrong', role: 'alert' }, error.message))
     return null
   }
+}
+
+/** A reader who had come to the static form by keyboard goes on in the instrument that hides it. */
+function moveFocus(element) {
+  if (!element.querySelector('.lab-static')?.contains(document.activeElement)) return
+  element.querySelector('.lab-live :is(button, input, select, a[href], [tabindex])')?.focus({ preventScroll: true })
 }

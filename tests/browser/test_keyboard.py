@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from support.built_sites import Site
 from support.lab_page import becomes, until
@@ -155,3 +155,21 @@ def test_colours_search_and_a_question_by_key(sites: Mapping[str, Site], page: P
             break
     page.keyboard.press("Enter")
     expect(question.locator(".verdict")).to_have_text(re.compile(r"\S"))
+
+
+def test_the_focus_goes_on_in_a_lab_that_starts(sites: Mapping[str, Site], page: Page) -> None:
+    """The static form that had it is hidden, so the focus would be at no visible place."""
+    held: list[Route] = []
+    configs = re.compile(r"/assets/labs/.*\.json$")
+    page.route(configs, lambda route: held.append(route))
+    site = sites["full"]
+    page.goto(site.url(site.kinds()["lesson"]))
+    page.locator(".lab-static a:visible").first.focus()
+    becomes(page, lambda: len(held) > 0, True)
+
+    def goes_on() -> object:
+        while held:
+            held.pop().continue_()
+        return page.evaluate("document.activeElement.closest('.lab-live') !== null")
+
+    becomes(page, goes_on, True)

@@ -192,7 +192,11 @@ class Fallback(Struct, frozen=True):
 
 
 FALLBACKS = (
+    Fallback(TEXT, "normal", ("DejaVu Serif",), 0.51002),
+    Fallback(TEXT, "normal", ("Noto Serif",), 0.47671),
     Fallback(TEXT, "normal", ("Times New Roman", "Liberation Serif", "Tinos"), 0.39831),
+    Fallback(TEXT, "italic", ("DejaVu Serif Italic",), 0.51002),
+    Fallback(TEXT, "italic", ("Noto Serif Italic",), 0.46265),
     Fallback(
         TEXT,
         "italic",
@@ -201,8 +205,11 @@ FALLBACKS = (
     ),
     Fallback(CODE, "normal", ("Courier New", "Liberation Mono", "Cousine"), 0.60010),
 )
-"""The widths are those of Liberation Serif and Liberation Mono, which are made to match the
-others."""
+"""Of several for one face the last that a machine has is taken: browsers try later rules first.
+
+The widths are measured as `site/prepare_fonts.py` measures those of the web fonts; Liberation Serif
+and Liberation Mono are made to match the others beside them.
+"""
 
 
 def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:

@@ -10,6 +10,7 @@ from fontTools.ttLib import TTFont
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.fonts import (
     CODE,
+    FALLBACKS,
     MATH,
     TEXT,
     FontJob,
@@ -158,8 +159,10 @@ def test_the_list_of_fonts_says_what_they_hold(assets: Assets) -> None:
 def test_rules_have_fallbacks_of_the_same_measure(assets: Assets) -> None:
     found = jobs(assets, "text")
     css = face_rules((job, f"fonts/{job.face.file}") for job in found)
-    assert css.count("@font-face") == len(found) + 3
+    assert css.count("@font-face") == len(found) + len(FALLBACKS)
     assert 'font-family:"Source Serif 4 Variable fallback";font-style:normal;src:local(' in css
-    assert "size-adjust:111." in css
+    for local, scale in (("Times New Roman", "111."), ("DejaVu Serif", "87.1")):
+        rule = css.split(f'local("{local}"')[1].split("}")[0]
+        assert f"size-adjust:{scale}" in rule, "as wide as the web font"
     assert 'font-family:"STIX Two Math";font-style:normal;font-weight:400;' in css
     assert css.count("font-display:swap") == len(found)
