@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import hashlib
 import http.server
 import mimetypes
@@ -137,6 +138,10 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             self.send_header("Content-Encoding", "br")
         kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
         text = "; charset=utf-8" if kind.startswith("text/") else ""
+        # Hosts of static pages compress texts without a copy on the way, and so does this one.
+        if data and text and not copy.is_file() and "gzip" in self.headers.get("Accept-Encoding", ""):
+            data = gzip.compress(data, mtime=0)
+            self.send_header("Content-Encoding", "gzip")
         self.send_header("Content-Type", kind + text)
         self.send_header("Vary", "Accept-Encoding")
         self.send_header("ETag", tag)
