@@ -1,7 +1,7 @@
 """The scales of axes: where the ticks are, and what they say.
 
-Entry points: `ticks`, `tick_texts` (even); `log_ticks`, `decades`, `power_text`
-(logarithmic); `number_text`.
+Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (even); `log_ticks`, `decades`,
+`power_text`, `log` (logarithmic); `number_text`.
 """
 
 from __future__ import annotations
@@ -9,6 +9,44 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+
+from msgspec import Struct
+
+_LARGEST = 290.0
+"""Powers of ten beyond this are drawn there."""
+
+
+class Scale(Struct, frozen=True):
+    """From values to places on a drawing; what is beyond an end is drawn there."""
+
+    start: float
+    end: float
+    """Places; the end may be before the start."""
+    low: float
+    high: float
+    """The values there; powers of ten where it is logarithmic."""
+    logarithmic: bool = True
+
+    def __call__(self, value: float) -> float:
+        """The place of a value."""
+        at = log(value) if self.logarithmic else value
+        part = (at - self.low) / (self.high - self.low)
+        return self.start + min(max(part, 0.0), 1.0) * (self.end - self.start)
+
+    def ticks(self, most: int) -> list[tuple[float, str]]:
+        """Places and texts of the ticks, no more than `most`."""
+        if self.logarithmic:
+            found = log_ticks(self.low, self.high, most)
+            return [(self(10.0**exponent), text) for exponent, text in found]
+        values = ticks(self.low, self.high, most)
+        return [(self(v), text) for v, text in zip(values, tick_texts(values), strict=True)]
+
+
+def log(value: float) -> float:
+    """The power of ten that a value is, within what can be drawn."""
+    if not value > 0:
+        return -_LARGEST
+    return min(max(math.log10(value), -_LARGEST), _LARGEST)
 
 
 def ticks(low: float, high: float, about: int = 5) -> list[float]:

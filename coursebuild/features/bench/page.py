@@ -93,18 +93,18 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     """The report without its plot, and what is to be seen in the plot."""
-    from coursebuild.numerics.reports.points import chart, described, telling
+    from coursebuild.numerics.reports.plot import work_precision
 
     page, report = writer.page, _shown(writer.page, block).report
     if isinstance(report, SweepReport):
         report = None  # all that its plot shows is in its table
-    quantity = None if report is None or "plot" not in block.shows else telling(report)
     html = page.template("bench/bench.html", bench=_view(page, block), plots=())
     head, *rest = writer.html(html).split("\n\n")
-    if report is not None and quantity is not None:
+    if report is not None and "plot" in block.shows:
         silent = replace(report, verdict=replace(report.verdict, text=""))  # the block says it
-        said = ". ".join(described(silent, chart(report, quantity)))
-        rest.insert(0, guarded(escaped(said)))
+        plot = work_precision(silent)
+        if plot is not None:
+            rest.insert(0, guarded(escaped(f"{plot.title}. {plot.text}")))
     return "\n\n".join((head, *rest))
 
 

@@ -120,7 +120,7 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (words("measured.realtime"), [factor(row.realtime) for row in rows]),
         (words("measured.seconds"), [_time(row) for row in rows]),
-        *(error(quantity) for quantity in quantities(report) if _is_known(quantity, report)),
+        *(error(quantity) for quantity in quantities(report) if quantity.tells(rows)),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
         (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
@@ -135,12 +135,6 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
 
 def _time(row: WorkPrecisionRow) -> str:
     return "" if row.seconds is None else seconds_text(row.seconds.value, 3)
-
-
-def _is_known(quantity: Quantity, report: ScenarioReport) -> bool:
-    """Whether any error is more than what the reference does not resolve."""
-    errors = (quantity.of(row) for row in report.rows)
-    return any(one is not None and one > quantity.least * (1 + 1e-9) for one in errors)
 
 
 def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:

@@ -32,7 +32,7 @@ from coursebuild.features.bench.scenarios import (
     stable_cells,
     stable_title,
 )
-from coursebuild.numerics.reports.case_plot import CaseQuantity, case_quantities, case_svg
+from coursebuild.numerics.reports.case_plot import case_quantities, case_svg
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
@@ -40,7 +40,7 @@ from coursebuild.numerics.reports.cases import (
     FigureLine,
     merged,
 )
-from coursebuild.numerics.reports.points import KNOWN, seconds_text, status_text
+from coursebuild.numerics.reports.points import KNOWN, Quantity, seconds_text, status_text
 from coursebuild.numerics.reports.records import STABILITY
 
 _RIGHT = 1e-3
@@ -156,7 +156,7 @@ def _case(words: Strings, report: CaseReport) -> CaseView:
     )
 
 
-def _about(words: Strings, report: CaseReport, shown: Sequence[CaseQuantity]) -> Iterator[str]:
+def _about(words: Strings, report: CaseReport, shown: Sequence[Quantity]) -> Iterator[str]:
     costs = [(cost, one) for one in KNOWN if (cost := report.cost_to(one, _RIGHT)) is not None]
     if costs:
         (least, best), (most, worst) = min(costs), max(costs)

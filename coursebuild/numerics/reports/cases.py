@@ -107,11 +107,11 @@ class CaseReport(Record, frozen=True):
     errors: tuple[ErrorLine, ...]
     costs: tuple[StepCost, ...]
 
-    def cost(self, line: ErrorLine) -> float | None:
+    def cost(self, line: ErrorLine) -> Interval | None:
         """Processor time for a simulated second, s; `None` where the integrator was not timed."""
-        found = (one.seconds.value for one in self.costs if one.integrator == line.integrator)
+        found = (one.seconds for one in self.costs if one.integrator == line.integrator)
         step = next(found, None)
-        return None if step is None else step / line.timestep
+        return None if step is None else step.scaled(1 / line.timestep)
 
     def cost_to(self, integrator: str, error: float) -> float | None:
         """The same for what is right to an error, m or rad; `None` where no run is.
@@ -119,17 +119,17 @@ class CaseReport(Record, frozen=True):
         Between two runs it goes by powers. No timestep longer than those tried is thought of.
         """
         runs = sorted(
-            (cost, max(pair[0] for pair in places))
+            (cost.value, max(pair[0] for pair in places))
             for line in self.errors
             if line.integrator == integrator and (cost := self.cost(line)) is not None
             if (places := [pair for pair in (line.position, line.attitude) if pair is not None])
         )
         if runs and runs[0][1] <= error:
             return runs[0][0]
-        for (cost, much), (more, less) in pairwise(runs):
+        for (little, much), (more, less) in pairwise(runs):
             if less <= error < much:
                 part = math.log(much / error) / math.log(much / less)
-                return float(cost * (more / cost) ** part)
+                return float(little * (more / little) ** part)
         return None
 
 

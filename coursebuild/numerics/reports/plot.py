@@ -1,72 +1,36 @@
-"""The work–precision plot of a scenario as SVG: error against cost, both logarithmic.
+"""The work–precision plot of a scenario as SVG: error against cost.
 
-Entry point: `plot_svg(report, …)`, for pages and for files of their own.
+Entry points: `plot_svg(report, …)`, for pages and for files of their own; `work_precision(report)`,
+what it shows.
 
-1. A line for each integrator, from long timesteps to short ones, with a colour, a mark and a dash
-   of its own. A mark is filled where the setting is on the Pareto front, and hollow where another
-   one is better. Small marks without a line have another solver, iterations or cone. Bars are the
-   intervals of the costs.
-2. Crosses at the upper edge are runs that were lost.
-3. A band below shows what the reference does not resolve.
-4. A ring is around the scene's own setting.
-
-Colours are variables of the page's style sheet with a value of their own to fall back on, set as
-attributes, since pages allow no styles inside of them. The same report gives the same bytes.
+1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
+   scene's own solver, iterations and cone; the rows with others are small marks beside it.
+2. A mark is filled where the setting is on the Pareto front, and hollow where another one is
+   better. A ring is around the scene's own setting. Bars are the intervals of the costs.
+3. A row that was not timed is put where its number of steps says: time goes by steps. Where nothing
+   at all was timed, the number of steps stands in for the cost.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import statistics
+from collections.abc import Iterator, Sequence
 
-from coursebuild.core.drawing.marks import markup_text, shortened, text_width
-from coursebuild.core.drawing.scales import number_text
-from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.numerics.reports.layout import (
-    NARROW,
-    SIZE,
-    TICK_SIZE,
-    WIDE,
-    Frame,
-    grid,
-    key,
-    log,
-    svg,
-    ticks_y,
-)
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
+from coursebuild.numerics.reports.chart import NARROW, WIDE, Chart, Line, Point, chart_svg
 from coursebuild.numerics.reports.points import (
-    Chart,
-    PlotLine,
-    Point,
+    KNOWN,
     Quantity,
-    chart,
-    described,
-    point_title,
+    integrator_rank,
+    interval_text,
     setting_text,
+    solving,
+    status_text,
     telling,
+    usual_setting,
 )
-from coursebuild.numerics.reports.strokes import (
-    FINE,
-    HALO,
-    MARK,
-    RING,
-    SMALL,
-    area,
-    bar,
-    colour,
-    cross,
-    label,
-    line_look,
-    path,
-    ring,
-    symbol,
-)
-
-_HEIGHT = {WIDE: 320.0, NARROW: 260.0}
-"""Of the plot itself, in the units of the drawing."""
-_TOP = 16.0
-"""Above it, for what was lost."""
-_NEAR = 1e-300
-"""An error of nothing is drawn here."""
+from coursebuild.numerics.reports.strokes import Entry
 
 STYLE = """\
 :root{color-scheme:light dark;background:light-dark(#fcfbf8,#17191c);color:light-dark(#484742,\
@@ -80,132 +44,148 @@ STYLE = """\
 
 
 def plot_svg(
-    report: ScenarioReport,
-    *,
-    name: str,
-    quantity: Quantity | None = None,
-    narrow: bool = False,
-    whole: bool = False,
+    report: ScenarioReport, *, name: str, narrow: bool = False, whole: bool = False
 ) -> str:
-    """The plot as an `svg` element.
+    """The plot as an `svg` element; empty where no row of the scenario has an error.
 
     Args:
         report: of the scenario.
         name: unlike those of all other plots on the page: what describes it has an id.
-        quantity: which error; the one that tells most where none is given.
         narrow: for narrow screens: the text has the same size there.
         whole: for a file of its own, which has no style sheet.
-
-    Returns:
-        The markup; empty where no row of the scenario has this error.
     """
-    shown = quantity or telling(report)
-    if shown is None:
+    chart = work_precision(report)
+    if chart is None:
         return ""
-    found = chart(report, shown)
-    if not any((*line.points, *line.others) for line in found.lines):
-        return ""
-    width = NARROW if narrow else WIDE
-    frame = _frame(report, found, width)
-    left = 6.0 if narrow else frame.left
-    below, height = key(_entries(report, found), left, frame.bottom + 62, width)
-    body = "".join(_parts(report, found, frame)) + below
-    style = STYLE if whole else ""
-    return svg(body, (width, height), name, described(report, found), style)
+    return chart_svg(chart, name, NARROW if narrow else WIDE, STYLE if whole else "")
 
 
-def _frame(report: ScenarioReport, found: Chart, width: float) -> Frame:
-    """The rectangle of the plot, wide enough for all that is in it."""
-    points = [p for line in found.lines for p in (*line.points, *line.others)]
-    lost = [p for line in found.lines for p in line.lost]
-    costs = [log(x) for p in (*points, *lost) for x in (p.cost.low, p.cost.high)]
-    pad = max(0.06 * (max(costs) - min(costs)), 0.12)
-    errors = [log(p.error) for p in points if p.error]
-    floor = log(found.quantity.least or _NEAR)
-    bottom, top = min(errors, default=floor), max(errors, default=floor + 1)
-    if found.quantity.name == "seen" and bottom - 1 <= 0 <= top + 1:
-        bottom, top = min(bottom, 0.0), max(top, 0.0)  # from where on it is visible
-    if floor > bottom - 1.5:  # the band, with room for what it says
-        bottom = min(bottom, floor) - 0.07 * max(top - bottom, 1.0)
-    span = max(top - bottom, 0.6)
-    low, high = bottom - 0.05 * span, bottom + 1.08 * span
-    texts = [text for _, text in ticks_y(low, high, _HEIGHT[width])]
-    left = 32 + max((text_width(text, TICK_SIZE) for text in texts), default=0.0)
-    edges = (left, width - 10, _TOP, _TOP + _HEIGHT[width])
-    return Frame(*edges, min(costs) - pad, max(costs) + pad, low, high)
-
-
-def _parts(report: ScenarioReport, found: Chart, frame: Frame) -> Iterator[str]:
-    """All parts, what lies below first."""
-    cost = "cost, relative to the scene’s own setting" if found.timed else "steps"
-    error = shortened(f"error: {found.quantity.label}", frame.bottom - frame.top, SIZE)
-    lines, texts = grid(frame, (cost, error))
-    yield from _levels(found.quantity, frame)
-    yield path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"')
-    edge = f"M{frame.left:.1f} {frame.top:.1f}V{frame.bottom:.1f}H{frame.right:.1f}"
-    yield path(edge, 'stroke="currentColor" stroke-opacity="0.7"')
-    yield from texts
-    for line in found.lines:
-        if len(line.points) > 1:
-            places = (_place(frame, point) for point in line.points)
-            d = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in places)
-            yield path(d, line_look(line.number, round_joins=True))
-    for line in found.lines:
-        yield from _marks(report, found, frame, line)
-
-
-def _levels(quantity: Quantity, frame: Frame) -> Iterator[str]:
-    """What the reference does not resolve, and from where on a learner sees the error."""
-    if quantity.least > 0 and log(quantity.least) > frame.low_y:
-        top = frame.y(quantity.least)
-        d = f"M{frame.left:.1f} {top:.1f}H{frame.right:.1f}V{frame.bottom:.1f}H{frame.left:.1f}Z"
-        yield area(d, 'fill-opacity="0.09"')
-        text = f"under {number_text(quantity.least)}: not resolved by the reference"
-        y = (top + frame.bottom) / 2 + 4 if frame.bottom - top >= 16 else top - 5
-        yield label(frame.right - 6, y, text, f'text-anchor="end" {FINE} {HALO}')
-    if quantity.name == "seen" and frame.low_y < 0 < frame.high_y:
-        y = frame.y(1.0)
-        look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
-        yield path(f"M{frame.left:.1f} {y:.1f}H{frame.right:.1f}", look)
-        yield label(frame.left + 6, y - 4, "just visible", f"{FINE} {HALO}")
-
-
-def _marks(report: ScenarioReport, found: Chart, frame: Frame, line: PlotLine) -> Iterator[str]:
-    """Each run of an integrator, with the interval of its cost."""
-    sizes = [(p, MARK) for p in line.points] + [(p, SMALL) for p in line.others]
-    for point, size in sizes:
-        x, y = _place(frame, point)
-        title, full = point_title(report, found, point), report.rows[point.row].front
-        yield bar(frame.x(point.cost.low), frame.x(point.cost.high), y, line.number)
-        yield symbol(line.number, x, y, size, full=full, title=title)
-    for point in line.lost:
-        title = markup_text(point_title(report, found, point))
-        yield (
-            f'<path d="{cross(*_place(frame, point))}" fill="none" '
-            f'stroke="{colour(line.number)}" stroke-width="1.8"><title>{title}</title></path>'
-        )
-    for point in (*line.points, *line.others, *line.lost):
-        if report.rows[point.row].own:
-            yield ring(*_place(frame, point), RING)
-
-
-def _place(frame: Frame, point: Point) -> tuple[float, float]:
-    """Where a run is; at the upper edge where it was lost."""
-    y = frame.top - 6 if point.error is None else frame.y(max(point.error, _NEAR))
-    return frame.x(point.cost.value), y
-
-
-def _entries(report: ScenarioReport, found: Chart) -> list[tuple[str, int | None, str]]:
-    """What lines and marks mean: only those that there are."""
-    rows = report.rows
-    drawn = [rows[p.row] for line in found.lines for p in (*line.points, *line.others)]
-    own = [f"the scene’s own: {setting_text(r.setting, r.setting)}" for r in rows if r.own]
-    marks = (
-        ("front", "on the Pareto front", any(row.front for row in drawn)),
-        ("beaten", "another is better", not all(row.front for row in drawn)),
-        ("other", "other solver, iterations or cone", any(line.others for line in found.lines)),
-        ("own", "".join(own[:1]), bool(own)),
-        ("lost", "run lost", any(line.lost for line in found.lines)),
+def work_precision(report: ScenarioReport) -> Chart | None:
+    """What is drawn; `None` where no row has an error."""
+    quantity = telling(report)
+    if quantity is None:
+        return None
+    timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
+    names = sorted({row.setting.integrator for row in report.rows}, key=integrator_rank)
+    lines = tuple(_line(report, quantity, timed, name, names) for name in names)
+    return Chart(
+        title=(
+            f"{report.title or report.name}: error of {quantity.label} "
+            f"against {'cost' if timed else 'steps'}"
+        ),
+        text=" ".join(_said(report, quantity, lines)),
+        axes=(
+            "cost, relative to the scene’s own setting" if timed else "steps",
+            f"error: {quantity.label}",
+        ),
+        lines=lines,
+        least=quantity.least,
+        one="just visible" if quantity.name == "seen" else "",
+        marks=tuple(_marks(report, lines)),
     )
-    names = [("line", line.number, line.integrator) for line in found.lines]
-    return names + [(kind, None, text) for kind, text, there in marks if there]
+
+
+def _line(
+    report: ScenarioReport,
+    quantity: Quantity,
+    timed: Sequence[WorkPrecisionRow],
+    name: str,
+    names: Sequence[str],
+) -> Line:
+    """The rows of an integrator."""
+    usual = usual_setting(report.rows)
+    points = []
+    rows = [row for row in report.rows if row.setting.integrator == name]
+    for row in sorted(rows, key=lambda row: -row.setting.timestep):
+        error = quantity.of(row) if row.status == "ok" else None
+        points.append(
+            Point(
+                _cost(row, timed),
+                error,
+                " · ".join(_told(report, row, error, timed=bool(timed))),
+                full=row.front,
+                small=usual is not None and solving(row.setting) != solving(usual),
+                ringed=row.own,
+            )
+        )
+    unknown = [one for one in names if one not in KNOWN]
+    number = KNOWN.index(name) if name in KNOWN else len(KNOWN) + unknown.index(name)
+    return Line(name, number, tuple(points))
+
+
+def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
+    """What a row costs; of one that was not timed, what its number of steps says."""
+    if row in timed and row.cost is not None:
+        return row.cost
+    like = [one for one in timed if one.setting.integrator == row.setting.integrator] or timed
+    rates = [one.cost.value / max(one.steps, 1) for one in like if one.cost is not None]
+    value = max(row.steps, 1) * (statistics.median(rates) if rates else 1.0)
+    return Interval(value, value, value)
+
+
+def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
+    """What marks mean: only those that there are."""
+    points = [point for line in lines for point in line.points]
+    drawn = [point for line in lines for point in line.drawn]
+    if any(point.full for point in drawn):
+        yield Entry("front", "on the Pareto front")
+    if not all(point.full for point in drawn):
+        yield Entry("beaten", "another is better")
+    if any(point.small for point in drawn):
+        yield Entry("other", "other solver, iterations or cone")
+    for row in report.rows:
+        if row.own:
+            yield Entry("own", f"the scene’s own: {setting_text(row.setting, row.setting)}")
+    if len(drawn) < len(points):
+        yield Entry("lost", "run lost")
+
+
+# --- the plot in words
+
+
+def _said(report: ScenarioReport, quantity: Quantity, lines: Sequence[Line]) -> Iterator[str]:
+    """What is to be seen."""
+    for line in lines:
+        if line.drawn:
+            errors = _range([point.y or 0.0 for point in line.drawn], 2, "{1} to {0}")
+            costs = _range([point.x.value for point in line.drawn], 3, "{0} to {1}")
+            yield f"{line.name}: errors {errors} at costs of {costs}."
+    lost = [line.name for line in lines if len(line.drawn) < len(line.points)]
+    if lost:
+        yield f"Runs were lost under {', '.join(lost)}."
+    for row in report.rows:
+        if row.own:
+            yield f"The scene’s own setting is {setting_text(row.setting)}."
+    if report.verdict.text:
+        yield report.verdict.text
+    if quantity.least > 0:
+        yield f"No error below {quantity.least:.1e} is given."
+
+
+def _range(values: Sequence[float], digits: int, words: str) -> str:
+    """The least and the largest of values."""
+    least, largest = (f"{one:.{digits}g}" for one in (min(values), max(values)))
+    return words.format(least, largest) if max(values) > min(values) else least
+
+
+def _told(
+    report: ScenarioReport, row: WorkPrecisionRow, error: float | None, *, timed: bool
+) -> Iterator[str]:
+    """What a point says when it is pointed at."""
+    yield setting_text(row.setting)
+    if error is None:
+        yield "; ".join((status_text(row.status), *row.reasons))
+    else:
+        yield f"error {error:.3g}"
+    if row.cost is not None:
+        yield f"cost {interval_text(row.cost)}"
+    elif timed:
+        yield "not timed"
+    yield f"{row.steps} steps"
+    if row.own:
+        yield "the scene’s own setting"
+    if row.front:
+        yield "on the Pareto front"
+    elif row.dominated_by is not None and 0 <= row.dominated_by < len(report.rows):
+        better = setting_text(report.rows[row.dominated_by].setting, row.setting)
+        yield f"{better} is better"

@@ -1,22 +1,28 @@
-"""The strokes of a work–precision plot: marks, dashes, rings, lines, letters.
+"""What charts are drawn with: marks, dashes, rings, lines, letters, a key, and the element itself.
 
-Entry points: `dash`, `colour`, `symbol`, `bar`, `key_mark`; `path`, `area`, `label`, `ring`.
+Entry points: `path`, `area`, `label`, `symbol`, `bar`, `cross`, `ring`; `colour`, `line_look`;
+`key`, `svg`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
-from coursebuild.core.drawing.marks import markup_text
+from coursebuild.core.drawing.marks import markup_text, shortened, text_width
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4")
 _LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#2b6f9e", "#1e1e1c")
 """Okabe and Ito's, darker on paper."""
 _CORNERS = (0, 4, 4, 3, 3, 5, 6)
 _TURNED = (0.0, 45.0, 0.0, -90.0, 90.0, -90.0, 0.0)
+SIZE, TICK_SIZE = 12.0, 11.0
+"""Of letters, in the units of the drawing."""
 MARK, SMALL = 4.2, 2.9
 RING = 8.5
+ROW = 18.0
+"""From one line of a key to the next."""
 OWN = "var(--rust, #86340c)"
 INK = "var(--ink, currentColor)"
 PAPER = "var(--paper, Canvas)"
@@ -24,6 +30,17 @@ FINE = 'font-size="11"'
 """Of texts other than names and titles."""
 HALO = f'stroke="{PAPER}" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'
 """The paper around letters, so that lines below do not cross them."""
+_FONT = "var(--sans, system-ui, sans-serif)"
+
+
+class Entry(NamedTuple):
+    """What a mark or a line means."""
+
+    kind: str
+    """`line`, `front`, `beaten`, `other`, `own` or `lost`."""
+    text: str
+    number: int | None = None
+    """Of a line."""
 
 
 def path(d: str, look: str) -> str:
@@ -71,20 +88,24 @@ def mark(number: int, x: float, y: float, size: float) -> str:
     return "M" + "L".join(places) + "Z"
 
 
-def cross(x: float, y: float) -> str:
-    """The path of a cross."""
+def cross(x: float, y: float, paint: str, title: str = "") -> str:
+    """What stands for a run that was lost."""
     s = 3.6
-    return f"M{x - s:.1f} {y - s:.1f}l{2 * s:g} {2 * s:g}m0 {-2 * s:g}l{-2 * s:g} {2 * s:g}"
+    d = f"M{x - s:.1f} {y - s:.1f}l{2 * s:g} {2 * s:g}m0 {-2 * s:g}l{-2 * s:g} {2 * s:g}"
+    return f'<path d="{d}" fill="none" stroke="{paint}" stroke-width="1.8">{_title(title)}</path>'
 
 
 def symbol(number: int, x: float, y: float, size: float, *, full: bool, title: str = "") -> str:
-    """The mark of a setting; `full` where it is on the front."""
+    """The mark of a run; `full` where it is on the front."""
     paint = colour(number)
-    inner = f"<title>{markup_text(title)}</title>" if title else ""
     return (
         f'<path d="{mark(number, x, y, size)}" fill="{paint if full else PAPER}" '
-        f'stroke="{paint}" stroke-width="1.5">{inner}</path>'
+        f'stroke="{paint}" stroke-width="1.5">{_title(title)}</path>'
     )
+
+
+def _title(text: str) -> str:
+    return f"<title>{markup_text(text)}</title>" if text else ""
 
 
 def bar(low: float, high: float, y: float, number: int) -> str:
@@ -99,16 +120,49 @@ def ring(x: float, y: float, radius: float) -> str:
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" {look}/>'
 
 
-def key_mark(kind: str, number: int | None, x: float, y: float) -> Iterator[str]:
-    """The mark that stands before an entry of the key; `number` is that of a line."""
-    if number is not None:
-        yield path(f"M{x - 13:.1f} {y:.1f}h26", line_look(number))
-        yield symbol(number, x, y, MARK, full=True)
-    elif kind == "own":
+def key(entries: Iterable[Entry], left: float, top: float, width: float) -> tuple[str, float]:
+    """Marks and what they mean, in rows; and where the rows end."""
+    found: list[str] = []
+    x, y = left, top
+    for entry in entries:
+        text = shortened(entry.text, width - left - 40, TICK_SIZE)
+        wide = 30 + text_width(text, TICK_SIZE) + 10
+        if x > left and x + wide > width:
+            x, y = left, y + ROW
+        found += _key_mark(entry, x + 14, y - 4)
+        found.append(label(x + 30, y, text, FINE))
+        x += wide
+    return "".join(found), y + 6
+
+
+def _key_mark(entry: Entry, x: float, y: float) -> Iterator[str]:
+    """The mark that stands before an entry of the key."""
+    if entry.number is not None:
+        yield path(f"M{x - 13:.1f} {y:.1f}h26", line_look(entry.number))
+        yield symbol(entry.number, x, y, MARK, full=True)
+    elif entry.kind == "own":
         yield ring(x, y, 6)
-    elif kind == "lost":
-        yield path(cross(x, y), f'stroke="{INK}" stroke-width="1.8"')
+    elif entry.kind == "lost":
+        yield cross(x, y, INK)
     else:
-        full = INK if kind == "front" else PAPER
+        full = INK if entry.kind == "front" else PAPER
         look = f'fill="{full}" stroke="{INK}" stroke-width="1.5"'
-        yield area(mark(0, x, y, SMALL if kind == "other" else MARK), look)
+        yield area(mark(0, x, y, SMALL if entry.kind == "other" else MARK), look)
+
+
+def svg(
+    body: str, size: tuple[float, float], name: str, said: tuple[str, str], style: str = ""
+) -> str:
+    """A drawing as an element; `said` is its title and its text for who cannot see it.
+
+    With a `style` it is for a file of its own.
+    """
+    key, (title, text) = markup_text(name), map(markup_text, said)
+    head = ' xmlns="http://www.w3.org/2000/svg"' if style else ""
+    return (
+        f'<svg{head} class="work-precision" viewBox="0 0 {size[0]:g} {size[1]:g}" '
+        f'role="img" aria-labelledby="{key}-title {key}-text" fill="currentColor" '
+        f'font-size="{SIZE:g}" font-family="{_FONT}"><title id="{key}-title">{title}'
+        f'</title><desc id="{key}-text">{text}</desc>'
+        + (f"<style>{style}</style>{body}</svg>\n" if style else f"{body}</svg>")
+    )

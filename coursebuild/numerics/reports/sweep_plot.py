@@ -1,6 +1,6 @@
 """The plot of a sweep as SVG: a row for each value, and for each figure a scale beside it.
 
-Entry point: `sweep_svg(sweep, …)`, for pages and for files of their own.
+Entry point: `sweep_svg(sweep, …)`.
 
 A dot is what was measured, a bar its interval, a line joins the values of one parameter, and a ring
 is around the value that the model has. A scale is logarithmic where its figures differ by much.
@@ -8,23 +8,26 @@ is around the value that the model has. A scale is logarithmic where its figures
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
-from msgspec import Struct
-
 from coursebuild.core.drawing.marks import shortened, text_width
-from coursebuild.core.drawing.scales import log_ticks, tick_texts, ticks
-from coursebuild.numerics.reports.layout import NARROW, ROW, SIZE, TICK_SIZE, WIDE, key, svg
+from coursebuild.core.drawing.scales import Scale, log
+from coursebuild.numerics.reports.chart import NARROW, WIDE
 from coursebuild.numerics.reports.strokes import (
     FINE,
     MARK,
+    ROW,
+    SIZE,
+    TICK_SIZE,
+    Entry,
     bar,
+    key,
     label,
     line_look,
     path,
     ring,
+    svg,
     symbol,
 )
 from coursebuild.numerics.reports.sweep import (
@@ -44,45 +47,20 @@ _GAP = 18.0
 """Between two scales."""
 
 
-class Scale(Struct, frozen=True):
-    """From a figure's values to places."""
-
-    figure: str
-    left: float
-    right: float
-    low: float
-    high: float
-    logarithmic: bool
-
-    def __call__(self, value: float) -> float:
-        """The place of a value."""
-        at = math.log10(max(value, 1e-300)) if self.logarithmic else value
-        part = (at - self.low) / (self.high - self.low)
-        return self.left + min(max(part, 0.0), 1.0) * (self.right - self.left)
-
-    def ticks(self) -> list[tuple[float, str]]:
-        """Places and texts, as many as have room."""
-        most = max(2, int((self.right - self.left) / 56))
-        if self.logarithmic:
-            return [(self(10.0**at), text) for at, text in log_ticks(self.low, self.high, most)]
-        values = ticks(self.low, self.high, most)
-        return [(self(v), text) for v, text in zip(values, tick_texts(values), strict=True)]
-
-
-def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False, style: str = "") -> str:
+def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
     """The plot as an `svg` element; empty where nothing was measured.
 
     Args:
         sweep: what to draw.
         name: unlike those of all other plots on the page: what describes it has an id.
         narrow: for narrow screens: the scales stand below each other.
-        style: the style sheet of a file of its own.
     """
-    figures, width = shown_figures(sweep)[:_MOST], NARROW if narrow else WIDE
+    figures = shown_figures(sweep)[:_MOST]
+    width, _ = NARROW if narrow else WIDE
     if not figures:
         return ""
-    names = [*(f"  {row.value}" for row in sweep.rows), *(row.parameter for row in sweep.rows)]
-    left = min(0.45 * width, max(text_width(text, TICK_SIZE) for text in names) + 16)
+    texts = [*(f"  {row.value}" for row in sweep.rows), *(row.parameter for row in sweep.rows)]
+    left = min(0.45 * width, max(text_width(text, TICK_SIZE) for text in texts) + 16)
     beside = 1 if narrow else len(figures)
     wide = (width - left - 14 - _GAP * (beside - 1)) / beside
     parts: list[str] = []
@@ -90,13 +68,14 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False, style: str
     for n, figure in enumerate(figures):
         start = left + (n % beside) * (wide + _GAP)
         scale = _scale(sweep.rows, figure, start, start + wide)
-        bottom = _panel(parts, sweep, scale, top, left if n % beside == 0 else 0.0)
+        names = left if n % beside == 0 else 0.0
+        bottom = _panel(parts, sweep, figure, scale, top, names)
         top = bottom if narrow else top
     if any(row.own for row in sweep.rows):
-        below, bottom = key([("own", None, "as the model is")], 6.0, bottom + 20, width)
+        below, bottom = key([Entry("own", "as the model is")], 6.0, bottom + 20, width)
         parts.append(below)
     title = f"{sweep.title}: {', '.join(FIGURES[figure] for figure in figures)}"
-    return svg("".join(parts), (width, bottom), name, (title, _said(sweep, figures)), style)
+    return svg("".join(parts), (width, bottom), name, (title, _said(sweep, figures)))
 
 
 def _scale(rows: Sequence[SweepRow], figure: str, left: float, right: float) -> Scale:
@@ -105,38 +84,41 @@ def _scale(rows: Sequence[SweepRow], figure: str, left: float, right: float) -> 
     low, high = min(values, default=0.0), max(values, default=1.0)
     powers = low > 0 and high > _SPREAD * low
     if powers:
-        low, high = math.log10(low), math.log10(high)
+        low, high = log(low), log(high)
     elif low < 0.5 * high:
         low = min(low, 0.0)
     pad = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
-    return Scale(figure, left, right, low - pad, high + pad, powers)
+    return Scale(left, right, low - pad, high + pad, powers)
 
 
-def _panel(parts: list[str], sweep: SweepReport, scale: Scale, top: float, names: float) -> float:
+def _panel(
+    parts: list[str], sweep: SweepReport, figure: str, scale: Scale, top: float, names: float
+) -> float:
     """One figure of all rows, with their names where there is room at the left; where it ends."""
     y = top + 34
-    title = shortened(FIGURES[scale.figure], scale.right - scale.left + 10, SIZE)
-    parts.append(label(scale.left, top + 14, title))
+    ticks = scale.ticks(max(2, int((scale.end - scale.start) / 56)))
+    title = shortened(FIGURES[figure], scale.end - scale.start + 10, SIZE)
+    parts.append(label(scale.start, top + 14, title))
     groups = [list(rows) for _, rows in groupby(sweep.rows, key=lambda row: row.parameter)]
     drawn: list[str] = []
     for number, rows in enumerate(groups):
         if names:
             head = shortened(rows[0].parameter, names - 8, TICK_SIZE)
             drawn.append(label(2, y + 4, head, f'{FINE} font-weight="600"'))
-        drawn += _group(rows, scale, y + ROW, number, names)
+        drawn += _group(rows, figure, scale, y + ROW, number, names)
         y += ROW * (len(rows) + 1) + 4
-    lines = [f"M{x:.1f} {top + 22:.1f}V{y - 10:.1f}" for x, _ in scale.ticks()]
+    lines = [f"M{x:.1f} {top + 22:.1f}V{y - 10:.1f}" for x, _ in ticks]
     parts.append(path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"'))
     parts += drawn
-    parts += [label(x, y + 4, text, f'text-anchor="middle" {FINE}') for x, text in scale.ticks()]
+    parts += [label(x, y + 4, text, f'text-anchor="middle" {FINE}') for x, text in ticks]
     return y + 12
 
 
 def _group(
-    rows: Sequence[SweepRow], scale: Scale, top: float, number: int, names: float
+    rows: Sequence[SweepRow], figure: str, scale: Scale, top: float, number: int, names: float
 ) -> Iterator[str]:
     """The values of a parameter."""
-    places = [(interval(row, scale.figure), top + ROW * n) for n, row in enumerate(rows)]
+    places = [(interval(row, figure), top + ROW * n) for n, row in enumerate(rows)]
     for (one, y), (other, below) in pairwise(places):
         if one is not None and other is not None:
             d = f"M{scale(one.value):.1f} {y:.1f}L{scale(other.value):.1f} {below:.1f}"
@@ -146,9 +128,9 @@ def _group(
             yield label(names - 8, y + 4, row.value, f'text-anchor="end" {FINE}')
         if found is None:
             text = "" if row.status == "ok" else row.status
-            yield label(scale.left, y + 4, text, FINE)
+            yield label(scale.start, y + 4, text, FINE)
             continue
-        x, title = scale(found.value), f"{row.parameter} {row.value}: {cell(row, scale.figure)}"
+        x, title = scale(found.value), f"{row.parameter} {row.value}: {cell(row, figure)}"
         yield bar(scale(found.low), scale(found.high), y, number)
         yield symbol(number, x, y, MARK, full=True, title=title)
         if row.own:

@@ -1,0 +1,258 @@
+"""A chart of lines between two logarithmic axes, as SVG.
+
+Entry point: `chart_svg(chart, …)`, for pages and for files of their own.
+
+1. A line has a colour, a mark and a dash of its own; its name stands in the key, or at its end
+   where there is no key. Bars are intervals.
+2. Crosses at the upper edge are runs that were lost.
+3. A band below shows what is not known.
+
+Colours are variables of the page's style sheet with a value of their own to fall back on, set as
+attributes, since pages allow no styles inside of them. The same chart gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+from msgspec import Struct
+
+from coursebuild.core.drawing.marks import apart, markup_text, shortened, text_width
+from coursebuild.core.drawing.scales import Scale, log, number_text
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.strokes import (
+    FINE,
+    HALO,
+    MARK,
+    RING,
+    SIZE,
+    SMALL,
+    TICK_SIZE,
+    Entry,
+    area,
+    bar,
+    colour,
+    cross,
+    key,
+    label,
+    line_look,
+    path,
+    ring,
+    svg,
+    symbol,
+)
+
+WIDE, NARROW, BESIDE = (620.0, 320.0), (350.0, 260.0), (430.0, 236.0)
+"""How wide a chart is, and how high between its axes: for wide screens, for narrow ones, and for
+charts beside each other."""
+_TOP = 16.0
+"""Above it, for what was lost."""
+_NAMES = 90.0
+"""At the right, for names at the ends of lines."""
+_NAME = 15.0
+"""From one name to the next."""
+
+
+class Point(Struct, frozen=True):
+    """A run."""
+
+    x: Interval
+    y: float | None
+    """`None` for a run that was lost."""
+    title: str
+    """What it says when it is pointed at."""
+    full: bool = True
+    """Whether its mark is filled."""
+    small: bool = False
+    """Whether it stands beside the line, with a smaller mark."""
+    ringed: bool = False
+
+
+class Line(Struct, frozen=True):
+    """Points that are joined in their order, but for small and lost ones."""
+
+    name: str
+    number: int
+    """Which colour, dash and mark."""
+    points: tuple[Point, ...]
+
+    @property
+    def drawn(self) -> list[Point]:
+        """The points that were not lost."""
+        return [point for point in self.points if point.y is not None]
+
+
+class Chart(Struct, frozen=True):
+    """What is drawn."""
+
+    title: str
+    text: str
+    """What is to be seen, for who cannot see it."""
+    axes: tuple[str, str]
+    """What stands below, and at the left."""
+    lines: tuple[Line, ...]
+    least: float = 0.0
+    """Nothing below is known."""
+    one: str = ""
+    """What it means to be 1, if anything."""
+    marks: tuple[Entry, ...] = ()
+    """What the key says after the lines; without it there is no key."""
+
+
+def chart_svg(chart: Chart, name: str, size: tuple[float, float], style: str = "") -> str:
+    """The chart as an `svg` element; empty where there is no point to be drawn.
+
+    Args:
+        chart: what to draw.
+        name: unlike those of all other drawings on the page: what describes it has an id.
+        size: one of those above.
+        style: the style sheet of a file of its own.
+    """
+    if not any(line.drawn for line in chart.lines):
+        return ""
+    x, y = _scales(chart, size)
+    body, height = "".join(_parts(chart, x, y)), y.start + 48
+    if chart.marks:
+        lines = (Entry("line", line.name, line.number) for line in chart.lines)
+        left = 6.0 if size == NARROW else x.start
+        below, height = key((*lines, *chart.marks), left, y.start + 62, size[0])
+        body += below
+    return svg(body, (size[0], height), name, (chart.title, chart.text), style)
+
+
+def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:
+    """The axes, wide enough for all that is between them."""
+    points = [point for line in chart.lines for point in line.points]
+    xs = [log(x) for point in points for x in (point.x.low, point.x.high)]
+    ys = [log(point.y) for point in points if point.y]
+    pad = max(0.06 * (max(xs) - min(xs)), 0.12)
+    floor = log(chart.least)
+    bottom, top = min(ys, default=floor), max(ys, default=floor + 1)
+    if chart.one and bottom - 1 <= 0 <= top + 1:
+        bottom, top = min(bottom, 0.0), max(top, 0.0)
+    if floor > bottom - 1.5:  # the band, with room for what it says
+        bottom = min(bottom, floor) - 0.07 * max(top - bottom, 1.0)
+    span = max(top - bottom, 0.6)
+    width, height = size
+    y = Scale(_TOP + height, _TOP, bottom - 0.05 * span, bottom + 1.08 * span)
+    left = 32 + max((text_width(text, TICK_SIZE) for _, text in _ticks_y(y)), default=0.0)
+    right = width - (10 if chart.marks else _NAMES)
+    return Scale(left, right, min(xs) - pad, max(xs) + pad), y
+
+
+def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
+    """All parts, what lies below first."""
+    lines, texts = _grid(x, y, chart.axes)
+    yield from _levels(chart, x, y)
+    yield path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"')
+    edge = f"M{x.start:.1f} {y.end:.1f}V{y.start:.1f}H{x.end:.1f}"
+    yield path(edge, 'stroke="currentColor" stroke-opacity="0.7"')
+    yield from texts
+    for line in chart.lines:
+        joined = [_place(point, x, y) for point in line.drawn if not point.small]
+        if len(joined) > 1:
+            d = "M" + "L".join(f"{across:.1f} {down:.1f}" for across, down in joined)
+            yield path(d, line_look(line.number, round_joins=True))
+    for line in chart.lines:
+        for point in sorted(line.points, key=lambda point: point.small):
+            yield from _mark(point, line.number, x, y)
+        yield from (ring(*_place(one, x, y), RING) for one in line.points if one.ringed)
+    if not chart.marks:
+        yield from _names(chart, x, y)
+
+
+def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
+    """What is not known, and what it means to be 1."""
+    if chart.least > 0 and log(chart.least) > y.low:
+        top = y(chart.least)
+        d = f"M{x.start:.1f} {top:.1f}H{x.end:.1f}V{y.start:.1f}H{x.start:.1f}Z"
+        yield area(d, 'fill-opacity="0.09"')
+        text = f"under {number_text(chart.least)}: not resolved by the reference"
+        at = (top + y.start) / 2 + 4 if y.start - top >= 16 else top - 5
+        yield label(x.end - 6, at, text, f'text-anchor="end" {FINE} {HALO}')
+    if chart.one and y.low < 0 < y.high:
+        look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
+        yield path(f"M{x.start:.1f} {y(1.0):.1f}H{x.end:.1f}", look)
+        yield label(x.start + 6, y(1.0) - 4, chart.one, f"{FINE} {HALO}")
+
+
+def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
+    """Where a run is; at the upper edge where it was lost."""
+    return x(point.x.value), y.end - 6 if point.y is None else y(point.y)
+
+
+def _mark(point: Point, number: int, x: Scale, y: Scale) -> Iterator[str]:
+    """A run with its interval."""
+    across, down = _place(point, x, y)
+    if point.y is None:
+        yield cross(across, down, colour(number), point.title)
+    else:
+        if point.x.high > point.x.low:
+            yield bar(x(point.x.low), x(point.x.high), down, number)
+        size = SMALL if point.small else MARK
+        yield symbol(number, across, down, size, full=point.full, title=point.title)
+
+
+def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
+    """At the right, in the order in which the lines end, and none on another."""
+    lines = [line for line in chart.lines if line.drawn]
+    ends = sorted(((_place(line.drawn[-1], x, y), line) for line in lines), key=_height)
+    places = apart([_height(end) for end in ends], _NAME, y.end, y.start)
+    for ((across, down), line), at in zip(ends, places, strict=True):
+        paint = colour(line.number)
+        lead = f"M{across + 5:.1f} {down:.1f}L{x.end + 6:.1f} {at:.1f}"
+        yield path(lead, f'stroke="{paint}" stroke-opacity="0.5" stroke-width="0.8"')
+        look = f'fill="{paint}" font-weight="600" {FINE} {HALO}'
+        yield label(x.end + 9, at + 4, line.name, look)
+
+
+def _height(end: tuple[tuple[float, float], Line]) -> float:
+    return end[0][1]
+
+
+# --- axes
+
+
+def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[str]]:
+    """Lines of the grid, and the texts of the axes."""
+    lines = [f"M{x.start:.1f} {at:.1f}H{x.end:.1f}" for at in _decades(y)]
+    texts: list[str] = []
+    for at, text in _ticks_y(y):
+        texts.append(label(x.start - 7, at + 4, text, f'text-anchor="end" {FINE}'))
+        lines.append(f"M{x.start:.1f} {at:.1f}h-4")
+    shown = _ticks_x(x)
+    for at in _decades(x) or [at for at, _ in shown]:
+        lines.append(f"M{at:.1f} {y.end:.1f}V{y.start:.1f}")
+    for at, text in shown:
+        lines.append(f"M{at:.1f} {y.start:.1f}v5")
+        texts.append(label(at, y.start + 18, text, f'text-anchor="middle" {FINE}'))
+    below, beside = titles
+    beside = shortened(beside, y.start - y.end, SIZE)
+    texts.append(
+        f'<text transform="translate(14 {(y.start + y.end) / 2:.1f}) rotate(-90)" '
+        f'text-anchor="middle">{markup_text(beside)}</text>'
+    )
+    texts.append(label((x.start + x.end) / 2, y.start + 37, below, 'text-anchor="middle"'))
+    return lines, texts
+
+
+def _decades(scale: Scale) -> list[float]:
+    """The place of each power of ten, unless they are too many to be told apart."""
+    first, last = math.ceil(scale.low - 1e-9), math.floor(scale.high + 1e-9)
+    return [scale(10.0**n) for n in range(first, last + 1)] if last - first <= 24 else []
+
+
+def _ticks_y(y: Scale) -> list[tuple[float, str]]:
+    return y.ticks(max(2, int((y.start - y.end) / 30)))
+
+
+def _ticks_x(x: Scale) -> list[tuple[float, str]]:
+    """So many that their texts do not touch."""
+    for most in (9, 7, 5, 4, 3, 2):
+        found = x.ticks(most)
+        wide = [(at, text_width(text, TICK_SIZE)) for at, text in found]
+        if all(b - a >= (w + v) / 2 + 8 for (a, w), (b, v) in pairwise(wide)):
+            return found
+    return found[:1]
