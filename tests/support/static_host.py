@@ -133,13 +133,14 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             status, data = 304, b""
         self.send_response(status)
         copy = path.with_name(f"{path.name}.br")
-        if data and "br" in self.headers.get("Accept-Encoding", "") and copy.is_file():
+        accepted = self.headers.get("Accept-Encoding", "")
+        if data and "br" in accepted and copy.is_file():
             data = copy.read_bytes()
             self.send_header("Content-Encoding", "br")
         kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
         text = "; charset=utf-8" if kind.startswith("text/") else ""
         # Hosts of static pages compress texts without a copy on the way, and so does this one.
-        if data and text and not copy.is_file() and "gzip" in self.headers.get("Accept-Encoding", ""):
+        if data and text and not copy.is_file() and "gzip" in accepted:
             data = gzip.compress(data, mtime=0)
             self.send_header("Content-Encoding", "gzip")
         self.send_header("Content-Type", kind + text)
