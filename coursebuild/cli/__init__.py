@@ -6,8 +6,9 @@ usage. Heavy imports happen in the command that needs them.
 - `unchanged`: a command with nothing to do, which loads no more than that
 - `running`: memory, and what a command ends with
 - `interrupts`: Ctrl-C and SIGTERM, wherever they come
-- `arguments`: what can be said; each command of every course has a module of its own (`build`,
-  `check`, …), and features have further ones
+- `commands`: which there are; those of every course have a module each (`build`, `check`, …), and
+  features bring further ones
+- `arguments`: what several commands take
 - `output`: what is written where, and the status that says it too
 """
 
@@ -17,7 +18,7 @@ import atexit
 import sys
 
 from coursebuild.cli.output import CLEAN, INTERRUPTED, say, write
-from coursebuild.cli.unchanged import said_before
+from coursebuild.cli.unchanged import said_before, split_directory
 
 TYPE_CHECKING = False
 """As type checkers know it: to import `typing` takes a tenth of a run with nothing to do."""
@@ -33,13 +34,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _utf8_streams()
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        said = said_before(given)
+        directory, words = split_directory(given)
+        said = said_before(directory, words)
         if said is not None:
             return _end(write(said, CLEAN), alone=arguments is None)
         from coursebuild.cli.running import run
     except KeyboardInterrupt:
         return say(INTERRUPTED, "interrupted")
-    return _end(run(given, alone=arguments is None), alone=arguments is None)
+    return _end(run(directory, words, alone=arguments is None), alone=arguments is None)
 
 
 def _end(status: int, *, alone: bool) -> int:

@@ -1,89 +1,17 @@
-"""What can be said on the command line.
+"""What several commands take on the command line.
 
-Entry points: `parser(given)`; `options_of`, what arguments say to every command; and what several
-commands take: `add_lessons`, `add_format` and others.
-
-A command is a name, a summary, and a module with `declare(parser)`, which adds its arguments, and
-`run(arguments)`, which gives the exit status. Features add theirs (`core.features.Command`). Only
-the module of the command that is given is imported.
+Entry points: `options_of`, what arguments say to every command; `add_lessons`, `add_format` and
+others, which declare them.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
 import os
-from collections.abc import Iterator, Sequence
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
-
-_COMMANDS = {
-    "build": "verify everything and publish the site",
-    "check": "verify, publish nothing",
-    "update": "bring recorded outputs up to date",
-    "extract": "write the scripts to examples/",
-    "serve": "preview: build, serve, rebuild and reload on change",
-    "export": "verify everything and write the course as one file",
-    "explain": "say why something would run again, and what depends on it",
-    "schema": "print a JSON Schema for an editor",
-}
-"""Those of every course, each in the module of its name."""
-
-
-def parser(given: Sequence[str]) -> argparse.ArgumentParser:
-    """What can be said, each command with the function that does it.
-
-    Of a command whose name is not among what is given only that is told: to declare what else can
-    be said to all of them takes as long as looking at every file of a course.
-    """
-    from coursebuild import __version__
-
-    parser = argparse.ArgumentParser(
-        prog="coursebuild",
-        description="Build a course of executable lessons: every recorded output is verified.",
-        allow_abbrev=False,
-    )
-    parser.add_argument(
-        "-C",
-        dest="root",
-        metavar="DIR",
-        help="the course's folder (default: the nearest one with content/course.toml)",
-    )
-    parser.add_argument("--version", action="version", version=f"coursebuild {__version__}")
-    commands = parser.add_subparsers(
-        title="commands", metavar="COMMAND", required=True, prog=parser.prog
-    )
-    word = _command_word(given)
-    for name, summary, module in _commands(with_features=word not in (*_COMMANDS, "--version")):
-        if name != word:
-            commands.add_parser(name, help=summary, add_help=False)
-            continue
-        command = commands.add_parser(name, help=summary, description=summary, allow_abbrev=False)
-        code = importlib.import_module(module)
-        command.set_defaults(command=code.run)
-        code.declare(command)
-    return parser
-
-
-def _command_word(given: Sequence[str]) -> str:
-    """The first word that is no folder behind `-C`; empty where there is none."""
-    before = ("", *given)
-    words = (word for last, word in zip(before, given, strict=False) if last != "-C")
-    return next((word for word in words if word == "--version" or not word.startswith("-")), "")
-
-
-def _commands(*, with_features: bool) -> Iterator[tuple[str, str, str]]:
-    """Name, summary and module of each command."""
-    for name, summary in _COMMANDS.items():
-        yield name, summary, f"coursebuild.cli.{name}"
-    if with_features:  # which takes longer than all the rest
-        from coursebuild.core.registry import features
-
-        for feature in features():
-            for command in feature.commands:
-                yield command.name, command.summary, command.module
 
 
 def options_of(arguments: argparse.Namespace) -> Options:
@@ -96,8 +24,8 @@ def options_of(arguments: argparse.Namespace) -> Options:
     if hasattr(arguments, "cache"):
         fresh = arguments.no_cache
         store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
-    quiet, long = getattr(arguments, "quiet", False), getattr(arguments, "long", False)
-    return Options(root, jobs, quiet, store, long)
+    quiet, long, verbose = (getattr(arguments, n, False) for n in ("quiet", "long", "verbose"))
+    return Options(root, jobs, quiet, store, long, verbose)
 
 
 def available_cores() -> int:
@@ -137,6 +65,9 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
 def add_running(parser: argparse.ArgumentParser) -> None:
     """What commands take that run scripts."""
     add_quiet(parser)
+    parser.add_argument(
+        "--verbose", "-v", action="store_true", help="say of each script why it runs"
+    )
     parser.add_argument(
         "--jobs",
         "-j",

@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report
 
+EXAMPLES = """\
+examples:
+  coursebuild build                  the site in public/
+  coursebuild build --out ../site    elsewhere
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

@@ -14,6 +14,15 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report
 
+EXAMPLES = """\
+examples:
+  coursebuild check                      the whole course
+  coursebuild check 4.2                  one lesson
+  coursebuild check -v                   why each script runs
+  coursebuild check --format github      annotations in GitHub Actions
+  coursebuild check --against 3.13.0     what another version of MuJoCo changes
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

@@ -1,4 +1,4 @@
-"""`coursebuild explain`: say why something would run again, and what depends on it."""
+"""`coursebuild explain`: say what a rule means, or why something would run again."""
 
 from __future__ import annotations
 
@@ -7,27 +7,39 @@ import sys
 
 from coursebuild.cli.arguments import add_format, options_of
 from coursebuild.cli.output import CLEAN, style_of, write
+from coursebuild.core.files.resources import rules_page
+from coursebuild.core.registry import installed_features
+from coursebuild.core.text.rules import RULES
 from coursebuild.pipeline.explain import explain
-from coursebuild.report.explained import explained_text
+from coursebuild.report.explained import explained_text, rule_text
 from coursebuild.report.values import json_text
+
+EXAMPLES = """\
+examples:
+  coursebuild explain output-drift             a rule, as in error[output-drift]
+  coursebuild explain 4.2                      would the scripts of a lesson run, and why?
+  coursebuild explain models/pendulum.xml      what depends on this file?
+"""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""
-    parser.description = (
-        "Say whether a script or lab would run again and why, and what depends on it."
-    )
     parser.add_argument(
-        "path",
-        metavar="PATH",
-        help="a script, lab, lesson, page, model, or any file of the project",
+        "name",
+        metavar="RULE|PATH",
+        help="a rule, or a script, lab, lesson, page, model, or any file of the project",
     )
     add_format(parser, "text", "json")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tell what is known of a path."""
-    explanation = explain(options_of(arguments), arguments.path)
+    """Tell what is known of a rule or a path."""
+    installed_features()  # which bring rules of their own
+    rule = RULES.get(arguments.name)
+    if rule is not None:
+        text = rule_text(rule, rules_page())
+        return write(json_text(rule) if arguments.format == "json" else text, CLEAN)
+    explanation = explain(options_of(arguments), arguments.name)
     if arguments.format == "json":
         return write(json_text(explanation), CLEAN)
     return write(explained_text(explanation, style_of(sys.stdout)), CLEAN)

@@ -10,6 +10,12 @@ from coursebuild.cli.output import print_report
 from coursebuild.core.registry import features
 from coursebuild.pipeline.export import export
 
+EXAMPLES = """\
+examples:
+  coursebuild export epub
+  coursebuild export scorm --out course.zip
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""
@@ -18,7 +24,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     offers = ", ".join(f"{one.name} ({one.summary})" for one in known)
     files = ", ".join(one.file for one in known)
     parser.add_argument(
-        "name", metavar="NAME", help=f"{offers}, or what a feature of the course itself can write"
+        "name", metavar="EXPORT", help=f"{offers}, or what a feature of the course itself can write"
     )
     parser.add_argument(
         "--out", metavar="FILE", help=f"from the course's folder (default: {files})"

@@ -8,6 +8,11 @@ from coursebuild.cli.arguments import add_quiet, options_of
 from coursebuild.cli.output import print_report
 from coursebuild.pipeline.extract import extract
 
+EXAMPLES = """\
+examples:
+  coursebuild extract --adopt        edits in examples/ go back into the lessons
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

@@ -85,13 +85,16 @@ def report_text(report: Report, options: Options) -> str:
 def look(stream: TextIO | None) -> tuple[bool, int]:
     """Whether to colour, and how many columns there are.
 
-    Colour only on a terminal whose user does not ask for none (https://no-color.org).
+    Colour on a terminal, unless its user asks for none (https://no-color.org), and wherever the
+    user asks for it (https://force-color.org).
     """
-    if stream is None or not stream.isatty():
-        return False, 100
+    terminal = stream is not None and stream.isatty()
+    wanted = terminal and os.environ.get("TERM") != "dumb"
+    colour = bool(wanted or os.environ.get("FORCE_COLOR")) and not os.environ.get("NO_COLOR")
+    if not terminal:
+        return colour, 100
     import shutil
 
-    colour = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
     return colour, shutil.get_terminal_size((100, 24)).columns
 
 

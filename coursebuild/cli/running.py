@@ -5,22 +5,21 @@ Entry point: `run`.
 
 from __future__ import annotations
 
-import argparse
 import atexit
 import gc
 
-from coursebuild.cli.arguments import parser
+from coursebuild.cli.commands import run_command
 from coursebuild.cli.interrupts import Terminated, heeded
 from coursebuild.cli.output import INTERRUPTED, TERMINATED, USAGE, WRONG, fail, say
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
 
-def run(given: Sequence[str], *, alone: bool) -> int:
-    """Run the command that the arguments name; gives the exit status.
+def run(directory: str | None, words: Sequence[str], *, alone: bool) -> int:
+    """Run the command that the words name, in a folder; gives the exit status.
 
     `alone`: it is the command of this process, which ends with it.
     """
@@ -32,17 +31,15 @@ def run(given: Sequence[str], *, alone: bool) -> int:
         atexit.register(gc.freeze)
     try:
         with heeded(alone=alone):
-            return _run(given)
+            return _run(directory, words)
     finally:
         if not alone:
             gc.set_threshold(*collected)
 
 
-def _run(given: Sequence[str]) -> int:
+def _run(directory: str | None, words: Sequence[str]) -> int:
     try:
-        options = parser(given).parse_args(given, argparse.Namespace(given=tuple(given)))
-        command: Callable[[argparse.Namespace], int] = options.command
-        return command(options)
+        return run_command(directory, words)
     except UsageError as error:
         return fail(USAGE, str(error))
     except PublishRefusedError as error:

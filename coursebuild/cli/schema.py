@@ -7,11 +7,17 @@ import argparse
 from coursebuild.cli.output import CLEAN, USAGE, fail, write
 from coursebuild.core.syntax.schemas import json_schema, schema_roots
 
+EXAMPLES = """\
+examples:
+  coursebuild schema course > course.schema.json
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""
-    parser.description = None
-    parser.add_argument("name", metavar="NAME", help="lab, course, model, or of a feature, as quiz")
+    parser.add_argument(
+        "name", metavar="SCHEMA", help="lab, course, model, or of a feature, as quiz"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -8,6 +8,11 @@ from coursebuild.cli.arguments import add_running, options_of
 from coursebuild.cli.output import CLEAN
 from coursebuild.preview.serve import serve
 
+EXAMPLES = """\
+examples:
+  coursebuild serve --port 0         at any free port
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

@@ -1,6 +1,7 @@
 """A command with nothing to do: known before its arguments are read.
 
-Entry points: `said_before`, what it says then; `run_unless_unchanged`, which keeps that.
+Entry points: `said_before`, what it says then; `run_unless_unchanged`, which keeps that;
+`split_directory`, by which both know which course is meant.
 
 It goes by the arguments as they were given, and by what else decides what is printed. To read
 arguments takes longer than to look at the files of a course; a command that is spelled in another
@@ -31,13 +32,31 @@ _VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_SIZE")
 """Of the environment: what says the same as arguments."""
 
 
-def said_before(given: Sequence[str]) -> str | None:
+def split_directory(given: Sequence[str]) -> tuple[str | None, list[str]]:
+    """The folder that `-C DIR` names, wherever it stands before `--`, and all other words."""
+    directory, words = None, []
+    rest = iter(given)
+    for word in rest:
+        if word == "--":
+            words += [word, *rest]
+        elif word[:2] != "-C":
+            words.append(word)
+        elif word != "-C":
+            directory = word[2:]
+        elif (folder := next(rest, None)) is not None:
+            directory = folder
+        else:  # told by who reads the words
+            words.append(word)
+    return directory, words
+
+
+def said_before(directory: str | None, words: Sequence[str]) -> str | None:
     """What this command said when all was as it is now; `None` where that is not known."""
-    command = _command_of(given)
-    if command is None or _ALL_ANEW in given:
+    command = _command_of(words)
+    if command is None or _ALL_ANEW in words:
         return None
     try:
-        root = (given[1] or ".") if given[0] == "-C" else find_course_root(".")
+        root = find_course_root(".") if directory is None else directory or "."
         return unchanged(os.path.realpath(root), command) if root else None
     except OSError:  # the working directory is gone, for one
         return None
@@ -57,7 +76,7 @@ def run_unless_unchanged(
     from coursebuild.core.engine.up_to_date import Watcher
 
     options = options_of(arguments)
-    command = _command_of(arguments.given)
+    command = _command_of(arguments.words)
     watcher = None if command is None else Watcher(str(options.root), command)
     report = work(options)
     status = print_report(report, "text", options)
@@ -71,19 +90,18 @@ def run_unless_unchanged(
     return status
 
 
-def _command_of(given: Sequence[str]) -> tuple[str, ...] | None:
+def _command_of(words: Sequence[str]) -> tuple[str, ...] | None:
     """The name of a command; `None` where it always works.
 
     Which course is meant is no part of it, since what was said is kept there.
     """
-    own = given[2:] if given and given[0] == "-C" else given
-    if not own or own[0] not in COMMANDS:
+    if not words or words[0] not in COMMANDS:
         return None
-    words = [word for word in own if word != _ALL_ANEW]
+    own = [word for word in words if word != _ALL_ANEW]
     around = [*look(sys.stdout), *map(os.environ.get, _VARIABLES)]
-    if any("/" in w or os.sep in w or os.path.exists(w) for w in words):  # noqa: PTH110
+    if any("/" in w or os.sep in w or os.path.exists(w) for w in own):  # noqa: PTH110
         try:
             around.append(os.getcwd())  # noqa: PTH109  # from where paths are meant
         except OSError:
             return None
-    return (*words, *map(repr, around))
+    return (*own, *map(repr, around))

@@ -8,6 +8,12 @@ from coursebuild.cli.arguments import add_lessons, add_long, add_running, option
 from coursebuild.cli.output import print_report
 from coursebuild.pipeline.update import update
 
+EXAMPLES = """\
+examples:
+  coursebuild update --dry-run       what would change
+  coursebuild update 4.2             one lesson
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

@@ -48,8 +48,18 @@ _FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
 """Folders of every site."""
 CORE_FENCES = ("mjcf", "python", "text")
 """The kinds of fences that the core reads."""
-CORE_COMMANDS = ("build", "check", "update", "extract", "serve", "export", "explain", "schema")
-"""The commands of every course, in the order in which they are named."""
+CORE_COMMANDS = {
+    "build": "verify everything and publish the site",
+    "check": "verify, publish nothing",
+    "update": "bring recorded outputs up to date",
+    "extract": "write the scripts to examples/",
+    "serve": "preview: build, serve, rebuild and reload on change",
+    "export": "verify everything and write the course as one file",
+    "explain": "say what a rule means, or why something would run again",
+    "schema": "print a JSON Schema for an editor",
+    "completion": "print what completes commands in a shell",
+}
+"""The commands of every course, each in the module `coursebuild.cli.NAME`, and what they do."""
 
 _INSTALLED_BY = {
     "bench": "coursebuild with its recorded reports",

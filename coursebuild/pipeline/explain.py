@@ -30,7 +30,6 @@ from coursebuild.core.run.dependencies import (
     Inputs,
     Kind,
     described,
-    input_changes,
     sought_files,
     state_changes,
 )
@@ -39,8 +38,9 @@ from coursebuild.core.run.mjcf import parts
 from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.text.diagnostics import nearest
+from coursebuild.core.text.rules import RULES
 from coursebuild.numerics.reports.records import BENCH
-from coursebuild.pipeline.load import load
+from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
 from coursebuild.report.explained import Explained, Explanation, State
 
@@ -51,10 +51,7 @@ def explain(options: Options, name: str) -> Explanation:
     Raises:
         UsageError: the course cannot be read, or nothing in it is called so.
     """
-    course = load(options.root).course
-    if course is None:
-        raise UsageError("the course map cannot be read; `coursebuild check` says why")
-    return _Explainer(course, options).of(name)
+    return _Explainer(load_course(options.root), options).of(name)
 
 
 class _Explainer:
@@ -85,7 +82,7 @@ class _Explainer:
         dependents = self._dependents(path)
         whole = self._part_of(path)
         if not dependents and not whole and not (self.root / path).exists():
-            near = nearest(name, [*self.scripts, *self.labs, *self.documents])
+            near = nearest(name, [*self.scripts, *self.labs, *self.documents, *RULES])
             help = f"; did you mean `{near}`?" if near is not None else ""
             raise UsageError(f"nothing of this course is called `{name}`{help}")
         return self._file(path, "file", dependents)
@@ -135,29 +132,19 @@ class _Explainer:
         record = self.memory.remembered(inputs)
         if record is not None:
             return _explained("script", path, extraction.owner, record, ())
-        last = self.memory.last(path)
-        reasons = self._reasons(last, inputs)
+        last, reasons = self.memory.last(path), self.memory.reasons(inputs)
         return _explained("script", path, extraction.owner, last, tuple(reasons))
 
     def _lab(self, name: str) -> Explained:
         inputs, trial = self.labs[name]
         last = self.memory.last(inputs.path)
         holds = last is not None and self._lab_holds(last, inputs)
-        reasons = [] if holds else self._reasons(last, inputs)
+        reasons = [] if holds else self.memory.reasons(inputs)
         return _explained("lab", name, trial.owner, last, tuple(reasons))
 
     def _lab_holds(self, last: RunRecord, inputs: Inputs) -> bool:
         same = not last.forgotten and last.inputs == inputs
         return same and not list(state_changes(last.dependencies, self.memory.states))
-
-    def _reasons(self, last: RunRecord | None, inputs: Inputs) -> list[str]:
-        if last is None:
-            return ["there is no result of it on this machine"]
-        found = input_changes(last.inputs, inputs)
-        found += state_changes(last.dependencies, self.memory.states)
-        if last.forgotten:
-            found.append(f"its last result is not remembered: {last.forgotten}")
-        return found or ["its result is no longer kept"]
 
     def _dependents(self, path: str) -> tuple[Explained, ...]:
         """Scripts and labs whose last results depend on a file or on the listing of its folder."""

@@ -1,7 +1,7 @@
 """Disk → Course: read the map, the lessons, the pages and the models, and parse them.
 
-Entry point: `load(root)`. A `Parser` parses the texts; `documents.Documents` is one that gives what
-was parsed before.
+Entry points: `load(root)`; `load_course(root)`, for commands that need a course. A `Parser` parses
+the texts; `documents.Documents` is one that gives what was parsed before.
 
 1. Read everything (`core.files.read`), parse `content/course.toml`. Where the map is broken the
    lessons are parsed all the same, so that all mistakes are told in one run.
@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import scenarios_of_no_model
 from coursebuild.core.files.course_features import load_course_features
+from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_course, read_sources
 from coursebuild.core.model import Course, Declarations, Document, Lesson, Level, Page, Status
 from coursebuild.core.model.vocabulary import CALLOUTS
@@ -76,6 +77,18 @@ def load(root: Path, parser: Parser | None = None) -> Loaded:
     loader = _Loader(root, Parser() if parser is None else parser)
     course = loader.course(loader.declared())
     return Loaded(course, tuple(loader.found))
+
+
+def load_course(root: Path) -> Course:
+    """The course below `root`, whatever is wrong in its lessons.
+
+    Raises:
+        UsageError: its map cannot be used.
+    """
+    course = load(root).course
+    if course is None:
+        raise UsageError("the course map cannot be read; `coursebuild check` says why")
+    return course
 
 
 class _Loader:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 
 from coursebuild.core.engine.memo import SIZE, Memo
+from coursebuild.core.files.changes import undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
@@ -36,6 +37,8 @@ class Options(Struct, frozen=True):
     """What was made before; what is kept in the course's folder where nothing is said."""
     long: bool = False
     """Whether scripts run of which the course keeps a run."""
+    verbose: bool = False
+    """Whether it is said of each script why it runs."""
     run_all: RunAll | None = None
     """What runs scripts, such as a server that stays for the next command; one of this command's
     own, where nothing is said."""
@@ -50,7 +53,7 @@ def find_course(directory: str | None) -> Path:
     """The course's folder: the one named, or the nearest above that holds `content/course.toml`.
 
     A named folder without a map is taken all the same: that the map is missing is then a mistake of
-    the course.
+    the course. What a killed command left half changed there is undone.
     """
     try:
         start = Path.cwd()
@@ -60,12 +63,21 @@ def find_course(directory: str | None) -> Path:
         root = find_root(None if directory is None else Path(directory), start)
     except EffectError as error:
         raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
+    check_path(root)
+    undo_changes(root)
+    return root
+
+
+def check_path(root: Path) -> None:
+    """Refuse a folder that no course can lie in.
+
+    MuJoCo opens no file whose path is not UTF-8, and a script cannot print it.
+    """
     try:
         str(root).encode()
-    except UnicodeEncodeError:  # MuJoCo opens no file there, and a script cannot print its path
+    except UnicodeEncodeError:
         shown = os.fsencode(root).decode("utf-8", "backslashreplace")
         raise UsageError(f"the path of the course is not UTF-8: {shown}") from None
-    return root
 
 
 def open_store(

@@ -164,6 +164,10 @@ def _run(
         memory.keep(inputs[done.path], done)
         progress.finished(done.path, done.outcome.value, done.seconds)
 
+    if options.verbose:
+        for job in todo:
+            if job.path in inputs:
+                progress.say(f"{job.path}: {'; '.join(memory.reasons(inputs[job.path]))}")
     memory.begin()
     run_all = run_all or options.run_all or run_scripts
     with progress.stage(stage, count):

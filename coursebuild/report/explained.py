@@ -1,15 +1,17 @@
-"""Why something would run again, or not, and what depends on it: values, and as text.
+"""Why something would run again, or not, and what depends on it: values, and as text; rules.
 
-Entry points: `Explanation`, `explained_text`.
+Entry points: `Explanation`, `explained_text`; `rule_text`.
 """
 
 from __future__ import annotations
 
+import re
 import time
 from typing import Literal
 
 from msgspec import Struct
 
+from coursebuild.core.text.rules import Rule
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, YELLOW, Style, visible
 from coursebuild.report.values import plural
 
@@ -51,6 +53,13 @@ class Explanation(Struct, frozen=True):
     """Models that it is a part of."""
     shown: tuple[str, ...] = ()
     """Files of the lessons and pages that show it, link to it or quote its output."""
+
+
+def rule_text(rule: Rule, page: str) -> str:
+    """What a rule means: its section of a page of rules, else what is known of it."""
+    section = re.search(rf"^## {rule.name}\n+(.*?)\s*(?=^## |\Z)", page, re.DOTALL | re.MULTILINE)
+    text = section[1] if section else f"{rule.severity.capitalize()}. {rule.summary}"
+    return f"{rule.name}\n\n{text}\n"
 
 
 def explained_text(explanation: Explanation, style: Style) -> str:

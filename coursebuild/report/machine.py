@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
-from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.rules import HELP, RULES
 from coursebuild.core.text.source import Span
 from coursebuild.report.terminal import Style
 from coursebuild.report.text import diagnostic_text, location
@@ -118,6 +118,7 @@ def to_sarif(report: Report) -> str:
         {
             "id": name,
             "shortDescription": {"text": RULES[name].summary},
+            "helpUri": HELP.format(name),
             "defaultConfiguration": {"level": RULES[name].severity},
         }
         for name in used

@@ -55,7 +55,7 @@ def test_a_course_is_built_without_a_feature(
         said = done.status, done.out.splitlines()[-1].partition(": ")[2]
         assert said == (0, "everything holds"), feature
         assert "<h2" in course.text("public/lessons/1.1-one.html")
-    assert "invalid choice: 'bench'" in course.run("bench", env=environments["bench"]).err
+    assert "there is no command `bench`" in course.run("bench", env=environments["bench"]).err
 
 
 def test_without_copies_no_page_offers_them(

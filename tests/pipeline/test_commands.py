@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild import __version__
+from coursebuild.cli.commands import known_commands
 from support.scratch_course import FIRST, GOOD, SECOND, Done, Folder, block, without_seconds
 
 pytestmark = pytest.mark.site
@@ -58,10 +60,16 @@ def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> N
 
 
 WRONG_USAGE = [
-    ("", "the following arguments are required: COMMAND"),
-    ("publish", "invalid choice: 'publish'"),
+    ("", "usage: coursebuild [-C DIR] COMMAND ...\n\nBuild a course"),
+    ("publish", "coursebuild: there is no command `publish`; `coursebuild help` lists them\n"),
+    ("buidl", "coursebuild: there is no command `buidl`; did you mean `build`?\n"),
+    ("help stabiliti", "coursebuild: there is no command `stabiliti`; did you mean `stability`?\n"),
+    (
+        "-q check",
+        "coursebuild: `-q` is no command: options stand behind one, and `-C` takes a folder\n",
+    ),
     ("check --nosuch", "unrecognized arguments: --nosuch"),
-    ("che", "invalid choice: 'che'"),
+    ("che", "there is no command `che`; did you mean `check`?"),
     ("check --form json", "unrecognized arguments: --form"),
     ("check --format yaml", "invalid choice: 'yaml'"),
     ("build extra", "unrecognized arguments: extra"),
@@ -73,7 +81,9 @@ WRONG_USAGE = [
     ("serve --port 65536", "'65536' is no port"),
     ("serve --port http", "'http' is no port"),
     ("schema nosuch", "there is no schema 'nosuch': choose from course, lab, model, quiz"),
-    ("-C", "expected one argument"),
+    ("-C", "`-C` takes a folder"),
+    ("check -C", "expected one argument"),
+    ("check -C no/such", "there is no folder no/such"),
     ("-C no/such check", "there is no folder no/such"),
     ("-C content/course.toml check", "content/course.toml is not a folder"),
     ("check 1.2", "no lesson or page is called `1.2`; known: `1.1`"),
@@ -123,10 +133,22 @@ def test_outside_of_a_course_gives_2(tmp_path: Path) -> None:
 
 
 def test_help_version_and_schemas_are_printed_anywhere(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    for arguments in (["--help"], ["-h"], ["help"]):
+        done = folder.main(*arguments)
+        assert (done.status, done.err) == (0, "")
+        for line in ("  check        verify, publish nothing\n", "  bench        measure speed"):
+            assert line in done.out
     in_build = ["-C", "build", "bench", "--help"]  # a folder that is called like a command
-    for arguments in (["--help"], ["check", "--help"], ["--version"], in_build):
-        done = Folder(tmp_path).main(*arguments)
-        assert (done.status, done.err, bool(done.out)) == (0, "", True), arguments
+    assert folder.main(*in_build) == folder.main("help", "bench")
+    for name in known_commands():
+        done = folder.main("help", name)
+        assert (done.status, done.err) == (0, ""), name
+        assert done.out.startswith(f"usage: coursebuild {name} "), name
+        assert "\nexamples:\n  " in done.out, name
+    for arguments in (["--version"], ["-V"], ["-C", "no/such", "-V"]):
+        done = folder.main(*arguments)
+        assert (done.status, done.out, done.err) == (0, f"coursebuild {__version__}\n", "")
     for name in ("quiz", "lab", "course"):
         done = Folder(tmp_path).main("schema", name)
         assert done.status == 0
@@ -147,6 +169,9 @@ def test_a_course_is_found_from_anywhere(make: Make, tmp_path: Path) -> None:
     relative = os.path.relpath(folder.root, elsewhere)
     for where in (folder.root, relative, f"{relative}/", f"{folder.root}/content/..", link):
         assert folder.main("-C", str(where), "check", cwd=elsewhere).status == 0, where
+    for words in (["check", "-C", relative], ["check", f"-C{relative}", "-q"]):
+        assert folder.main(*words, cwd=elsewhere).status == 0, words
+    assert folder.main("check", "--", "-C", cwd=folder.root).status == 2  # a lesson of this name
     assert not any(elsewhere.iterdir())
     where = str(folder.root)
     assert folder.main("-C", where, "build", "--out", "../a site/öut", cwd=elsewhere).status == 0

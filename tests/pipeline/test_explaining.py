@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.text.rules import RULES
 from support.scratch_course import HELLO, ROOT, Folder, block
 
 pytestmark = pytest.mark.site
@@ -237,7 +238,37 @@ def test_explain_lessons_and_files_by_any_of_their_names(course: Folder) -> None
     assert isinstance(own["made"], int)
 
 
+def test_explain_tells_what_a_rule_means_anywhere(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    done = folder.main("explain", "footnote-unused")
+    assert (done.status, done.err) == (0, "")
+    assert done.out.startswith(
+        "footnote-unused\n\nWarning. A footnote is written and never referred to.\n\n"
+    )
+    assert "\nwarning[footnote-unused]: " in done.out
+    page = (ROOT / "docs/rules.md").read_text()
+    shown = "".join(folder.main("explain", name).out for name in RULES)
+    assert shown.count("\nError. ") + shown.count("\nWarning. ") == len(RULES)
+    assert all(line in page for line in shown.splitlines())
+    told = json.loads(folder.main("explain", "footnote-unused", "--format", "json").out)
+    assert (told["name"], told["severity"]) == ("footnote-unused", "warning")
+
+
+def test_verbose_says_why_each_script_runs(course: Folder) -> None:
+    done = course.main("check", "-v")
+    assert "examples/hello.py: there is no result of it on this machine\n" in done.err
+    course.write("models/data.txt", "wxyz")
+    done = course.main("check", "-v")
+    assert "examples/reads.py: models/data.txt changed\n" in done.err
+    assert "examples/hello.py" not in done.err
+    done = course.main("check", "1.2", "--verbose", "--no-cache")
+    assert "examples/helper.py: everything is to run again\n" in done.err
+
+
 def test_explain_what_cannot_be_explained_gives_2(course: Folder) -> None:
+    done = course.main("explain", "output-drif")
+    said = "nothing of this course is called `output-drif`; did you mean `output-drift`?"
+    assert (done.status, done.err) == (2, f"coursebuild: {said}\n")
     done = course.main("explain", "examples/helo.py")
     said = "nothing of this course is called `examples/helo.py`; did you mean `examples/hello.py`?"
     assert (done.status, done.err) == (2, f"coursebuild: {said}\n")

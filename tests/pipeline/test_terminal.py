@@ -159,6 +159,9 @@ def test_colours_are_for_a_terminal_that_wants_them(make: Make) -> None:
 
     assert "\x1b[" in shown(NO_COLOR="").replace(ERASE, "")
     assert "\x1b" not in shown(NO_COLOR="1").replace(ERASE, "")
+    for asked, coloured in (({"FORCE_COLOR": "1"}, True), ({"FORCE_COLOR": ""}, False)):
+        assert ("\x1b[" in folder.run("check", env=asked).out) == coloured, "into a pipe"
+    assert "\x1b" not in folder.run("check", env={"FORCE_COLOR": "1", "NO_COLOR": "1"}).out
     shutil.rmtree(folder.root / ".coursebuild/scripts")
     dumb = shown(TERM="dumb")
     assert "\x1b" not in dumb

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import tomllib
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -12,6 +14,7 @@ from coursebuild.core.text.diagnostics import Note, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.report import Report, ScriptLine, Style, Summary, render_report
 
+ROOT = Path(__file__).parents[2]
 SOURCE = Source("content/lessons/1.1-a,b.md", "first\nwr\x00ng <&> here\n")
 ERROR = diagnose(
     "math-syntax",
@@ -127,7 +130,10 @@ def test_sarif_names_rule_region_and_related_places() -> None:
     run = json.loads(render_report(REPORT, "sarif", Style()))["runs"][0]
     result = run["results"][1]
     assert result["ruleId"] == "math-syntax"
-    assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == "math-syntax"
+    rule = run["tool"]["driver"]["rules"][result["ruleIndex"]]
+    assert rule["id"] == "math-syntax"
+    site = tomllib.loads((ROOT / "content/course.toml").read_text())["course"]["base_url"]
+    assert rule["helpUri"] == f"{site}rules.html#math-syntax"
     assert result["locations"][0]["physicalLocation"]["region"] == {
         "startLine": 2,
         "startColumn": 1,

@@ -18,14 +18,15 @@ import shutil
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from coursebuild.core.engine import publish as publishing
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import check_out, publish
+from coursebuild.core.files.changes import FileChange, change_files, undo_changes
 from coursebuild.core.files.examples import write_examples
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.files.write import write_atomic
+from coursebuild.core.files.write import PREFIX, write_atomic
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 
 CALLS = ("fsync", "rename", "replace", "link", "symlink", "unlink", "rmdir", "mkdir")
@@ -220,6 +221,31 @@ class Create(Update):
         assert (root / "lessons/b.md").read_bytes() == b"another"
 
 
+class ChangeTogether(Update):
+    """Change a file, make one and remove one, all or none: the next command undoes the rest."""
+
+    before: ClassVar = {"a.md": Update.old, "b.md": b"another"}
+    after: ClassVar = {"b.md": b"changed", "c.md": Update.new}
+
+    def run(self, root: Path) -> None:
+        if self.lessons(root) != self.after:
+            names = sorted({*self.before, *self.after})
+            pairs = [(name, self.before.get(name), self.after.get(name)) for name in names]
+            changes = [FileChange(f"lessons/{name}", old, new) for name, old, new in pairs]
+            change_files(root, changes)
+
+    def lessons(self, root: Path) -> dict[str, bytes]:
+        return {p: d for p, d in tree(root / "lessons").items() if not p.startswith(PREFIX)}
+
+    def whole(self, root: Path) -> None:
+        undo_changes(root)
+        assert self.lessons(root) in (self.before, self.after)
+
+    def done(self, root: Path) -> None:
+        assert tree(root / "lessons") == self.after
+        assert not (root / ".coursebuild/changes").exists()
+
+
 class Extract:
     """Change, add and remove scripts beside an author's file and one that was changed by hand."""
 
@@ -295,6 +321,7 @@ SCENARIOS = (
     PublishFirst,
     Update,
     Create,
+    ChangeTogether,
     Extract,
     ExtractAndChange,
 )

@@ -1,10 +1,11 @@
 """Where the files lie that come with the tool and are not Python.
 
 Entry points: `assets_dir`, for what the build of the package bundles for browsers; `templates_dir`,
-for the pages' templates; `bundled_files` and `template_texts` read them whole, `Bundle` one by one.
+for the pages' templates; `bundled_files` and `template_texts` read them whole, `Bundle` one by one;
+`rules_page`, the page of all rules.
 
-In an installed package both are inside it. In a source tree they are where they are made:
-`site/dist` and `templates`.
+In an installed package all are inside it. In a source tree they are where they are made:
+`site/dist`, `templates` and `docs`.
 """
 
 from __future__ import annotations
@@ -35,6 +36,16 @@ def templates_dir() -> Path:
         EffectError: the installation is broken.
     """
     return _first(_PACKAGE / "templates", _TREE / "templates", "the page templates are missing")
+
+
+def rules_page() -> str:
+    """The Markdown that has a section for each rule, with an example.
+
+    Raises:
+        EffectError: the installation is broken.
+    """
+    folder = _first(_PACKAGE / "docs", _TREE / "docs", "the page of rules is missing")
+    return (folder / "rules.md").read_text(encoding="utf-8")
 
 
 def bundled_files() -> tuple[tuple[str, bytes], ...]:

@@ -1,6 +1,6 @@
 """Replacing a file of the course in one step, or not at all.
 
-Entry points: `write_atomic`, `check_writable`, `remove_leftovers`.
+Entry points: `write_atomic`, `check_writable`, `check_unchanged`, `remove_leftovers`.
 
 1. The new bytes go into a temporary file in the same folder, locked so that others see that its
    writer lives.
@@ -58,7 +58,7 @@ def write_atomic(
             _fill(fd, data, target)
             if durable:
                 os.fsync(fd)
-            _check_unchanged(target, path, expected)
+            check_unchanged(target, path, expected)
             _put(temporary, target, path, new=expected is None)
             if durable:
                 _sync_folder(target.parent)
@@ -157,10 +157,15 @@ def _put(temporary: str, target: Path, path: str, *, new: bool) -> None:
     Path(temporary).replace(target)
 
 
-def _check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
+def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
+    """Refuse to go on where a file does not hold what is expected; `None` is no file.
+
+    Raises:
+        FileChangedError: it does not.
+    """
     try:
         current: bytes | None = target.read_bytes()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         current = None
     if current == expected:
         return

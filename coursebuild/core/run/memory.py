@@ -38,6 +38,7 @@ from coursebuild.core.run.dependencies import (
     Need,
     forgotten,
     group_key,
+    input_changes,
     inputs_of,
     is_perturbed,
     looked_at,
@@ -163,6 +164,19 @@ class Memory:
         data = self.store.peek(_LAST, _last_key(path))
         record = None if data is None else from_bytes(data.partition(b"\n")[2])
         return record if record is not None and record.inputs.path == path else None
+
+    def reasons(self, inputs: Inputs) -> list[str]:
+        """Why a result of these inputs is not used."""
+        if self.fresh:
+            return ["everything is to run again"]
+        last = self.last(inputs.path)
+        if last is None:
+            return ["there is no result of it on this machine"]
+        found = input_changes(last.inputs, inputs)
+        found += state_changes(last.dependencies, self.states)
+        if last.forgotten:
+            found.append(f"its last result is not remembered: {last.forgotten}")
+        return found or ["its result is no longer kept"]
 
     def note_trial(
         self,

@@ -10,6 +10,9 @@ from typing import Literal
 
 from msgspec import Struct
 
+HELP = "https://example.org/mujoco-course/rules.html#{}"
+"""Where a rule is explained: on the site of coursebuild's own course, of the map's `base_url`."""
+
 
 class Rule(Struct, frozen=True):
     """One entry of the catalogue."""

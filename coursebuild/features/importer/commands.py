@@ -43,10 +43,16 @@ _ROOM = 3.0
 _MISSING = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
 
 
+EXAMPLES = """\
+examples:
+  coursebuild import ../old-course --out my-course
+"""
+
+
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""
     parser.description = (
-        "Write a course of another tool as one of coursebuild: a course.json with Markdown, "
+        "Write a course of another tool as one of coursebuild: a course.json with Markdown,\n"
         "Jupyter notebooks, MyST or Quarto. Its folder is only read."
     )
     add_running(parser)

@@ -128,13 +128,13 @@ def test_saved_at_the_last_moment(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_made_after_the_last_look(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    really = write._check_unchanged
+    really = write.check_unchanged
 
     def look(target: Path, path: str, expected: bytes | None) -> None:
         really(target, path, expected)
         target.write_bytes(b"made by somebody")
 
-    monkeypatch.setattr(write, "_check_unchanged", look)
+    monkeypatch.setattr(write, "check_unchanged", look)
     with pytest.raises(FileChangedError):
         write_atomic(tmp_path, "a.md", b"new", expected=None)
     assert (tmp_path / "a.md").read_bytes() == b"made by somebody"

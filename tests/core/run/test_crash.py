@@ -26,7 +26,7 @@ def names(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "at_least"), [*zip(SCENARIOS, (20, 20, 12, 12, 4, 4, 14, 14), strict=True)]
+    ("scenario", "at_least"), [*zip(SCENARIOS, (20, 20, 12, 12, 4, 4, 12, 14, 14), strict=True)]
 )
 def test_killed_wherever_it_changes_a_folder(
     tmp_path: Path, scenario: type[Publish | Update | Extract], at_least: int

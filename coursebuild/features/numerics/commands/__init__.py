@@ -13,6 +13,11 @@ from coursebuild.features.numerics.commands.stability import check_stability, st
 from coursebuild.pipeline.options import Options
 from coursebuild.report.values import json_text
 
+EXAMPLES = """\
+examples:
+  coursebuild stability impact           one family of hard cases
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

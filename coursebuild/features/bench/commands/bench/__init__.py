@@ -15,6 +15,12 @@ from coursebuild.features.bench.commands.bench.values import bench_values
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.pipeline.options import Options
 
+EXAMPLES = """\
+examples:
+  coursebuild bench --quick              a first look at all models
+  coursebuild bench pendulum --record    what pages show of it
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

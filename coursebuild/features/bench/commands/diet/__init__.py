@@ -12,6 +12,12 @@ from coursebuild.features.bench.commands import measured, write_measured
 from coursebuild.features.bench.commands.diet.run import diet
 from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
 
+EXAMPLES = """\
+examples:
+  coursebuild diet pendulum              what it could be without
+  coursebuild diet --fix                 take out what changes nothing
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""

@@ -1,0 +1,104 @@
+"""Which commands there are, and what the words of a line ask for.
+
+Entry points: `run_command`; `known_commands` and `parser_of`, what can be said.
+
+A command is a name, a summary, and a module with `declare(parser)`, which adds its arguments, and
+`run(arguments)`, which gives the exit status. `EXAMPLES` of the module, if there, end its help.
+Features bring further commands (`core.features.Command`). Only the module of the command that is
+given is imported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from collections.abc import Sequence
+
+from coursebuild.cli.output import CLEAN, USAGE, say, write
+from coursebuild.core.files.errors import UsageError
+
+TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
+if TYPE_CHECKING:
+    from coursebuild.core.features import Command
+
+_OVERVIEW = """\
+usage: coursebuild [-C DIR] COMMAND ...
+
+Build a course of executable lessons: every recorded output is verified.
+
+commands:
+{}
+anywhere on the line:
+  -C DIR         the course's folder (default: the nearest one with content/course.toml)
+
+`coursebuild help COMMAND` says what a command takes, `coursebuild --version` which version this is.
+"""
+
+
+def run_command(directory: str | None, words: Sequence[str]) -> int:
+    """Do what the words ask for, in a folder; gives the exit status.
+
+    Raises:
+        UsageError: they ask for nothing that there is.
+    """
+    match words:
+        case []:
+            return say(USAGE, _overview().rstrip())
+        case ["-h" | "--help", *_] | ["help"] | ["help", "-h" | "--help" | "help", *_]:
+            return write(_overview(), CLEAN)
+        case ["-V" | "--version", *_]:
+            from coursebuild import __version__
+
+            return write(f"coursebuild {__version__}\n", CLEAN)
+        case ["help", name, *_]:
+            words = [name, "--help"]
+        case _:
+            pass
+    name, *rest = words
+    if name.startswith("-"):
+        message = f"`{name}` is no command: options stand behind one, and `-C` takes a folder"
+        raise UsageError(message)
+    command = known_commands(installed=False).get(name) or known_commands().get(name)
+    if command is None:
+        from coursebuild.core.text.diagnostics import did_you_mean
+
+        help = did_you_mean(name, known_commands()) or "`coursebuild help` lists them"
+        raise UsageError(f"there is no command `{name}`; {help}")
+    arguments = parser_of(command).parse_args(
+        rest, argparse.Namespace(root=directory, words=tuple(words))
+    )
+    return int(importlib.import_module(command.module).run(arguments))
+
+
+def known_commands(*, installed: bool = True) -> dict[str, Command]:
+    """By name: those of every course, and those of installed features."""
+    from coursebuild.core.features import Command
+    from coursebuild.core.registry import CORE_COMMANDS, installed_features
+
+    found = [
+        Command(name=name, summary=summary, module=f"coursebuild.cli.{name}")
+        for name, summary in CORE_COMMANDS.items()
+    ]
+    if installed:  # to find them takes longer than all the rest
+        found += [command for feature in installed_features() for command in feature.commands]
+    return {command.name: command for command in found}
+
+
+def parser_of(command: Command) -> argparse.ArgumentParser:
+    """What can be said to a command."""
+    code = importlib.import_module(command.module)
+    parser = argparse.ArgumentParser(
+        prog=f"coursebuild {command.name}",
+        description=f"{command.summary[:1].upper()}{command.summary[1:]}.",
+        epilog=getattr(code, "EXAMPLES", None),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("-C", metavar="DIR", dest="root", help="the course's folder")
+    code.declare(parser)
+    return parser
+
+
+def _overview() -> str:
+    rows = (f"  {one.name:<13}{one.summary}\n" for one in known_commands().values())
+    return _OVERVIEW.format("".join(rows))

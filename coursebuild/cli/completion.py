@@ -1,0 +1,123 @@
+"""`coursebuild completion`: print what completes commands in a shell.
+
+What it prints asks this command in turn, with the words of the line behind `--`, what the last one
+may become. Where nothing is known the shell completes names of files.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+
+from coursebuild.cli.commands import known_commands, parser_of
+from coursebuild.cli.output import CLEAN, write
+from coursebuild.cli.unchanged import split_directory
+from coursebuild.core.files.course_root import MAP, find_course_root
+from coursebuild.core.registry import features
+from coursebuild.core.syntax.schemas import schema_roots
+from coursebuild.core.text.rules import RULES
+
+EXAMPLES = """\
+examples:
+  eval "$(coursebuild completion bash)"                 in ~/.bashrc
+  eval "$(coursebuild completion zsh)"                  in ~/.zshrc, behind compinit
+  coursebuild completion fish | source                  in ~/.config/fish/config.fish
+"""
+
+_SCRIPTS = {
+    "bash": """\
+_coursebuild() {
+    local IFS=$'\\n'
+    COMPREPLY=($(coursebuild completion bash -- "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null))
+}
+complete -o default -F _coursebuild coursebuild
+""",
+    "zsh": """\
+_coursebuild() {
+    local -a words_known
+    words_known=("${(@f)$(coursebuild completion zsh -- "${(@)words[2,CURRENT]}" 2>/dev/null)}")
+    [[ -n $words_known ]] && compadd -- $words_known || _files
+}
+compdef _coursebuild coursebuild
+""",
+    "fish": """\
+complete -c coursebuild -a '(coursebuild completion fish -- \\
+    (commandline -opc)[2..] (commandline -ct) 2>/dev/null)'
+""",
+}
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    parser.add_argument("shell", choices=_SCRIPTS, metavar="SHELL", help=", ".join(_SCRIPTS))
+    parser.add_argument("line", nargs="*", metavar="WORD", help="of a line that is to be completed")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the script, or what a word may become."""
+    if not arguments.line:
+        return write(_SCRIPTS[arguments.shell], CLEAN)
+    directory, words = split_directory(arguments.line)
+    return write("".join(f"{word}\n" for word in _candidates(directory, words)), CLEAN)
+
+
+def _candidates(directory: str | None, words: list[str]) -> list[str]:
+    """What the last word may become, in order."""
+    *before, last = words or [""]
+    known = known_commands()
+    if not before or before == ["help"]:
+        found: Iterable[str] = [*known, *([] if before else ["help", "--version", "-C"])]
+    elif before[0] not in known:
+        found = ()
+    else:
+        found = _of_command(parser_of(known[before[0]]), before, last, directory)
+    return sorted({word for word in found if word.startswith(last)})
+
+
+def _of_command(
+    parser: argparse.ArgumentParser, before: list[str], last: str, directory: str | None
+) -> Iterable[str]:
+    actions = parser._actions
+    if last.startswith("-"):
+        return [name for action in actions for name in action.option_strings]
+    for action in actions:
+        if before[-1] in action.option_strings and action.nargs != 0:
+            return action.choices or ()
+    return [
+        word
+        for action in actions
+        if not action.option_strings
+        for word in _values(action, directory)
+    ]
+
+
+def _values(action: argparse.Action, directory: str | None) -> Iterable[str]:
+    """What a positional argument may be, by what the help calls it."""
+    if action.choices:
+        return action.choices
+    root = find_course_root(directory or ".")
+    match action.metavar:
+        case "LESSON" | "OLD" if root is not None:
+            return _lessons(Path(root))
+        case "MODEL" | "SCENE" if root is not None:
+            return sorted(path.stem for path in Path(root, "models").glob("*.xml"))
+        case "RULE|PATH":
+            return [*RULES, *(_lessons(Path(root)) if root is not None else ())]
+        case "SCHEMA":
+            return schema_roots()
+        case "EXPORT":
+            return [one.name for feature in features() for one in feature.exporters]
+        case _:
+            return ()
+
+
+def _lessons(root: Path) -> list[str]:
+    """Ids of the lessons and pages of a map; none where it cannot be read."""
+    try:
+        course = tomllib.loads((root / MAP).read_text("utf-8"))
+        lessons = [one["id"] for level in course["level"] for one in level["lesson"]]
+        return [*lessons, *(page["id"] for page in course.get("page", ()))]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
