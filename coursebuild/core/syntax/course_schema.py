@@ -1,12 +1,15 @@
 """The tables and fields of course.toml.
 
-Entry point: `CourseFile`. The decoder checks the file against it, and the JSON Schema for editors
-is made from it; ids that must be unique and prerequisites that must exist are checked in
-`coursemap`.
+Entry points: `CourseFile`; `slug_of`, a slug made of a title.
+
+The decoder checks the file against `CourseFile`, and the JSON Schema for editors is made from it;
+ids that must be unique and prerequisites that must exist are checked in `coursemap`.
 """
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
@@ -64,6 +67,12 @@ FolderPath: TypeAlias = Annotated[
         extra={"expects": "a folder of the course, as in `src`"},
     ),
 ]
+
+
+def slug_of(text: str) -> str:
+    """A name for files and addresses: lower-case words of ASCII joined by hyphens."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
+    return "-".join(re.findall("[a-z0-9]+", plain)) or "untitled"
 
 
 class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,6 +1,6 @@
 """TOML, every value with its place.
 
-Entry point: `parse_toml(source)`.
+Entry points: `parse_toml(source)`; `quoted`, a string as TOML has it.
 
 1. `tomllib` says whether the text is TOML. What is wrong otherwise is told by `toml_mistakes`.
 2. tree-sitter says where keys, values and headers stand. Of these come the nodes that JSON gives
@@ -9,6 +9,7 @@ Entry point: `parse_toml(source)`.
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from typing import TypeAlias
@@ -56,6 +57,11 @@ def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode
     except ValueError as error:
         wrong = _repeated_key(body, str(error)) or mistake_of(body, str(error), rule)
     return Parsed(None, (wrong,))
+
+
+def quoted(text: str) -> str:
+    """A basic string of TOML, which takes the escapes of JSON."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _body(source: Source) -> Excerpt:

@@ -5,12 +5,13 @@ Entry points: `ImportedText`, a lesson or page on its way; `texts_of`, `map_text
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
+from coursebuild.core.syntax.course_schema import slug_of
+from coursebuild.core.syntax.toml_text import quoted
 from coursebuild.features.importer.lesson import read_segments
 from coursebuild.features.importer.values import (
     Files,
@@ -19,7 +20,6 @@ from coursebuild.features.importer.values import (
     SourceLesson,
     SourceLevel,
     name_of,
-    slug_of,
 )
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
@@ -111,7 +111,7 @@ def _map(
     yield from ("", "[verify]", 'compare = "digits"')
     if callouts:
         yield from ("", "[callouts]")
-        yield from (f"{_quoted(kind)} = {_quoted(label)}" for kind, label in callouts.items())
+        yield from (f"{quoted(kind)} = {quoted(label)}" for kind, label in callouts.items())
     rest = iter(texts)
     for number, level in enumerate(course.levels, 1):
         yield from ("", "[[level]]")
@@ -141,13 +141,8 @@ def _status(lesson: SourceLesson) -> str:
 def _fields(**values: str | tuple[str, ...] | int | None) -> Iterator[str]:
     for name, value in values.items():
         if isinstance(value, tuple) and value:
-            yield f"{name} = [{', '.join(map(_quoted, value))}]"
+            yield f"{name} = [{', '.join(map(quoted, value))}]"
         elif isinstance(value, str) and value:
-            yield f"{name} = {_quoted(value)}"
+            yield f"{name} = {quoted(value)}"
         elif isinstance(value, int):
             yield f"{name} = {value}"
-
-
-def _quoted(text: str) -> str:
-    """A basic string of TOML, which takes the escapes of JSON."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

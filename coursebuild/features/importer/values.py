@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import posixpath
 import re
-import unicodedata
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -124,12 +123,6 @@ def read_yaml(text: str) -> Any:
         return yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError):  # such as a date that is none
         return None
-
-
-def slug_of(text: str) -> str:
-    """A name for files and addresses: lower-case words of ASCII joined by hyphens."""
-    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
-    return "-".join(re.findall("[a-z0-9]+", plain)) or "untitled"
 
 
 def stem_of(path: str) -> str:

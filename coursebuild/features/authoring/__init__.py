@@ -1,0 +1,24 @@
+"""What takes an author from nothing to a course, and through its changes: commands.
+
+- `init`: a small complete course, from the files in `course/`
+- `new`: a lesson, with its entry in the map (`course_map`), or a model
+- `rename`: a lesson gets another id, wherever the course names it (`references`)
+- `doctor`: what of all that courses need works here
+"""
+
+from coursebuild.core.features import Command, Feature
+
+_SUMMARIES = {
+    "init": "make a small complete course to begin with",
+    "new": "add a lesson or a model",
+    "rename": "give a lesson another id, wherever the course names it",
+    "doctor": "say what works on this machine, and what to do where it does not",
+}
+FEATURE = Feature(
+    name="authoring",
+    needs=("lab",),
+    commands=tuple(
+        Command(name=name, summary=summary, module=f"{__name__}.commands.{name}")
+        for name, summary in _SUMMARIES.items()
+    ),
+)

@@ -1,0 +1,75 @@
+"""`coursebuild new`: add a lesson or a model."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from coursebuild.cli.arguments import options_of
+from coursebuild.core.files.changes import FileChange
+from coursebuild.core.files.errors import UsageError
+from coursebuild.core.syntax.course_schema import slug_of
+from coursebuild.features.authoring.commands import apply_changes
+from coursebuild.features.authoring.course_map import with_lesson
+from coursebuild.pipeline.load import load_course
+
+EXAMPLES = """\
+examples:
+  coursebuild new lesson 1.4 "Large swings"
+  coursebuild new model pendulum
+"""
+_LESSON = "## First section\n\nText.\n"
+_MODEL = """\
+<mujoco model="{}">
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 0.1"/>
+    <body name="ball" pos="0 0 1">
+      <freejoint/>
+      <geom name="ball" size="0.1" mass="1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+_NAME = re.compile(r"\w[\w-]*(?:/\w[\w-]*)*", re.ASCII)
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    kinds = parser.add_subparsers(metavar="KIND", required=True, prog=parser.prog)
+    lesson = kinds.add_parser("lesson", help="a draft, and its entry in the course map")
+    lesson.add_argument("id", metavar="ID", help="its level's id, a dot, its own part, as in 1.4")
+    lesson.add_argument("title", metavar="TITLE")
+    lesson.add_argument("--slug", help="for its file and address (default: made of the title)")
+    lesson.set_defaults(add=_new_lesson)
+    model = kinds.add_parser("model", help="a file of models/ with a ball above a floor")
+    model.add_argument("name", metavar="NAME", help="letters, digits, `_` and `-`; `/` for folders")
+    model.set_defaults(add=_new_model)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the files."""
+    root = options_of(arguments).root
+    changes: Sequence[FileChange] = arguments.add(root, arguments)
+    return apply_changes(root, changes)
+
+
+def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
+    course = load_course(root)
+    id, title = arguments.id, arguments.title
+    if any("\ud800" <= char <= "\udfff" for char in title):
+        raise UsageError("the title is not UTF-8")
+    slug = arguments.slug or slug_of(title)
+    changed = with_lesson(course, id, slug, title)
+    return [
+        FileChange(course.map.path, course.map.text.encode(), changed.encode()),
+        FileChange(f"content/lessons/{id}-{slug}.md", None, _LESSON.encode()),
+    ]
+
+
+def _new_model(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
+    name = arguments.name
+    if not _NAME.fullmatch(name):
+        raise UsageError(f"`{name}` is no name of a model: use letters, digits, `_` and `-`")
+    return [FileChange(f"models/{name}.xml", None, _MODEL.format(name).encode())]

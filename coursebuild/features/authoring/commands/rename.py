@@ -1,0 +1,97 @@
+"""`coursebuild rename`: give a lesson another id, wherever the course names it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from coursebuild.cli.arguments import options_of
+from coursebuild.cli.output import WRONG, fail
+from coursebuild.core.engine.up_to_date import FOLDERS
+from coursebuild.core.files.changes import FileChange
+from coursebuild.core.files.errors import UsageError
+from coursebuild.core.files.read import read_bytes, read_sources
+from coursebuild.core.model import Course, Lesson
+from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.text.diagnostics import Edit
+from coursebuild.core.text.source import Source, Span
+from coursebuild.features.authoring.commands import apply_changes
+from coursebuild.features.authoring.course_map import with_lesson_renamed
+from coursebuild.features.authoring.references import doubtful_places, references
+from coursebuild.pipeline.load import load_course
+from coursebuild.pipeline.options import documents_by_name
+from coursebuild.report.terminal import visible
+from coursebuild.report.text import location
+from coursebuild.report.values import plural
+
+EXAMPLES = """\
+examples:
+  coursebuild rename 1.4 1.6
+  coursebuild rename 1.4 2.1 --leave      where code, comments or ranges mention it as well
+"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    parser.add_argument("old", metavar="LESSON", help="id, slug or file of the lesson")
+    parser.add_argument("new", metavar="ID", help="the id that it gets")
+    parser.add_argument(
+        "--leave", action="store_true", help="leave as they are the places that may mean it"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Change the map, the lesson's file, and all that leads to it."""
+    root = options_of(arguments).root
+    course, new = load_course(root), arguments.new
+    lesson = documents_by_name(course).get(arguments.old)
+    if not isinstance(lesson, Lesson):
+        raise UsageError(f"no lesson is called `{arguments.old}`")
+    edits = references(course, lesson, new)
+    changes = _changes(root, course, lesson, new, edits)
+    doubtful = doubtful_places(course, lesson, new, edits, _code(root))
+    if doubtful and not arguments.leave:
+        return _refuse(doubtful, lesson)
+    return apply_changes(root, changes)
+
+
+def _changes(
+    root: Path, course: Course, lesson: Lesson, new: str, edits: Sequence[Edit]
+) -> list[FileChange]:
+    """What becomes of the map, of the lesson's file, and of those that lead to it."""
+    by_source: dict[Source, list[Edit]] = {}
+    for edit in edits:
+        by_source.setdefault(edit.span.source, []).append(edit)
+    changed = with_lesson_renamed(course, lesson, new, by_source.pop(course.map))
+    found = [FileChange(course.map.path, course.map.text.encode(), changed.encode())]
+    for source, its in by_source.items():
+        text = apply_edits(source.text, its)
+        found.append(FileChange(source.path, source.text.encode(), text.encode()))
+    if lesson.document is None:
+        return found
+    data = read_bytes(root, lesson.path)
+    own = next((c for c in found if c.path == lesson.path), FileChange(lesson.path, data, data))
+    return [
+        *(change for change in found if change is not own),
+        FileChange(replace(lesson, id=new).path, None, own.new),
+        FileChange(lesson.path, own.old, None),
+    ]
+
+
+def _code(root: Path) -> tuple[Source, ...]:
+    """Code of the project, which may speak of lessons."""
+    files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
+    code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
+    return read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value
+
+
+def _refuse(doubtful: Sequence[Span], lesson: Lesson) -> int:
+    lines = [f"{plural(len(doubtful), 'place')} may mean lesson {lesson.id}:"]
+    for span in doubtful:
+        text = visible(span.source.line_text(span.line).strip())
+        lines.append(f"  {location(span)}: {text}")
+    help = "edit them first, or leave them as they are with --leave; nothing was changed"
+    return fail(WRONG, "\n".join(lines), help)

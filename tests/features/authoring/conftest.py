@@ -1,0 +1,22 @@
+"""Scratch courses for the commands that begin and change courses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from support.scratch_course import Folder
+
+
+@pytest.fixture
+def make(tmp_path: Path, stores: Path) -> Callable[..., Folder]:
+    """Makes a course of these lessons, in a folder with no simple name."""
+
+    def make(*lessons: str | bytes) -> Folder:
+        folder = Folder(tmp_path / "a cöurse")
+        folder.fill(lessons, stores)
+        return folder
+
+    return make

@@ -1,0 +1,102 @@
+"""A new course: it is whole, right on any machine, and takes the place of nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+from coursebuild import __version__
+from support.scratch_course import Folder
+
+pytestmark = pytest.mark.site
+
+SAID = """\
+wrote 9 files to {0}
+
+  coursebuild -C {1} serve    look at the course, and write
+  coursebuild -C {1} build    verify it, and write the site to public/
+"""
+
+
+@pytest.mark.engine
+def test_new_course_passes_check_and_build_as_it_is(tmp_path: Path, stores: Path) -> None:
+    outside = Folder(tmp_path)
+    name = "a cöurse's"
+    done = outside.main("init", name)
+    assert (done.status, done.err) == (0, "")
+    assert done.out == SAID.format(name, """'a cöurse'"'"'s'""")
+    folder = Folder(tmp_path / name)
+    made = folder.tree()
+    for store in stores.iterdir():
+        (folder.root / ".coursebuild" / store.name).symlink_to(store)
+    done = folder.main("check", "--no-cache")
+    assert (done.status, done.out.splitlines()[-1]) == (
+        0,
+        "1 lesson, 1 script run, 1 lab tried: everything holds",
+    )
+    assert done.out.startswith("ok "), "not even a warning"
+    assert folder.main("build").status == 0
+    assert {path: data for path, data in folder.tree().items() if path in made} == made
+    page = folder.text("public/lessons/1.1-pendulum.html")
+    for part in ("data-lab", "data-quiz", "swing", "2.0125 s"):
+        assert part in page, part
+    assert folder.main("doctor").status == 0
+
+
+def test_new_course_has_what_git_ci_and_an_editor_need(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    done = folder.main("init")
+    assert (done.status, "coursebuild serve " in done.out) == (0, True)
+    made = folder.tree()
+    assert {"public/", "examples/", ".coursebuild/"} <= {*folder.text(".gitignore").split()}
+    jobs = yaml.safe_load(made[".github/workflows/course.yml"])["jobs"]
+    steps = [step["run"] for step in jobs["check"]["steps"] if "run" in step]
+    assert steps == [
+        f'pip install "coursebuild=={__version__}"',
+        "coursebuild check --format github",
+        "coursebuild build",
+    ]
+    for path, data in made.items():
+        if path.endswith(".json"):
+            assert json.loads(data), path
+        if path.endswith(".toml"):
+            schema = data.decode().splitlines()[0].removeprefix("#:schema ")
+            assert (folder.root / "content" / schema).is_file()
+            assert tomllib.loads(data.decode())["verify"] == {"compare": "digits"}
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    folder.write("own/.gitignore", "*.log\n")
+    folder.write("own/models/pendulum.xml", "<mujoco/>")
+    (tmp_path / "linked").mkdir()
+    (tmp_path / "linked/.gitignore").symlink_to("nowhere")
+    before = folder.tree()
+    done = folder.main("init", "own")
+    assert (done.status, done.out, done.err) == (
+        2,
+        "",
+        "coursebuild: own has .gitignore, models/pendulum.xml already, so nothing was written\n"
+        "  help: name another folder, as in `coursebuild init my-course`\n",
+    )
+    assert folder.main("init", "linked").status == 2
+    assert folder.tree() == before
+    folder.write("file", "text")
+    done = folder.main("init", "file")
+    assert (done.status, done.err) == (1, "coursebuild: file cannot be made: file exists\n")
+    folder.write("half/models", "a file")
+    done = folder.main("init", "half")
+    assert (done.status, "models/pendulum.xml cannot be written: " in done.err) == (1, True)
+    assert folder.tree("half") == {"models": b"a file"}
+    done = folder.main("init", os.fsdecode(b"caf\xe9"))
+    assert (done.status, "the path of the course is not UTF-8: " in done.err) == (2, True)
+    (tmp_path / "kept").mkdir()
+    folder.write("kept/README.md", "# Mine\n")
+    assert folder.main("-C", "kept", "init").status == 0
+    assert folder.text("kept/README.md") == "# Mine\n"
+    assert folder.main("init", "kept").status == 2

@@ -1,0 +1,144 @@
+"""New lessons and models: their files, and the entry in a map that stays as its author wrote it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.text.source import Source
+from coursebuild.features.authoring.course_map import with_lesson
+from support.scratch_course import FIRST, SECOND, Done, Folder
+
+pytestmark = pytest.mark.site
+
+MAP = "content/course.toml"
+HEAD = '[course]\ntitle = "C"\n\n[[level]]\nid = "1"\ntitle = "One"  # a level\n'
+ENTRY = '[[level.lesson]]\nid = "{}"\nslug = "{}"\ntitle = "{}"\nstatus = "{}"\n'
+NEW = ENTRY.format("1.4", "new", "New", "draft")
+
+
+def planned(id: str, slug: str = "x") -> str:
+    return ENTRY.format(id, slug, "X", "planned")
+
+
+def added(text: str, id: str = "1.4") -> str:
+    course = parse_course_map(Source(MAP, text)).value
+    assert course is not None
+    return with_lesson(course, id, "new", "New")
+
+
+PLACES = {
+    "an empty level": (HEAD, HEAD + "\n" + NEW),
+    "no line end at the end": (HEAD.rstrip("\n"), HEAD + "\n" + NEW.rstrip("\n")),
+    "behind the one before, not by letters": (
+        f"{HEAD}\n{planned('1.3')}# of 1.3\n\n# of 1.10\n{planned('1.10')}\n# the end\n",
+        f"{HEAD}\n{planned('1.3')}\n{NEW}\n# of 1.3\n\n# of 1.10\n{planned('1.10')}\n# the end\n",
+    ),
+    "before the first, above its comment": (
+        f"{HEAD}\n# of 1.5\n# too\n{planned('1.5')}",
+        f"{HEAD}\n{NEW}\n# of 1.5\n# too\n{planned('1.5')}",
+    ),
+    "the last of a level that another follows": (
+        f'{HEAD}\n{planned("1.3")}minutes = 3 # short\n\n# ---\n\n[[level]]\nid = 2\ntitle = "T"\n',
+        f"{HEAD}\n{planned('1.3')}minutes = 3 # short\n\n{NEW}\n# ---\n\n"
+        '[[level]]\nid = 2\ntitle = "T"\n',
+    ),
+    "entries that stand close, and a table between": (
+        f"{HEAD}{planned('1.3')}{planned('1.5')}[verify]\ncompare = 'digits'\n",
+        f"{HEAD}{planned('1.3')}\n{NEW}\n{planned('1.5')}[verify]\ncompare = 'digits'\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", PLACES)
+@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
+def test_entry_is_put_where_it_belongs_and_all_else_stays(case: str, line_end: str) -> None:
+    before, after = (text.replace("\n", line_end) for text in PLACES[case])
+    assert added(before) == after
+
+
+def test_entry_is_as_far_in_as_those_around_it() -> None:
+    indented = "".join(f"  {line}\n" for line in planned("1.3").splitlines())
+    new = "".join(f"  {line}\n" for line in NEW.splitlines())
+    assert added(f"{HEAD}\n{indented}") == f"{HEAD}\n{indented}\n{new}"
+
+
+def test_new_lesson_is_checked_and_built_as_it_is(make: Callable[..., Folder]) -> None:
+    folder = make(FIRST, SECOND)
+    for arguments, path in (
+        (("1.10", 'Über "alles" \\ 50 %'), "content/lessons/1.10-uber-alles-50.md"),
+        (("1.3", "力学", "--slug", "lixue"), "content/lessons/1.3-lixue.md"),
+        (("1.2.1", "A\tB\x7f"), "content/lessons/1.2.1-a-b.md"),
+    ):
+        done = folder.main("new", "lesson", *arguments)
+        assert done == Done(0, f"changed {MAP}\nwrote {path}\n", "")
+        assert (folder.root / path).is_file()
+    done = folder.main("check")
+    assert (done.status, done.out.count("warning")) == (0, 0), done.out
+    ids = [line[6:-1] for line in folder.text(MAP).splitlines() if line.startswith("id = ")]
+    assert ids[1:] == ["1.1", "1.2", "1.2.1", "1.3", "1.10"]
+
+
+REFUSED = [
+    ("lesson 1.1 T", "there is a lesson 1.1 already: Lesson one"),
+    ("lesson 7.1 T", "the map has no level for `7.1`; known: `1`"),
+    ("lesson ../x T", "the map has no level for `../x`; known: `1`"),
+    ("lesson 1 T", f"{MAP} cannot have a lesson 1: "),
+    ("lesson 1./../x T", f"{MAP} cannot have a lesson 1./../x: "),
+    ("lesson 1.3 T --slug A/b", f"{MAP} cannot have a lesson 1.3: "),
+    ("lesson 1.3 \udcff", "the title is not UTF-8"),
+    ("lesson 1.7 there", "there is a file content/lessons/1.7-there.md already"),
+    ("model ../x", "`../x` is no name of a model: use letters, digits, `_` and `-`"),
+    ("model there", "there is a file models/there.xml already"),
+]
+
+
+def test_what_cannot_be_added_changes_nothing(make: Callable[..., Folder]) -> None:
+    folder = make(FIRST)
+    folder.write("content/lessons/1.7-there.md", "## There\n")
+    folder.write("models/there.xml", "<mujoco/>")
+    before = folder.tree()
+    for arguments, message in REFUSED:
+        done = folder.main("new", *arguments.split(" "))
+        assert (done.status, done.out) == (2, ""), arguments
+        assert message in done.err, arguments
+    assert folder.main("new", "lesson", "1.3", " ").status == 2
+    (folder.root / MAP).chmod(0o444)
+    done = folder.main("new", "lesson", "1.3", "T")
+    assert (done.status, f"{MAP} is read-only" in done.err) == (1, True)
+    assert folder.tree() == before
+    (folder.root / MAP).chmod(0o644)
+    for text, message in (
+        ("[", "the course map cannot be read; `coursebuild check` says why"),
+        (
+            'level = [{id = "1", title = "One"}]\ncourse = {title = "C"}\n',
+            f"{MAP} cannot have a lesson 1.3: ",
+        ),
+    ):
+        folder.write(MAP, text)
+        done = folder.main("new", "lesson", "1.3", "T")
+        assert (done.status, message in done.err, folder.text(MAP)) == (2, True, text)
+
+
+def test_new_model_compiles(make: Callable[..., Folder]) -> None:
+    folder = make(FIRST + "\nThe [model](model:parts/falling-ball).\n")
+    done = folder.main("new", "model", "parts/falling-ball")
+    assert done == Done(0, "wrote models/parts/falling-ball.xml\n", "")
+    assert folder.main("check").status == 0
+
+
+def test_read_only_folder_is_told(tmp_path: Path, make: Callable[..., Folder]) -> None:
+    folder = make(FIRST)
+    (folder.root / "models").write_text("a file where a folder is wanted")
+    done = folder.main("new", "model", "ball")
+    assert (done.status, done.out) == (1, "")
+    assert "models/ball.xml cannot be written: " in done.err
+    if os.geteuid():  # root may write everywhere
+        (folder.root / "content/lessons").chmod(0o555)
+        done = folder.main("new", "lesson", "1.3", "T")
+        (folder.root / "content/lessons").chmod(0o755)
+        assert (done.status, "1.3" in folder.text(MAP)) == (1, False)
