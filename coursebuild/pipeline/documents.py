@@ -173,12 +173,12 @@ class Documents(Parser):
 
     # --- drawing
 
-    def draw(self, pages: Iterator[PageRequest]) -> list[bytes]:
-        """Draw pages, which are in the store then; gives their records, encoded.
+    def draw(self, pages: Iterator[PageRequest]) -> Iterator[bytes]:
+        """Draw pages, which are in the store then; gives their records, encoded, in order.
 
         Pages are asked for while others are drawn.
         """
-        return [data for data, _ in self._work("drawing pages", pages)]
+        return (data for data, _ in self._work("drawing pages", pages))
 
     def page(self, key: str, request: Callable[[], PageRequest]) -> DrawnPage:
         """The page of a key, as it is in the store; drawn here and now, where it is not."""

@@ -14,6 +14,7 @@ Entry point: `Pages`.
 from __future__ import annotations
 
 import functools
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
@@ -171,26 +172,30 @@ class Pages:
 
     def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> dict[str, SitePage]:
         """The pages by site path, in order; they are drawn where they are not kept."""
-        found: dict[str, tuple[PageEntry, str, PageRecord | None]] = {}
+        found: dict[str, SitePage | None] = {}
+        asked: deque[tuple[PageEntry, str]] = deque()
 
         def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
             for entry in entries:
                 key, request = self._request(entry, keys)
                 kept = decode(self._store.get(PAGES, key, local=True), DrawnPage)
-                if kept is None and entry.path in self._last_good:
-                    continue  # what it was is gone
-                found[entry.path] = entry, key, None if kept is None else kept.record
-                if kept is None:
+                if kept is not None:
+                    found[entry.path] = self._noted(entry, key, kept.record)
+                elif entry.path not in self._last_good:  # else what it was is gone
+                    found[entry.path] = None
+                    asked.append((entry, key))
                     yield request or page_request(entry, self._library)
 
-        records = self._documents.draw(missing())
-        self.drawn = tuple(path for path, (_, _, record) in found.items() if record is None)
+        drawn: list[str] = []
+        for data in self._documents.draw(missing()):
+            entry, key = asked.popleft()
+            record = decode(data, PageRecord)
+            assert record is not None
+            found[entry.path] = self._noted(entry, key, record)
+            drawn.append(entry.path)
+        self.drawn = tuple(drawn)
         """Site paths of the pages that were drawn just now."""
-        new = dict(zip(self.drawn, records, strict=True))
-        return {
-            path: self._noted(entry, key, record or _decoded(new[path]))
-            for path, (entry, key, record) in found.items()
-        }
+        return {path: page for path, page in found.items() if page is not None}
 
     def _noted(self, entry: PageEntry, key: str, record: PageRecord) -> SitePage:
         """A page, now that it is known what it says."""
@@ -217,12 +222,6 @@ class Pages:
             make = functools.partial(page_request, page.entry, self._library)
             self._latest = path, self._documents.page(page.key, make)
         return self._latest[1]
-
-
-def _decoded(data: bytes) -> PageRecord:
-    record = decode(data, PageRecord)
-    assert record is not None
-    return record
 
 
 def framed(page: DrawnPage, frame: PageFrame) -> bytes:
