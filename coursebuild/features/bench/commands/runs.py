@@ -5,19 +5,18 @@ Entry points: `MeasuringRun`, which gives a `Measurement`; `CannotError`; `with_
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from msgspec.structs import astuple, replace
+from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import resolve_inside, write_atomic
-from coursebuild.core.model.results import Machine
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
+from coursebuild.core.values import fingerprint
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
@@ -76,7 +75,7 @@ class MeasuringRun:
         self,
         name: str,
         kind: str,
-        parts: Sequence[str],
+        parts: tuple[object, ...],
         what: type[_T],
         measure: Callable[[], _T | None],
     ) -> _T | None:
@@ -100,25 +99,14 @@ class MeasuringRun:
         self.progress.known()
         return found
 
-    def kept(self, kind: str, parts: Sequence[str], what: type[_T]) -> _T | None:
+    def kept(self, kind: str, parts: tuple[object, ...], what: type[_T]) -> _T | None:
         """What was made of these before."""
-        return None if self.again else self.options.store.get_value(kind, digest_of(parts), what)
+        return None if self.again else self.options.store.get_value(kind, fingerprint(parts), what)
 
-    def keep(self, kind: str, parts: Sequence[str], value: object) -> None:
+    def keep(self, kind: str, parts: tuple[object, ...], value: object) -> None:
         """Keep what was made of these."""
         if not self.again:
-            self.options.store.put_value(kind, digest_of(parts), value, local=self.local)
-
-
-def digest_of(parts: Iterable[str]) -> str:
-    """The key under which something is kept that was made of these."""
-    text = "\0\0".join(parts)
-    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
-
-
-def machine_parts(here: Machine) -> tuple[str, ...]:
-    """All that figures depend on of where they were measured."""
-    return tuple(map(str, astuple(here)))
+            self.options.store.put_value(kind, fingerprint(parts), value, local=self.local)
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:

@@ -23,7 +23,7 @@ from coursebuild.core.run.machine import machine, one_processor
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import MeasuringRun, machine_parts, with_records
+from coursebuild.features.bench.commands.runs import MeasuringRun, with_records
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.departures import Checked, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
@@ -90,7 +90,7 @@ class _CaseRun(MeasuringRun):
             return self.each(_chosen(names), self._one)
 
     def _one(self, name: str) -> CaseReport | None:
-        parts = (name, self.code, *machine_parts(self.here))
+        parts = (name, self.code, self.here)
         return self.once(name, "stability", parts, CaseReport, lambda: self._measured(name))
 
     def _measured(self, name: str) -> CaseReport | None:

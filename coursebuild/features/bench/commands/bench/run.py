@@ -24,11 +24,11 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.features.bench.commands.bench import measuring
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import (
     MeasuringRun,
     forbid_quick,
-    machine_parts,
     with_records,
 )
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
@@ -53,12 +53,11 @@ def bench(
     *,
     quick: bool = False,
     record: bool = False,
-    measuring: Any = None,
+    measuring: Any = measuring,
 ) -> Measurement[SceneReport]:
     """Measure the models that the names mean; all where there are none.
 
-    `record`: each model's report is also written into the course. `measuring`: what measures, if
-    not the module `measuring`.
+    `record`: each model's report is also written into the course. `measuring`: what measures.
 
     Raises:
         UsageError: no model is called so, or only a part is to be recorded.
@@ -79,7 +78,7 @@ def check(
     names: tuple[str, ...] = (),
     *,
     quick: bool = False,
-    measuring: Any = None,
+    measuring: Any = measuring,
 ) -> Measurement[SceneReport]:
     """Measure again, and hold it against what is recorded.
 
@@ -152,19 +151,19 @@ class SceneRun(MeasuringRun):
         self.quick = quick
         self.cards = cards
         """Whether it is also told what the models are made of."""
-        self._measuring = measuring
+        self.measuring = measuring
         self.here = machine(pinned=True)
         self.code = code_digest(*_CODE)
 
     def measure(self, scene: CourseScene) -> SceneReport | None:
         """What was measured on a scene; `None` where it cannot be."""
-        parts = (scene.name, scene.digest, f"{self.quick}", self.code, *machine_parts(self.here))
-        whole = (*parts, f"{self.cards}")
+        parts = (scene.name, scene.digest, self.quick, self.code, self.here)
+        whole = (*parts, self.cards)
         return self.once(
             scene.name, "bench", whole, SceneReport, lambda: self._report(scene, parts)
         )
 
-    def _report(self, scene: CourseScene, parts: tuple[str, ...]) -> SceneReport:
+    def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> SceneReport:
         loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
         scenarios = tuple(self._scenarios(scene, loaded, parts))
         sweeps = tuple(self._sweeps(scene, loaded, parts))
@@ -182,7 +181,7 @@ class SceneRun(MeasuringRun):
         return report
 
     def _sweeps(
-        self, scene: CourseScene, loaded: Any, parts: tuple[str, ...]
+        self, scene: CourseScene, loaded: Any, parts: tuple[object, ...]
     ) -> Iterator[SweepReport]:
         """Each sweep, from what is kept or measured now."""
         for sweep in () if scene.declared is None else scene.declared.sweeps:
@@ -196,11 +195,11 @@ class SceneRun(MeasuringRun):
             yield found
 
     def _scenarios(
-        self, scene: CourseScene, loaded: Any, parts: tuple[str, ...]
+        self, scene: CourseScene, loaded: Any, parts: tuple[object, ...]
     ) -> Iterator[ScenarioReport]:
         """Each scenario, from what is kept or measured now."""
         for number in range(len(loaded.scenarios)):
-            own = (*parts, f"{number}")
+            own = (*parts, number)
             found = self.kept("bench-scenarios", own, ScenarioReport)
             if found is None:
                 found = self.measuring.measured(
@@ -212,15 +211,6 @@ class SceneRun(MeasuringRun):
                 )
                 self.keep("bench-scenarios", own, found)
             yield found
-
-    @property
-    def measuring(self) -> Any:
-        """What measures, which is heavy."""
-        if self._measuring is None:
-            from coursebuild.features.bench.commands.bench import measuring
-
-            self._measuring = measuring
-        return self._measuring
 
 
 # ------------------------------------------------------------------------------------------- plots

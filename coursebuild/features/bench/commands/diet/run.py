@@ -30,7 +30,6 @@ from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import (
     MeasuringRun,
     forbid_quick,
-    machine_parts,
     with_records,
 )
 from coursebuild.numerics.engine import silent
@@ -80,10 +79,10 @@ def diet(
     return with_records(options.root, found, records)
 
 
-def _state(file: Path) -> str:
+def _state(file: Path) -> tuple[int, int]:
     """What tells whether a file is another one."""
     status = file.stat()
-    return f"{status.st_size} {status.st_mtime_ns}"
+    return status.st_size, status.st_mtime_ns
 
 
 class _DietRun(MeasuringRun):
@@ -146,28 +145,27 @@ class _DietRun(MeasuringRun):
             self.remarks.append(f"changed {path}: {', '.join(dict.fromkeys(kinds.get(path, ())))}")
         return report
 
-    def _parts(self, look: DietModel) -> tuple[str, ...]:
+    def _parts(self, look: DietModel) -> tuple[object, ...]:
         """All that what is found depends on; first the digest of the model."""
-        parts = [look.scene.digest, look.scene.name, f"{self.quick}", self.code]
-        parts += machine_parts(self.here)
+        parts: list[object] = [look.scene.digest, look.scene.name, self.quick, self.code, self.here]
         declared = look.scene.declared
         for one in () if declared is None else declared.keep:
             place = one.finding_span
-            parts.append(f"{one.finding}\0{one.reason}\0{place.line}:{place.column}")
-        parts += [f"{path}\0{why}" for path, why in look.locked.items()]
+            parts.append((one.finding, one.reason, place.line, place.column))
+        parts += look.locked.items()
         if look.readers.files and self.course is not None:
-            parts += [f"{one.source.path}\0{one.source.text}" for one in self.course.documents]
-            parts += [f"{path}\0{_state(self.options.root / path)}" for path in self.files.files]
+            parts += [(one.source.path, one.source.text) for one in self.course.documents]
+            parts += [(path, _state(self.options.root / path)) for path in self.files.files]
         return tuple(parts)
 
-    def kept(self, kind: str, parts: Sequence[str], what: type[_T]) -> _T | None:
+    def kept(self, kind: str, parts: tuple[object, ...], what: type[_T]) -> _T | None:
         """What was found before, if there is nothing in it to fix where that is wanted."""
         found = super().kept(kind, parts, what)
         if self.fix and isinstance(found, DietReport) and any(o.fixable for o in found.findings):
             return None
         return found
 
-    def keep(self, kind: str, parts: Sequence[str], value: object) -> None:
+    def keep(self, kind: str, parts: tuple[object, ...], value: object) -> None:
         """Keep what was found, unless the files changed meanwhile, by us or somebody else."""
         if isinstance(value, DietReport) and value.digest == parts[0]:
             super().keep(kind, parts, value)
