@@ -12,7 +12,7 @@ from coursebuild.core.model import Course, Document, FeatureBlock, document_bloc
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.model.scenarios import keyframe_scenarios
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.features.bench.model import Bench
+from coursebuild.features.bench.model import Bench, declared_scenarios
 
 
 def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
@@ -29,7 +29,7 @@ def check_keyframes(
     """What is wrong with scenarios of models that declare none: their keyframes are scenarios."""
     for document in course.documents:
         for block in document_blocks(document):
-            if isinstance(block, Bench) and not _declared(course, block.model):
+            if isinstance(block, Bench) and not declared_scenarios(course, block.model):
                 facts = facts_of(block)
                 if facts is not None:
                     yield from _check_scenario(block, keyframe_scenarios(facts.keyframes))
@@ -49,19 +49,13 @@ def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
         message = f"the model `{bench.model}` has no sweep `{bench.sweep}`"
         help = did_you_mean(bench.sweep, sweeps)
         yield diagnose("bench-scenario", bench.sweep_span or bench.span, message, help=help)
-    declared = _declared(course, bench.model)
+    declared = declared_scenarios(course, bench.model)
     if declared:
         yield from _check_scenario(bench, declared)
     if BENCH.path(bench.model) not in course.files:
         message = f"nothing was recorded of the model `{bench.model}`, so the page says so"
         help = f"measure it with `{BENCH.command(bench.model)}`"
         yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
-
-
-def _declared(course: Course, model: str) -> tuple[str, ...]:
-    """The scenarios that stand beside a model, by name."""
-    found = (one for one in course.declarations if one.model == model)
-    return tuple(scenario.name for one in found for scenario in one.scenarios)
 
 
 def _check_scenario(bench: Bench, names: Collection[str]) -> Iterator[Diagnostic]:

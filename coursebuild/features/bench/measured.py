@@ -15,18 +15,16 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.tools import Tools
 from coursebuild.features.bench.figures import again, factor, power, sentence, size, where, whole
+from coursebuild.features.bench.model import declared_scenarios
 from coursebuild.features.bench.scenarios import (
     ScenarioView,
     SweepView,
     plots,
     scenario_view,
-    sweep_plots,
     sweep_view,
 )
-from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
 from coursebuild.numerics.reports.records import BENCH, DIET
-from coursebuild.numerics.reports.sweep import SweepReport
 
 
 class FindingView(Struct, frozen=True):
@@ -70,11 +68,7 @@ class MeasuredView(Struct, frozen=True):
     diet_command: str
     numerics: str
     """The address of the hard cases; empty where there are none."""
-    reports: tuple[ScenarioReport, ...]
-    """Of the scenarios, for their plots."""
-    sweeps: tuple[SweepView, ...] = ()
-    swept: tuple[SweepReport, ...] = ()
-    """The same, for their plots."""
+    sweeps: tuple[SweepView, ...]
 
 
 def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasuredView:
@@ -83,7 +77,7 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
     scene, diet = library.reports.scenes.get(name), library.reports.diets.get(name)
     scenarios = () if scene is None else scene.scenarios
     sweeps = () if scene is None else scene.sweeps
-    declared = _declared(library, name)
+    declared = declared_scenarios(library.course, name)
     anchors = {one: scenario_anchor(one) for one in declared}
     return MeasuredView(
         scenarios=tuple(
@@ -101,25 +95,17 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
         diet=None if diet is None else _diet(words, place, diet),
         diet_command=again("diet", name, "--record"),
         numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
-        reports=scenarios,
         sweeps=tuple(
             sweep_view(words, one, scenario_anchor(f"sweep-{one.name}")) for one in sweeps
         ),
-        swept=sweeps,
     )
 
 
 def draw_measured(tools: Tools, view: MeasuredView) -> Markup:
     """The part of the page."""
-    drawn = tuple(plots(f"_plot-{n}", one) for n, one in enumerate(view.reports, 1))
-    swept = tuple(sweep_plots(f"_sweep-{n}", one) for n, one in enumerate(view.swept, 1))
+    drawn = tuple(plots(f"_plot-{n}", one.report) for n, one in enumerate(view.scenarios, 1))
+    swept = tuple(plots(f"_sweep-{n}", one.report) for n, one in enumerate(view.sweeps, 1))
     return tools.render("bench/measured.html", measured=view, plots=drawn, sweep_plots=swept)
-
-
-def _declared(library: Library, model: str) -> dict[str, str]:
-    """The titles of the scenarios that a model declares, by name."""
-    found = (one for one in library.course.declarations if one.model == model)
-    return {one.name: one.title or one.name for each in found for one in each.scenarios}
 
 
 def measured_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str], ...]:

@@ -1,10 +1,10 @@
-"""A recorded report that a text shows."""
+"""A recorded report that a text shows, and the scenarios that models declare."""
 
 from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
-from coursebuild.core.model import FeatureBlock
+from coursebuild.core.model import Course, FeatureBlock
 from coursebuild.core.text.source import Span
 
 BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
@@ -34,3 +34,9 @@ class Bench(FeatureBlock, frozen=True):
     def mentioned_models(self) -> tuple[str, ...]:
         """The one that was measured."""
         return (self.model,)
+
+
+def declared_scenarios(course: Course, model: str) -> dict[str, str]:
+    """The titles of the scenarios that stand beside a model, by name."""
+    found = (one for one in course.declarations if one.model == model)
+    return {one.name: one.title or one.name for each in found for one in each.scenarios}

@@ -20,8 +20,8 @@ from coursebuild.core.model import document_blocks, scenario_anchor
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escaped, guarded
 from coursebuild.features.bench.figures import Grid, again, where
-from coursebuild.features.bench.model import Bench
-from coursebuild.features.bench.scenarios import plots, scenario_view, sweep_plots, sweep_view
+from coursebuild.features.bench.model import Bench, declared_scenarios
+from coursebuild.features.bench.scenarios import plots, scenario_view, sweep_view
 from coursebuild.numerics.reports.sweep import SweepReport
 
 if TYPE_CHECKING:
@@ -70,12 +70,7 @@ def shown_bench(library: Library, place: urls.Place, bench: Bench) -> ShownBench
     if bench.sweep is not None:
         named = (one for one in (() if scene is None else scene.sweeps) if one.name == bench.sweep)
     report = next(named, None)
-    declared = {
-        one.name
-        for each in library.course.declarations
-        if each.model == bench.model
-        for one in each.scenarios
-    }
+    declared = declared_scenarios(library.course, bench.model)
     anchor = "measured"
     if isinstance(report, SweepReport):
         anchor = scenario_anchor(f"sweep-{report.name}")
@@ -163,5 +158,4 @@ def _plots(page: PageContext, block: Bench) -> tuple[Markup, ...]:
     if report is None or "plot" not in block.shows:
         return ()
     places = [b.span.start for b in document_blocks(page.document) if isinstance(b, Bench)]
-    name = f"_bench-{places.index(block.span.start) + 1}"
-    return sweep_plots(name, report) if isinstance(report, SweepReport) else plots(name, report)
+    return plots(f"_bench-{places.index(block.span.start) + 1}", report)

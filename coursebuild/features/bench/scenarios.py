@@ -74,6 +74,8 @@ class ScenarioView(Struct, frozen=True):
     """Of runs that say nothing, or of another model."""
     orders: Grid | None
     stable: Grid | None
+    report: ScenarioReport
+    """For its plot."""
 
 
 def scenario_view(words: Strings, report: ScenarioReport, anchor: str) -> ScenarioView:
@@ -88,6 +90,7 @@ def scenario_view(words: Strings, report: ScenarioReport, anchor: str) -> Scenar
         notes=tuple(_notes(words, report)),
         orders=_orders(words, report.orders),
         stable=_stable(words, report),
+        report=report,
     )
 
 
@@ -240,6 +243,8 @@ class SweepView(Struct, frozen=True):
     title: str
     table: Grid
     notes: tuple[str, ...]
+    report: SweepReport
+    """For its plot."""
 
 
 def sweep_view(words: Strings, sweep: SweepReport, anchor: str = "") -> SweepView:
@@ -251,26 +256,19 @@ def sweep_view(words: Strings, sweep: SweepReport, anchor: str = "") -> SweepVie
     ]
     marked = tuple(n for n, row in enumerate(sweep.rows) if row.own)
     notes = lost_runs((f"{row.parameter} {row.value}", row) for row in sweep.rows)
-    return SweepView(anchor, sweep.title, grid(sweep.title, columns, marked=marked), tuple(notes))
+    table = grid(sweep.title, columns, marked=marked)
+    return SweepView(anchor, sweep.title, table, tuple(notes), sweep)
 
 
-def sweep_plots(name: str, sweep: SweepReport) -> tuple[Markup, ...]:
-    """The plot of a sweep for wide and narrow screens."""
-    from coursebuild.numerics.reports.sweep_plot import sweep_svg  # which few pages need
-
-    drawn = (
-        sweep_svg(sweep, name=f"{name}-{kind}", narrow=kind == "narrow")
-        for kind in ("wide", "narrow")
-    )
-    return tuple(Markup(svg) for svg in drawn if svg)
-
-
-def plots(name: str, report: ScenarioReport) -> tuple[Markup, ...]:
-    """The plot of a scenario for wide and narrow screens; `name` is that of no other one there."""
+def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[Markup, ...]:
+    """A plot for wide and narrow screens; `name` is that of no other one there."""
     from coursebuild.numerics.reports.plot import plot_svg  # which few pages need
+    from coursebuild.numerics.reports.sweep_plot import sweep_svg
 
-    drawn = (
-        plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
+    found = (
+        sweep_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
+        if isinstance(report, SweepReport)
+        else plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
         for kind in ("wide", "narrow")
     )
-    return tuple(Markup(svg) for svg in drawn if svg)
+    return tuple(Markup(svg) for svg in found if svg)

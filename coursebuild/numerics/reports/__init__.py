@@ -2,8 +2,8 @@
 
 Entry points: `Reports`, those that a course's pages may show. `bench`: speed against error of a
 model; `sweep`: its parameters at other values; `cases`: the hard cases; `diet`: what a model can be
-without. `records`: reports as files; `departures`: how two differ; `points`, `layout`, `plot`: the
-work–precision plot. Nothing here measures.
+without. `records`: reports as files; `departures`: how two differ; `points`: what is shown, and in
+which words; `plot`, `case_plot` and `sweep_plot`: charts. Nothing here measures.
 """
 
 from __future__ import annotations

@@ -154,7 +154,7 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
         joined = [_place(point, x, y) for point in line.drawn if not point.small]
         if len(joined) > 1:
             d = "M" + "L".join(f"{across:.1f} {down:.1f}" for across, down in joined)
-            yield path(d, line_look(line.number, round_joins=True))
+            yield path(d, line_look(line.number))
     for line in chart.lines:
         for point in sorted(line.points, key=lambda point: point.small):
             yield from _mark(point, line.number, x, y)

@@ -64,12 +64,11 @@ def colour(number: int) -> str:
     return f"var(--trace-{n + 1}, {_LIGHT[n]})"
 
 
-def line_look(number: int, *, round_joins: bool = False) -> str:
+def line_look(number: int) -> str:
     """The colour, width and dashes of a line."""
     dash = _DASHES[number % len(_DASHES)]
-    joins = ' stroke-linejoin="round"' if round_joins else ""
     dashes = f' stroke-dasharray="{dash}"' if dash else ""
-    return f'stroke="{colour(number)}" stroke-width="1.7"{joins}{dashes}'
+    return f'stroke="{colour(number)}" stroke-width="1.7" stroke-linejoin="round"{dashes}'
 
 
 def mark(number: int, x: float, y: float, size: float) -> str:
