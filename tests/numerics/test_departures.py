@@ -19,7 +19,8 @@ from coursebuild.numerics.reports.bench import (
 )
 from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
 from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
-from support.bench_reports import CASE, FIRST, MACHINE, interval, lost, row, scenario, scene, swing
+from support.bench_reports import FIRST, MACHINE, interval, lost, row, scenario, scene, swing
+from support.model_reports import case
 
 BANDS = Bands()
 
@@ -202,13 +203,13 @@ def test_a_change_departs_exactly_beyond_the_band(share: float) -> None:
 
 
 def test_a_case_that_is_gone_is_a_departure() -> None:
-    assert case_departures([CASE], [CASE], BANDS) == ()
-    (gone,) = case_departures([CASE], [], BANDS)
+    assert case_departures([case()], [case()], BANDS) == ()
+    (gone,) = case_departures([case()], [], BANDS)
     assert gone == Departure("spring", "", "case", "there", "nothing", "the same")
 
 
 def figure(measured: float | None, exact: float | None = 1.0) -> Any:
-    return replace(CASE, figures=(FigureLine("growth", "m", "Euler", measured, exact, "a law"),))
+    return replace(case(), figures=(FigureLine("growth", "m", "Euler", measured, exact, "a law"),))
 
 
 def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
@@ -226,14 +227,14 @@ def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
 
 def test_boundaries_and_runs_of_cases() -> None:
     line = BoundaryLine(
-        "Euler", None, (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, None, "", None, "diverged", 1.5
+        "Euler", None, (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, None, "", None, "reset", 1.5
     )
-    new = replace(CASE, boundaries=(line,), errors=(replace(CASE.errors[0], status="reset"),))
-    assert [
-        (d.setting, d.figure, d.recorded, d.measured) for d in case_departures([CASE], [new], BANDS)
-    ] == [
+    old, run = case(), replace(case().errors[0], status="reset")
+    new = replace(old, boundaries=(line, *old.boundaries[1:]), errors=(run, *old.errors[1:]))
+    found = case_departures([old], [new], BANDS)
+    assert [(one.setting, one.figure, one.recorded, one.measured) for one in found] == [
         ("Euler", "largest stable timestep", "200 ms", "all"),
         ("Euler", "monotone", "yes", "no"),
-        ("Euler", "beyond", "nothing", "diverged"),
-        ("Euler at 100 ms", "status", "ok", "reset"),
+        ("Euler", "beyond", "diverged", "reset"),
+        ("Euler at 10 ms", "status", "ok", "reset"),
     ]

@@ -7,7 +7,8 @@ import json
 import pytest
 
 from coursebuild.numerics.reports.records import BENCH, STABILITY, RecordError
-from support.bench_reports import CASE, lost, row, scenario, scene, swing
+from support.bench_reports import lost, row, scenario, scene, swing
+from support.model_reports import case
 
 GOOD = BENCH.encode(scene())
 
@@ -25,8 +26,8 @@ def test_what_is_written_is_read() -> None:
         data = BENCH.encode(report)
         assert BENCH.decode(data) == report
         assert BENCH.encode(BENCH.decode(data)) == data
-    data = STABILITY.encode((CASE,))
-    assert STABILITY.decode(data) == (CASE,)
+    data = STABILITY.encode((case(),))
+    assert STABILITY.decode(data) == (case(),)
 
 
 def test_a_row_is_a_line_and_keys_are_sorted() -> None:
@@ -59,7 +60,7 @@ def test_where_a_report_is() -> None:
         (b'{"rows": []}', "holds no report of `coursebuild bench`"),
         (b'{"holds": "x"}', 'holds a report of "x", not of `coursebuild bench`'),
         (
-            STABILITY.encode((CASE,)),
+            STABILITY.encode((case(),)),
             'holds a report of "coursebuild stability", not of `coursebuild bench`',
         ),
         (b'{"holds": "coursebuild bench"}', "does not say which form it has"),
@@ -116,4 +117,4 @@ def test_what_is_no_report(data: bytes, message: str) -> None:
 
 def test_two_cases_of_one_name() -> None:
     with pytest.raises(RecordError, match="holds two cases of one name"):
-        STABILITY.decode(STABILITY.encode((CASE, CASE)))
+        STABILITY.decode(STABILITY.encode((case(), case())))

@@ -17,35 +17,10 @@ from coursebuild.numerics.reports.bench import (
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.cases import (
-    BoundaryLine,
-    CaseReport,
-    ErrorLine,
-    FigureLine,
-    ReferenceLine,
-    StepCost,
-)
 
 MACHINE = Machine("3.14.0", "3.11.7", "2.3.0", "Linux x86_64", "A Processor @ 2 GHz")
 VERDICT = RowVerdict(True, None, None, None, False, "The scene’s own setting is on the front.")
 FIRST = FittedOrder(1.0, 0.01, 0.02)
-CASE = CaseReport(
-    name="spring",
-    title="A spring",
-    case=5,
-    machine=MACHINE,
-    note="",
-    reference=ReferenceLine("closed", "a textbook", "another", 1e-13, 0.0, 1e-12),
-    boundaries=(
-        BoundaryLine(
-            "Euler", 0.2, (1e-3, 1.0), None, 9.0, 45, 9, None, 0.2, "hω = 2", 0.0, "", None
-        ),
-    ),
-    figures=(FigureLine("growth", "m", "Euler", 1.25, 1.0, "a law"),),
-    orders=(OrderRow("Euler", FIRST, None, None),),
-    errors=(ErrorLine("Euler", 0.1, "ok", (), (0.1, 0.01), None, None, 1e-3, None, 0.0, False),),
-    costs=(StepCost("Euler", Interval(1e-6, 0.9e-6, 1.1e-6)),),
-)
 _KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
 
 

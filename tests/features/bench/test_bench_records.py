@@ -29,134 +29,131 @@ def recorded(course: Path, *found: ScenarioReport) -> Measurement[SceneReport]:
     return bench(options(course), record=True, measuring=fake)
 
 
-class TestRecords:
-    """`--record` and `--check`."""
-
-    def test_what_is_recorded_is_checked(self, course: Path) -> None:
-        write(course / "models" / "arms" / "left arm.xml", BOX)
-        found = recorded(course)
-        assert found.ok
-        assert found.remarks == (
-            "wrote content/reports/arms/left arm.bench.json",
-            f"wrote {PATH}",
-        )
-        report = BENCH.decode((course / PATH).read_bytes())
-        assert report.model == "box" and report.scenarios == (swing(),)
-        assert report.digest == find_scenes(course, ("box",)).scenes[0].digest
-        fake = Fake()
-        again = check(options(course), measuring=fake)
-        assert again.ok
-        assert [one.departures for one in again.checked] == [(), ()]
-        assert fake.asked == [("arms/left arm", 0, False, False), ("box", 0, False, False)]
-
-    def test_the_same_bytes_are_not_written_again(self, course: Path) -> None:
-        recorded(course)
-        before = (course / PATH).stat()
-        found = recorded(course)
-        assert found.remarks == (f"{PATH} is as it was",)
-        assert (course / PATH).stat().st_mtime_ns == before.st_mtime_ns
-
-    def test_a_figure_that_left_its_band_fails(self, course: Path) -> None:
-        recorded(course)
-        rows = list(swing().rows)
-        rows[2] = replace(rows[2], velocity=(1.0, 1.0), cost=1000.0)
-        fake = Fake(replace(swing(), rows=tuple(rows)))
-        found = check(options(course), measuring=fake)
-        assert not found.ok
-        (one,) = found.checked
-        assert (one.name, one.path) == ("box", PATH)
-        assert {d.figure for d in one.departures} == {
-            "error of velocity",
-            "error of velocity at the end",
-        }
-        write(course / "models" / "box.toml", f"[bench]\nband = 1.0\n{TOML}")
-        rows[2] = replace(rows[2], velocity=tuple(1.9 * x for x in swing().rows[2].velocity or ()))  # type: ignore[arg-type]
-        wide = check(options(course), measuring=Fake(replace(swing(), rows=tuple(rows))))
-        assert wide.ok
-        assert wide.checked[0].remarks == (
-            "the model or its scenarios have changed since it was recorded",
-        )
-
-    def test_a_report_that_is_not_there(self, course: Path) -> None:
-        write(course / "models" / "left arm.xml", BOX)
-        fake = Fake()
-        found = check(options(course), measuring=fake)
-        assert not found.ok and fake.asked == []
-        assert [(one.message, one.help) for one in found.failures] == [
-            (
-                f"{PATH} is not there",
-                "make it with `coursebuild bench box --record`, and commit it",
-            ),
-            (
-                "content/reports/left arm.bench.json is not there",
-                "make it with `coursebuild bench 'left arm' --record`, and commit it",
-            ),
-        ]
-
-    @pytest.mark.parametrize(
-        ("data", "message"),
-        [
-            (b"{", f"{PATH} is damaged: input data was truncated"),
-            (b"{}", f"{PATH} holds no report of `coursebuild bench`"),
-            (
-                b'{"holds": "coursebuild bench", "form": 1}',
-                f"{PATH} was written by an older version of this tool (form 1, not 2)",
-            ),
-        ],
+def test_what_is_recorded_is_checked(course: Path) -> None:
+    write(course / "models" / "arms" / "left arm.xml", BOX)
+    found = recorded(course)
+    assert found.ok
+    assert found.remarks == (
+        "wrote content/reports/arms/left arm.bench.json",
+        f"wrote {PATH}",
     )
-    def test_a_report_that_is_none(self, course: Path, data: bytes, message: str) -> None:
-        (course / "content" / "reports").mkdir()
-        (course / PATH).write_bytes(data)
+    report = BENCH.decode((course / PATH).read_bytes())
+    assert report.model == "box" and report.scenarios == (swing(),)
+    assert report.digest == find_scenes(course, ("box",)).scenes[0].digest
+    fake = Fake()
+    again = check(options(course), measuring=fake)
+    assert again.ok
+    assert [one.departures for one in again.checked] == [(), ()]
+    assert fake.asked == [("arms/left arm", 0, False, False), ("box", 0, False, False)]
+
+
+def test_the_same_bytes_are_not_written_again(course: Path) -> None:
+    recorded(course)
+    before = (course / PATH).stat()
+    found = recorded(course)
+    assert found.remarks == (f"{PATH} is as it was",)
+    assert (course / PATH).stat().st_mtime_ns == before.st_mtime_ns
+
+
+def test_a_figure_that_left_its_band_fails(course: Path) -> None:
+    recorded(course)
+    rows = list(swing().rows)
+    rows[2] = replace(rows[2], velocity=(1.0, 1.0), cost=1000.0)
+    fake = Fake(replace(swing(), rows=tuple(rows)))
+    found = check(options(course), measuring=fake)
+    assert not found.ok
+    (one,) = found.checked
+    assert (one.name, one.path) == ("box", PATH)
+    assert {d.figure for d in one.departures} == {
+        "error of velocity",
+        "error of velocity at the end",
+    }
+    write(course / "models" / "box.toml", f"[bench]\nband = 1.0\n{TOML}")
+    rows[2] = replace(rows[2], velocity=tuple(1.9 * x for x in swing().rows[2].velocity or ()))  # type: ignore[arg-type]
+    wide = check(options(course), measuring=Fake(replace(swing(), rows=tuple(rows))))
+    assert wide.ok
+    assert wide.checked[0].remarks == (
+        "the model or its scenarios have changed since it was recorded",
+    )
+
+
+def test_a_report_that_is_not_there(course: Path) -> None:
+    write(course / "models" / "left arm.xml", BOX)
+    fake = Fake()
+    found = check(options(course), measuring=fake)
+    assert not found.ok and fake.asked == []
+    assert [(one.message, one.help) for one in found.failures] == [
+        (
+            f"{PATH} is not there",
+            "make it with `coursebuild bench box --record`, and commit it",
+        ),
+        (
+            "content/reports/left arm.bench.json is not there",
+            "make it with `coursebuild bench 'left arm' --record`, and commit it",
+        ),
+    ]
+
+
+def test_a_report_that_is_none(course: Path) -> None:
+    (course / "content" / "reports").mkdir()
+    (course / PATH).write_bytes(b'{"holds": "coursebuild bench", "form": 1}')
+    (failure,) = check(options(course), measuring=Fake()).failures
+    assert failure.message == (
+        f"{PATH} was written by an older version of this tool (form 1, not 2)"
+    )
+    assert failure.help == "make it again with `coursebuild bench box --record`"
+
+
+def test_a_report_of_something_else(course: Path) -> None:
+    recorded(course)
+    report = BENCH.decode((course / PATH).read_bytes())
+    for other, message in (
+        (replace(report, model="arm"), f"{PATH} holds a report of the model `arm`"),
+        (
+            replace(report, quick=True),
+            f"{PATH} holds a report of `coursebuild bench --quick`, which measures only a part",
+        ),
+    ):
+        (course / PATH).write_bytes(BENCH.encode(other))
         (failure,) = check(options(course), measuring=Fake()).failures
         assert failure.message == message
-        assert failure.help == "make it again with `coursebuild bench box --record`"
 
-    def test_a_report_of_something_else(self, course: Path) -> None:
-        recorded(course)
-        report = BENCH.decode((course / PATH).read_bytes())
-        for other, message in (
-            (replace(report, model="arm"), f"{PATH} holds a report of the model `arm`"),
-            (
-                replace(report, quick=True),
-                f"{PATH} holds a report of `coursebuild bench --quick`, which measures only a part",
-            ),
-        ):
-            (course / PATH).write_bytes(BENCH.encode(other))
-            (failure,) = check(options(course), measuring=Fake()).failures
-            assert failure.message == message
 
-    def test_a_report_of_no_model_is_told(self, course: Path) -> None:
-        recorded(course)
-        (course / "content/reports/gone").mkdir()
-        (course / "content/reports/gone/arm.bench.json").write_bytes(b"{}")
-        found = check(options(course), measuring=Fake())
-        assert found.ok
-        assert found.remarks == ("content/reports/gone/arm.bench.json belongs to no model",)
-        assert check(options(course), ("box",), measuring=Fake()).remarks == ()
+def test_a_report_of_no_model_is_told(course: Path) -> None:
+    recorded(course)
+    (course / "content/reports/gone").mkdir()
+    (course / "content/reports/gone/arm.bench.json").write_bytes(b"{}")
+    found = check(options(course), measuring=Fake())
+    assert found.ok
+    assert found.remarks == ("content/reports/gone/arm.bench.json belongs to no model",)
+    assert check(options(course), ("box",), measuring=Fake()).remarks == ()
 
-    def test_a_part_is_not_recorded(self, course: Path) -> None:
-        why = " takes no --quick: what is recorded is measured in full"
-        with pytest.raises(UsageError, match=f"--record{why}"):
-            bench(options(course), quick=True, record=True, measuring=Fake())
-        with pytest.raises(UsageError, match=f"--check{why}"):
-            check(options(course), quick=True, measuring=Fake())
 
-    def test_where_nothing_can_be_written(self, course: Path, tmp_path: Path) -> None:
-        (tmp_path / "away").mkdir()
-        (course / "content" / "reports").symlink_to(tmp_path / "away")
-        (failure,) = recorded(course).failures
-        assert failure.message == f"{PATH} leads out of the project"
-        (course / "content" / "reports").unlink()
-        (course / "content" / "reports").write_text("a file")
-        (failure,) = recorded(course).failures
-        assert failure.message == f"{PATH} cannot be written: file exists"
-        assert list((tmp_path / "away").iterdir()) == []
+def test_a_part_is_not_recorded(course: Path) -> None:
+    why = " takes no --quick: what is recorded is measured in full"
+    with pytest.raises(UsageError, match=f"--record{why}"):
+        bench(options(course), quick=True, record=True, measuring=Fake())
+    with pytest.raises(UsageError, match=f"--check{why}"):
+        check(options(course), quick=True, measuring=Fake())
 
-    def test_another_engine_is_told(self, course: Path) -> None:
-        recorded(course)
-        report = BENCH.decode((course / PATH).read_bytes())
-        machine = replace(report.machine, engine="3.13.0", system="Plan 9 mips")
-        (course / PATH).write_bytes(BENCH.encode(replace(report, machine=machine)))
-        (one,) = check(options(course), measuring=Fake()).checked
-        assert one.remarks[0].startswith("recorded with MuJoCo 3.13.0, measured with ")
-        assert one.remarks[1].startswith("recorded with Plan 9 mips, measured with ")
+
+def test_where_nothing_can_be_written(course: Path, tmp_path: Path) -> None:
+    (tmp_path / "away").mkdir()
+    (course / "content" / "reports").symlink_to(tmp_path / "away")
+    (failure,) = recorded(course).failures
+    assert failure.message == f"{PATH} leads out of the project"
+    (course / "content" / "reports").unlink()
+    (course / "content" / "reports").write_text("a file")
+    (failure,) = recorded(course).failures
+    assert failure.message == f"{PATH} cannot be written: file exists"
+    assert list((tmp_path / "away").iterdir()) == []
+
+
+def test_another_engine_is_told(course: Path) -> None:
+    recorded(course)
+    report = BENCH.decode((course / PATH).read_bytes())
+    machine = replace(report.machine, engine="3.13.0", system="Plan 9 mips")
+    (course / PATH).write_bytes(BENCH.encode(replace(report, machine=machine)))
+    (one,) = check(options(course), measuring=Fake()).checked
+    assert one.remarks[0].startswith("recorded with MuJoCo 3.13.0, measured with ")
+    assert one.remarks[1].startswith("recorded with Plan 9 mips, measured with ")
