@@ -95,7 +95,8 @@ def _surroundings(
         for path in library.course.files
         if path.startswith("models/")
     )
-    around = zips.Surroundings((), ours, meshes, imports)
+    style = tuple(OutputFile(path.name, path.read_bytes()) for path in root.glob("matplotlibrc"))
+    around = zips.Surroundings((), ours, meshes, style, imports)
     modules = zips.imported_modules(library.course, around)
     packages = tuple(zips.Package(*p) for p in distributions(store, modules))
     return replace(around, packages=packages)

@@ -247,8 +247,10 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 
 
 def _parts(tools: Tools, block: Script) -> tuple[CodePart, ...]:
+    """The code as it is shown; what draws is folded whole, since its figure tells the story."""
     text = block.code.text.rstrip("\n")
     lines = tools.mark("python", text)
+    parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
     return tuple(
         CodePart(
             numbered(lines[part.first - 1 : part.last], block.path, part.first),
@@ -256,7 +258,7 @@ def _parts(tools: Tools, block: Script) -> tuple[CodePart, ...]:
             part.folded,
             _fold_label(tools.words, part),
         )
-        for part in fold(text)
+        for part in parts
     )
 
 

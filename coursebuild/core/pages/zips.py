@@ -58,6 +58,8 @@ class Surroundings(Struct, frozen=True):
     model_files: tuple[OutputFile, ...] = ()
     """Files in `models/` that are no MJCF (meshes, height fields), by path relative to the project
     root."""
+    style: tuple[OutputFile, ...] = ()
+    """The course's `matplotlibrc`, if it has one: the style of all figures."""
     imports: Callable[[str], frozenset[str]] = imports
     """What a Python text imports: whoever calls may know it already."""
 
@@ -173,6 +175,8 @@ def _files(
     beside, others = _imported(scripts, around, own)
     files |= {f"examples/{file.path}": file.data for file in beside}
     files |= _models(library, around, scripts)
+    if "matplotlib" in others:
+        files |= {file.path: file.data for file in around.style}
     files["requirements.txt"] = _requirements(library, around.packages, others)
     first = scripts[0].path
     readme = library.words("zip.readme", title=library.course.title, script=first)

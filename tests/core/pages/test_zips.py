@@ -36,6 +36,7 @@ VALUE = 1
 ```python file=examples/three.py
 import torch
 import swing
+import matplotlib.pyplot as plt
 ```
 """
 
@@ -49,6 +50,7 @@ AROUND = Surroundings(
     packages=(Package("numpy", "numpy", "2.4.6"), Package("yaml", "PyYAML", "6.0.3")),
     library=lambda name: LIBRARY.get(name, ()),
     model_files=(OutputFile("models/meshes/hand.obj", b"v 0 0 0\n"),),
+    style=(OutputFile("matplotlibrc", b"font.size: 11\n"),),
 )
 
 
@@ -85,13 +87,14 @@ def test_the_course_archive_has_scripts_models_library_and_requirements(made: An
         "bodies-axes/examples/swing/__init__.py",
         "bodies-axes/examples/swing/a.csv",
         "bodies-axes/examples/three.py",
+        "bodies-axes/matplotlibrc",
         "bodies-axes/models/arm.xml",
         "bodies-axes/models/meshes/hand.obj",
         "bodies-axes/models/part.xml",
         "bodies-axes/requirements.txt",
     ]
     assert archive.read("bodies-axes/requirements.txt").decode() == (
-        "PyYAML==6.0.3\nmujoco==3.14.0\nnumpy==2.4.6\nscipy\ntorch\n"
+        "PyYAML==6.0.3\nmatplotlib\nmujoco==3.14.0\nnumpy==2.4.6\nscipy\ntorch\n"
     )
     readme = archive.read("bodies-axes/README.md").decode()
     assert readme.startswith("# Bodies & <axes>: scripts\n")
@@ -102,10 +105,10 @@ def test_a_lesson_archive_has_what_its_scripts_import(made: Any) -> None:
     found = archives(made)
     names = found["lessons/0.1-falling.zip"].namelist()
     assert "0.1-falling/examples/helper.py" in names
-    assert [name for name in names if "three" in name or "swing" in name] == []
+    assert [n for n in names if "three" in n or "swing" in n or "matplotlibrc" in n] == []
     other = found["lessons/1.1-spinning.zip"]
     assert [name for name in other.namelist() if "models" in name or "mjcourse" in name] == []
-    assert other.read("1.1-spinning/requirements.txt") == b"PyYAML==6.0.3\nscipy\ntorch\n"
+    assert other.read("1.1-spinning/requirements.txt") == b"PyYAML==6.0.3\nmatplotlib\nscipy\ntorch\n"
 
 
 def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
@@ -151,6 +154,7 @@ runpy.run_path("examples/a.py", run_name="__main__")
 
 def test_what_scripts_import_from_others(made: Any) -> None:
     assert imported_modules(made.course, AROUND) == (
+        "matplotlib",
         "mujoco",
         "numpy",
         "scipy",
