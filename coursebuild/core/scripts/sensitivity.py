@@ -137,7 +137,7 @@ def _doubtful(
     halved: ScriptRun | None,
 ) -> Iterator[Doubt | Flip]:
     """Numbers and texts of a recording that moved states or halved steps change, in order."""
-    exact = Comparison(Mode.EXACT, ellipsis=comparison.ellipsis)
+    exact = replace(comparison, mode=Mode.EXACT)
 
     def changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
         found = compare(recording, exact, course.filters, run.stdout).changes

@@ -124,6 +124,9 @@ def test_what_a_filter_takes_out_does_not_count() -> None:
     filters = (Filter("took [0-9.]+ s", "took TIME"),)
     found = measured("x 1.5, took 3.1 s", "x 1.5, took 4.2 s", filters=filters)
     assert digits(found) == []
+    volatile = Comparison(volatile="[0-9.]+ s")
+    found = measured("x 1.5, took 3.1 s", "x 1.5, took 4.2 s", comparison=volatile)
+    assert digits(found) == []
 
 
 def test_values_that_a_tolerance_took_are_held_against_those_of_the_run() -> None:
