@@ -72,7 +72,7 @@ class Folder:
 
     def copy(self, course: Path) -> None:
         """Copy what the author of a course wrote."""
-        for name in ("content", "models", "docs", "matplotlibrc"):
+        for name in ("content", "models", "docs", "lib", "runs", "matplotlibrc"):
             if (course / name).is_dir():
                 shutil.copytree(course / name, self.root / name)
             elif (course / name).is_file():
