@@ -70,6 +70,11 @@ class Page(Struct, frozen=True):
     menu: bool = True
     """Whether every page's menu has it."""
 
+    @property
+    def is_home(self) -> bool:
+        """Whether it has no page of its own: its text opens the home page."""
+        return self.id == "home"
+
 
 class MjcfModel(Struct, frozen=True):
     """A file of `models/`; its name is its path there without `.xml`."""

@@ -78,8 +78,8 @@ def _lesson_card(library: Library, place: urls.Place, lesson: Lesson) -> LessonC
 def galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:
     """The pages in the menu that have more than one picture."""
     found = []
-    for page in library.course.pages:
-        pictures = pictures_of(library, place, page) if page.menu and page.id != "home" else ()
+    for page in library.menu:
+        pictures = pictures_of(library, place, page)
         if len(pictures) > 1:
             found.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
     return tuple(found)

@@ -190,8 +190,7 @@ def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
 
 def _menu(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
     """Links to the pages that are in the menu; the home page has a place of its own there."""
-    pages = (page for page in library.course.pages if page.menu and page.id != "home")
-    paths = ((urls.page_path(page), page.title) for page in pages)
+    paths = ((urls.page_path(page), page.title) for page in library.menu)
     return tuple(NavLink(place.href(path), title, path == place.path) for path, title in paths)
 
 

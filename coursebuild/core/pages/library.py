@@ -170,6 +170,11 @@ class Library(Struct, frozen=True, dict=True):
         """The pages that features add to this course, in their order."""
         return tuple(kind for kind in page_kinds() if kind.exists(self))
 
+    @property
+    def menu(self) -> tuple[Page, ...]:
+        """The pages in the menu of every page, beside the home page."""
+        return tuple(page for page in self.course.pages if page.menu and not page.is_home)
+
     def mathml(self, tex: str, display: bool) -> str:
         """A formula; empty for one that cannot be set."""
         return known_mathml(self._formulas)(tex, display)

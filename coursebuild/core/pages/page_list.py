@@ -41,11 +41,9 @@ class PageEntry(Struct, frozen=True):
         match self.kind:
             case "lesson":
                 return library.lessons[self.id].document
-            case "page":
-                return library.pages[self.id].document
-            case "home":
-                opening = library.pages.get("home")
-                return None if opening is None else opening.document
+            case "page" | "home":
+                page = library.pages.get(self.id)
+                return None if page is None else page.document
             case _:
                 return None
 
@@ -53,7 +51,7 @@ class PageEntry(Struct, frozen=True):
 def page_list(library: Library) -> Iterator[PageEntry]:
     """The pages of the site of a course."""
     course = library.course
-    yield PageEntry(urls.HOME, "home")
+    yield PageEntry(urls.HOME, "home", "home")
     for level in course.levels:
         yield PageEntry(urls.level_path(level), "level", level.id)
     for lesson in library.order:
@@ -63,7 +61,7 @@ def page_list(library: Library) -> Iterator[PageEntry]:
     for kind in library.added_pages:
         yield PageEntry(kind.path, kind.name)
     for page in course.pages:
-        if page.document is not None and page.id != "home":
+        if page.document is not None and not page.is_home:
             yield PageEntry(urls.page_path(page), "page", page.id)
     yield PageEntry(urls.NOT_FOUND, "notfound")
 
@@ -90,7 +88,7 @@ def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
 
     match entry.kind:
         case "home":
-            return pages.home_inputs(library)
+            return pages.home_inputs(library, entry.document(library))
         case "level":
             return pages.level_inputs(library, library.levels[entry.id])
         case "lesson":

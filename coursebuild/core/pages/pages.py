@@ -49,15 +49,13 @@ class Named(Struct, frozen=True):
     remark: str = ""
 
 
-def home_inputs(library: Library) -> PageInputs:
+def home_inputs(library: Library, document: Document | None) -> PageInputs:
     """What the home page shows: what can be read, and the whole plan.
 
     The document of the page `home` opens it, if there is one; its summary is enough.
     """
     course = library.course
     place = urls.Place(urls.HOME)
-    home = library.pages.get("home")
-    document = None if home is None else home.document
     written = [lesson for lesson in library.order if lesson.document is not None]
     values = {
         "course": CourseHead(course.title, course.summary),

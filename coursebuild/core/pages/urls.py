@@ -73,7 +73,7 @@ def model_file_path(name: str) -> str:
 
 def page_path(page: Page) -> str:
     """`about.html`; the page `home` opens the home page."""
-    return HOME if page.id == "home" else f"{page.id}.html"
+    return HOME if page.is_home else f"{page.id}.html"
 
 
 def owner_path(owner: Lesson | Page) -> str:

@@ -48,7 +48,7 @@ def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> by
     """The text of a page; nothing where it has no copy."""
     if not urls.has_copies(inputs.head.path):
         return b""
-    if page is not None and inputs.head.path != urls.HOME:
+    if page is not None and inputs.head.kind != "home":
         text = _document_copy(inputs, page)
     else:
         place = urls.Place(inputs.head.path)
