@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict'
 import { before, test } from 'node:test'
+import { OVERLAYS } from '../js/lab/core/frame.js'
 import { LabError } from '../js/lab/core/piece.js'
 import { FALLING, PENDULUM, control, labOf, newEngine, plot } from './helpers.mjs'
 
@@ -183,7 +184,7 @@ test('looking changes no bit of the motion, with contact, sensors, a controller 
         t,
         engine,
         xml,
-        {},
+        { overlays: OVERLAYS, arrows: { width: 0.01, momentum: 1, angularMomentum: 1, axis: 1 } },
         {
           controller: ({ data, lib }) => (data.ctrl[0] = 0.1 * data.sensordata[2] + lib.sitePos('s')[2]),
           readouts: [({ lib }) => lib.energy().total, ({ lib }) => lib.norm(lib.angmom()), ({ lib }) => lib.normalForce()],

@@ -155,7 +155,8 @@ test('what lab code changes of the looks is in the next frame', (t) => {
 test('every overlay shows something and can be switched off', (t) => {
   const xml = `<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
     <body pos="0 0 .099"><joint type="slide" axis="0 0 1"/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>`
-  const lab = labOf(t, engine, xml, { overlays: ['com'] })
+  const arrows = { width: 0.01, momentum: 1, angularMomentum: 1, axis: 1 }
+  const lab = labOf(t, engine, xml, { overlays: ['com'], arrows })
   lab.start()
   lab.step(100)
   assert.equal(decorations(lab.frame()).length, 1, 'com is on')
@@ -167,8 +168,29 @@ test('every overlay shows something and can be switched off', (t) => {
     assert.equal(decorations(lab.frame()).length, 0)
     return [name, count]
   })
-  assert.deepEqual(Object.fromEntries(counts), { frames: 3, contacts: 4, forces: 4, com: 1, inertia: 1, joints: 1 })
+  assert.deepEqual(Object.fromEntries(counts), {
+    frames: 3, contacts: 4, forces: 4, com: 1, inertia: 1, joints: 1, momentum: 1, angularMomentum: 0, axis: 0,
+  }) // prettier-ignore
   assert.throws(() => lab.pictures.setOverlay('heat', true), { message: 'there is no overlay "heat"' })
+})
+
+test('arrows are momentum, and angular momentum about a pivot or the centre of mass', (t) => {
+  const xml = `<mujoco><option gravity="0 0 0"/><worldbody>
+    <body name="free" pos="0 0 1"><freejoint/><geom type="box" size=".1 .2 .3" mass="2"/></body>
+    <body name="swung" pos="5 0 0"><joint axis="0 1 0"/><geom size=".01" pos="0 0 -2" mass="3"/></body></worldbody></mujoco>`
+  const arrows = { width: 0.01, momentum: 0.1, angularMomentum: 1, axis: 1 }
+  const lab = labOf(t, engine, xml, { overlays: ['momentum', 'angularMomentum', 'axis'], arrows })
+  lab.start()
+  lab.data.qvel.set([1, 0, 0, 0, 0, 4, 0.5])
+  lab.settle()
+  const rows = decorations(lab.frame())
+  const reach = (row) => row.size[2] / 2
+  assert.deepEqual(rows.map(({ type }) => type), [100, 100, 100, 100, 100, 100, 5, 5])
+  close(rows[0].pos, [0, 0, 1])
+  close(rows.map(reach), [0.2, 0.3, (2 / 3) * 0.05 * 4], 'lengths')
+  close(rows[1].pos, [5, 0, -2])
+  close(rows[4].pos, [5, 0, 0], 'the hinge')
+  assert.ok(Math.abs(reach(rows[4]) - 3 * 4 * 0.5) < 1e-3)
 })
 
 test('forceScale is the length of an arrow for each newton', (t) => {

@@ -30,7 +30,7 @@ _LIVE = PagePart(
     mark="data-config=",
     texts=(
         *("lab.live.", "overlay.", "lab.plot", "lab.value", "lab.time", "lab.overlays"),
-        "lab.untitled",
+        *("lab.untitled", "lab.scale"),
     ),
 )
 """The script of live labs is loaded by the element itself."""

@@ -24,6 +24,8 @@ class LabRecord(Struct, frozen=True):
 
     size: tuple[int, int]
     """Of the picture, width and height in pixels."""
+    scale: tuple[float, float]
+    """Length of the bar that shows the picture's scale, m and pixels."""
     time: float
     """Simulated time of the picture, s."""
     readouts: tuple[tuple[str, str], ...]

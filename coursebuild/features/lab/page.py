@@ -1,8 +1,8 @@
 """Labs as a page shows them before they run: what they are, what can be changed, what is shown.
 
-Entry points: `draw_lab(page, block)`, `index_lab`. No control is drawn that does nothing: the
-page's script puts the live instrument into `data-lab` when it starts, and reads its configuration
-there.
+Entry points: `draw_lab(page, block)`, `index_lab`; `lab_view`, what its template shows. No control
+is drawn that does nothing: the page's script puts the live instrument into `data-lab` when it
+starts, and reads its configuration there.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.features import IndexReader, Picture
 from coursebuild.core.model import ModelTarget
 from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.urls import Place
 from coursebuild.features.lab.files import ShownLab
 from coursebuild.features.lab.model import MJCF, Lab
 from coursebuild.features.lab.schema import Control, Select, Slider
@@ -41,6 +43,9 @@ class RecordedView(Struct, frozen=True):
     width: int
     height: int
     alt: str
+    bar: float
+    """Length of the bar of its scale, pixels, and of what it stands for."""
+    length: str
     readouts: tuple[tuple[str, str], ...]
     plots: tuple[Markup, ...]
     at: str
@@ -66,27 +71,63 @@ class PlotView(Struct, frozen=True):
     """Reference lines."""
 
 
+class LabView(Struct, frozen=True):
+    """A lab in its static form, apart from what its author wrote about it."""
+
+    kind: str
+    title: str
+    key: str
+    """Its name in the course, as of `config` and `script` (addresses); empty where it cannot run.
+    """
+    config: str
+    script: str
+    model: str | None
+    model_href: str
+    start: str | None
+    stop: str | None
+    controls: tuple[ControlView, ...]
+    readouts: tuple[str, ...]
+    plots: tuple[PlotView, ...]
+    overlays: tuple[str, ...]
+    recorded: RecordedView | None
+
+
 def draw_lab(page: PageContext, block: Lab) -> Markup:
     """A lab in its static form."""
-    words = page.tools.words
-    live, fields = shown_lab(page, block), block.fields
+    live, model = shown_lab(page, block), block.fields.model
+    view = lab_view(page.tools.words, page.place, block, live, page.shown.engine)
+    if model is not None:
+        view = replace(view, model_href=page.href(ModelTarget(model)))
     return page.template(
         "lab/lab.html",
-        lab=block,
-        key=live.name if live is not None else None,
-        config=page.place.href(live.config) if live is not None else None,
-        script=page.place.href(live.script) if live is not None else None,
-        recorded=_recorded(page, block, live),
+        lab=replace(view, start=start_name(page, block)),
+        docked=block.fields.dock,
         paper=_paper(page, live.name) if live is not None else None,
-        title=title_of(page, block),
         source=_source(page, block),
         note=page.blocks(block.note),
-        model_href=page.href(ModelTarget(fields.model)) if fields.model is not None else None,
-        start=start_name(page, block),
+    )
+
+
+def lab_view(
+    words: Strings, place: Place, block: Lab, live: ShownLab | None, engine: str
+) -> LabView:
+    """A lab as seen from a place; `live` is what is shown of its trial."""
+    fields = block.fields
+    return LabView(
+        kind=block.kind,
+        title=fields.title or words("lab.untitled"),
+        key=live.name if live is not None else "",
+        config=place.href(live.config) if live is not None else "",
+        script=place.href(live.script) if live is not None else "",
+        model=fields.model,
+        model_href="",
+        start=None,
         stop=number(fields.stopAt) if fields.stopAt is not None else None,
         controls=tuple(control_view(words, control) for control in fields.controls),
+        readouts=tuple(readout.label for readout in fields.readouts),
         plots=tuple(plot_view(words, block, index) for index in range(len(fields.plots))),
         overlays=tuple(overlay_name(words, name) for name in fields.toggles),
+        recorded=_recorded(words, place, block, live, engine),
     )
 
 
@@ -134,14 +175,15 @@ def _paper(page: PageContext, name: str) -> PaperView | None:
     return PaperView(code, address, address.partition("://")[2])
 
 
-def _recorded(page: PageContext, block: Lab, live: ShownLab | None) -> RecordedView | None:
+def _recorded(
+    words: Strings, place: Place, block: Lab, live: ShownLab | None, engine: str
+) -> RecordedView | None:
     """What the trial recorded; `None` where it did not come to its end."""
     record = live.record if live is not None else None
     if live is None or record is None:
         return None
-    words = page.tools.words
     return RecordedView(
-        page.place.href(live.picture),
+        place.href(live.picture),
         record.size[0],
         record.size[1],
         words(
@@ -149,12 +191,14 @@ def _recorded(page: PageContext, block: Lab, live: ShownLab | None) -> RecordedV
             title=block.fields.title or words("lab.untitled"),
             t=number(record.time, 4),
         ),
+        round(record.scale[1], 1),
+        f"{record.scale[0]:.1g} m",
         record.readouts,
         tuple(Markup(svg) for svg in record.plots),
         words("lab.at", t=seconds(record.end)),
         words(
             "lab.proven",
-            engine=page.shown.engine,
+            engine=engine,
             tried=str(live.tried),
             parity=live.parity,
         ),

@@ -14,7 +14,17 @@ from msgspec import Meta, Struct
 
 from coursebuild.core.syntax.fields import Digits, NotNegative, OptionalBlocks, Positive, Text
 
-Overlay: TypeAlias = Literal["frames", "contacts", "forces", "com", "inertia", "joints"]
+Overlay: TypeAlias = Literal[
+    "frames",
+    "contacts",
+    "forces",
+    "com",
+    "inertia",
+    "joints",
+    "momentum",
+    "angularMomentum",
+    "axis",
+]
 OVERLAYS: tuple[Overlay, ...] = get_args(Overlay)
 Scalar: TypeAlias = float | str
 Step: TypeAlias = Text | dict[str, Scalar]
@@ -31,6 +41,9 @@ class Overlays(Struct, frozen=True, forbid_unknown_fields=True):
     com: bool = False
     inertia: bool = False
     joints: bool = False
+    momentum: bool = False
+    angularMomentum: bool = False  # noqa: N815  # the author's spelling
+    axis: bool = False
 
 
 class Camera(Struct, frozen=True, forbid_unknown_fields=True):

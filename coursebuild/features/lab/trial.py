@@ -289,6 +289,7 @@ def _framed(config: str, main: dict[str, Any] | None) -> str:
         return config
     camera = {name: main["scene"]["camera"][name] for name in Camera.__struct_fields__}
     data = {**json.loads(config), "camera": camera, "floor": main["scene"]["floor"]}
+    data["arrows"] = main["arrows"]
     if "xml" in data:  # which the reader may change, to one that this camera does not suit
         data["extent"] = main["scene"]["extent"]
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"))

@@ -302,6 +302,13 @@ def test_arrays_come_back_as_they_were() -> None:
 
 
 def test_the_size_of_the_picture_follows_the_lab(tmp_path: Path) -> None:
-    main = {"plots": {"times": [], "plots": []}, "pictures": [{"time": 0, "readouts": None}]}
-    sizes = [lab_record(make_lab(height=h), main).size for h in (80, 260, 480, 2000)]
-    assert sizes == [(640, 160), (640, 347), (640, 480), (640, 480)]
+    eye = {"azimuth": 0, "elevation": 0, "distance": 1, "target": (0, 0, 0), "fovy": 90}
+    main = {
+        "plots": {"times": [], "plots": []},
+        "pictures": [{"time": 0, "readouts": None}],
+        "scene": {"camera": {**eye, "orthographic": False}},
+    }
+    made = [lab_record(make_lab(height=h), main) for h in (80, 260, 480, 2000, 300)]
+    sizes = [(640, 160), (640, 347), (640, 480), (640, 480), (640, 400)]
+    assert [one.size for one in made] == sizes
+    assert made[-1].scale == (0.5, pytest.approx(100)), "2 m are 400 pixels high"

@@ -63,6 +63,8 @@ class Solid(Struct, frozen=True):
     """Whether both of its sides are outside."""
     body: bool = False
     """Whether it is a thing with an edge and a shadow."""
+    front: bool = False
+    """Whether nothing covers it."""
 
     def placed(self) -> Surface:
         """Its surface in the world."""
@@ -185,11 +187,8 @@ class _Canvas:
     ) -> None:
         """Draw solids, with lines around them; `mirror` shows what is in `reflected`."""
         buffer = GBuffer(self.eye)
-        opaque = [solid for solid in solids if solid.opaque]
-        for i, solid in enumerate(opaque):
-            buffer.add(i, solid.surface, solid.position, solid.rotation, front=False)
-        for i, solid in enumerate(opaque):
-            self._colour(buffer, i, solid, reflected if solid is mirror else None)
+        opaque = [solid for solid in solids if solid.opaque and not solid.front]
+        self._paint_opaque(buffer, opaque, mirror, reflected)
         if lines and opaque:
             edges(self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool))
         if floor is not None:
@@ -201,6 +200,21 @@ class _Canvas:
             front = not (solid.open or solid.plane)
             film.add(0, solid.surface, solid.position, solid.rotation, front=front)
             self._colour(film, 0, solid, None)
+        foremost = [solid for solid in solids if solid.opaque and solid.front]
+        if foremost:
+            self._paint_opaque(GBuffer(self.eye), foremost, None, None)
+
+    def _paint_opaque(
+        self,
+        buffer: GBuffer,
+        solids: Sequence[Solid],
+        mirror: Solid | None,
+        reflected: _Canvas | None,
+    ) -> None:
+        for i, solid in enumerate(solids):
+            buffer.add(i, solid.surface, solid.position, solid.rotation, front=False)
+        for i, solid in enumerate(solids):
+            self._colour(buffer, i, solid, reflected if solid is mirror else None)
 
     def put_behind(self, background: Texture) -> None:
         """Fill what is not covered with a sky."""

@@ -19,6 +19,7 @@ from coursebuild.features.lab.picture.shapes import (
     Array,
     Kind,
     Surface,
+    arrow,
     flat_surface,
     grid_faces,
     join_surfaces,
@@ -36,6 +37,10 @@ _KINDS: tuple[Kind, ...] = (
 )
 """By their numbers in mjtGeom."""
 _ARROWS = (100, 101, 102)
+_HEAD_WIDTH = 1.75
+"""Of an arrow, in widths of its shaft; those of the second kind have none."""
+_IN_FRONT = -2
+"""In the place of a data id: see `arrows.js` of the live view."""
 _VISIBLE = (0, 1, 2)
 """Groups that MuJoCo shows by itself."""
 _GEOM, _DECORATION = 19, 24
@@ -132,10 +137,10 @@ class _Scene:
         size = (float(row[12]), float(row[13]), float(row[14]))
         rgba = _rgba(row[15:19])
         if kind in _ARROWS:
-            shape = surface("cylinder", (size[0], size[2] / 2))
-            assert shape is not None
-            position = position + rotation[:, 2] * size[2] / 2
-            return Solid(shape, position, rotation, rgba, looks.material)
+            head = 1.0 if kind == _ARROWS[1] else _HEAD_WIDTH
+            pointer = arrow(size[0], size[2] / 2, head=head, both=kind == _ARROWS[2])
+            front = data == _IN_FRONT
+            return Solid(pointer, position, rotation, rgba, looks.material, front=front)
         if kind >= len(_KINDS):
             return None
         name = _KINDS[kind]

@@ -26,6 +26,8 @@ _AROUND = 28
 _FAR = 30.0
 """Half-length (m) at which a plane without a size ends in a picture."""
 _AROUND_ROPE = 12
+_HEAD_LENGTH = 3.0
+"""Of an arrow, in radii of its shaft."""
 _SMOOTH = 0.8
 """Cosine between a face and its vertex's normal from which on the edge is not sharp."""
 
@@ -65,6 +67,19 @@ def surface(kind: Kind, size: tuple[float, ...], mesh: Surface | None = None) ->
             ball = _capsule(1.0, 0.0, _AROUND)
             axes = np.array(size[:3] if kind == "ellipsoid" else (size[0],) * 3)
             return Surface(ball.normals * axes, unit(ball.normals / axes), ball.faces)
+
+
+def arrow(radius: float, length: float, *, head: float, both: bool) -> Surface:
+    """An arrow along z from the origin, or to both sides of it; `head` in widths of its shaft."""
+    tip, wide = min(_HEAD_LENGTH * radius, length / 2), head * radius
+    neck = length - tip
+    upper = [(0.0, length), (wide, neck), (wide, neck), (radius, neck), (radius, neck)]
+    normals = [(tip, wide), (tip, wide), (0.0, -1.0), (0.0, -1.0), (1.0, 0.0)]
+    if both:
+        lower, under = [(r, -z) for r, z in upper[::-1]], [(r, -z) for r, z in normals[::-1]]
+    else:
+        lower, under = [(radius, 0.0), (radius, 0.0), (0.0, 0.0)], [(1.0, 0.0), *[(0.0, -1.0)] * 2]
+    return _revolve(np.array(upper + lower), unit(np.array(normals + under)))
 
 
 def flat_surface(vertices: Array, faces: NDArray[np.int64]) -> Surface:

@@ -19,7 +19,7 @@ from coursebuild.features.lab.picture.draw import FreeCamera, draw
 from coursebuild.features.lab.picture.light import light_of
 from coursebuild.features.lab.picture.plots import plot_svg
 from coursebuild.features.lab.picture.scenery import scene_solids
-from coursebuild.features.lab.picture.studio import Floor
+from coursebuild.features.lab.picture.studio import Floor, round_length
 from coursebuild.features.lab.picture.textures import SKY, texture_of
 from coursebuild.features.lab.reply import unpack_arrays
 
@@ -27,6 +27,8 @@ _WIDTH = 640
 _USUAL = 1.6
 """Width of a view over its height."""
 _FROM_AFAR = 1000.0
+_BAR = 0.2
+"""The most of the picture's width that the bar of its scale takes."""
 _LARGE = 1e9
 """From here on numbers are shown as powers of ten, as in the live lab."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -36,7 +38,17 @@ def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
     """The start of the main run of a lab's trial, as PNG."""
     scene = unpack_arrays(main["scene"])
     frame = unpack_arrays(main["pictures"][0]["frame"])
-    camera = scene["camera"]
+    seen = _camera(lab, scene["camera"])
+    light = light_of(scene, np.asarray(frame, dtype=float), seen.forward)
+    skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
+    solids = tuple(scene_solids(scene, frame))
+    floor = None
+    if scene["floor"] is not None and not scene["lights"]:
+        floor = Floor(scene["floor"], seen.distance, seen.target)
+    return png(draw(solids, seen, _size(lab), light, next(skies, None), floor))
+
+
+def _camera(lab: Lab, camera: dict[str, Any]) -> FreeCamera:
     distance, fovy = camera["distance"], camera["fovy"]
     if camera["orthographic"]:  # whose `fovy` is a length: the same seen from far away
         distance *= _FROM_AFAR
@@ -46,14 +58,15 @@ def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
         wider = max(1.0, _USUAL * height / width)
         fovy = math.degrees(2 * math.atan(wider * math.tan(math.radians(fovy) / 2)))
     target = tuple(camera["target"])
-    seen = FreeCamera(camera["azimuth"], camera["elevation"], distance, target, fovy)
-    light = light_of(scene, np.asarray(frame, dtype=float), seen.forward)
-    skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
-    solids = tuple(scene_solids(scene, frame))
-    floor = None
-    if scene["floor"] is not None and not scene["lights"]:
-        floor = Floor(scene["floor"], distance, target)
-    return png(draw(solids, seen, _size(lab), light, next(skies, None), floor))
+    return FreeCamera(camera["azimuth"], camera["elevation"], distance, target, fovy)
+
+
+def _scale(lab: Lab, camera: dict[str, Any]) -> tuple[float, float]:
+    """A round length, m, and how long it is in the picture, pixels, at what the camera looks at."""
+    seen, (width, height) = _camera(lab, camera), _size(lab)
+    metre = height / (2 * seen.distance * math.tan(math.radians(seen.fovy) / 2))
+    length = round_length(_BAR * width / metre)
+    return length, length * metre
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:
@@ -89,7 +102,8 @@ def lab_record(lab: Lab, main: dict[str, Any]) -> LabRecord:
         (readout.label, _shown(value, readout.digits))
         for readout, value in zip(lab.fields.readouts, last["readouts"] or (), strict=False)
     )
-    return LabRecord(_size(lab), first["time"], readouts, last["time"], plots)
+    scale = _scale(lab, main["scene"]["camera"])
+    return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots)
 
 
 def _shown(value: Any, digits: int) -> str:

@@ -14,9 +14,11 @@
  *   decorations 24 each               type (mjtGeom), data id, object type (mjtObj), object id, size 3, position 3, matrix 9,
  *                                     colour 4, emission; they begin where the trail ends
  *
- * Decorations are what MuJoCo's own visualizer adds: tendons, the overlays that are on, the spring of a drag.
+ * Decorations are what MuJoCo's own visualizer adds: tendons, the overlays that are on, the spring of a drag. Behind them are the
+ * arrows of `arrows.js`.
  */
 
+import { arrowRows, momenta } from './arrows.js'
 import { describeScene } from './scene.js'
 import { SceneGeoms } from './structs.js'
 
@@ -27,10 +29,13 @@ const CAMERA = 13
 const DECORATION = 24
 const AXIS = 0.4 // of the thickness that MuJoCo gives them
 const MOST_DECORATIONS = 2000
+const PALE = [0.7, 0.9, 0.9, 1] // MuJoCo's colour of contact forces, hardly seen on light paper
+const FORCE = [0, 0.62, 0.45, 1]
 const DEFAULT_COLOUR = [0.5, 0.5, 0.5, 1] // MuJoCo's default colour: a geom that has it takes that of its material
 
 /** The overlays that a lab can offer, and what they switch on in MuJoCo's visualizer. */
-export const OVERLAYS = ['frames', 'contacts', 'forces', 'com', 'inertia', 'joints']
+export const OVERLAYS = ['frames', 'contacts', 'forces', 'com', 'inertia', 'joints', 'momentum', 'angularMomentum', 'axis']
+const OWN = OVERLAYS.slice(-3) // which are not MuJoCo's
 
 export class Pictures {
   /**
@@ -56,10 +61,14 @@ export class Pictures {
     mj.mjv_updateCamera(this.model, this.data, this.camera, this.scene)
     this.geoms = new SceneGeoms(this.scene, this.data)
     this.layout = layoutOf(this.model, sampler.capacity)
-    if (config.forceScale) this.model.vis.map.force = config.forceScale
+    const { map } = this.model.vis
+    if (config.forceScale) map.force = config.forceScale
+    // MuJoCo divides by the mean mass, and half of what comes out is drawn.
+    else if (config.arrows?.forces) map.force = 2 * this.model.stat.meanmass * config.arrows.forces
     // Geoms, sites, skins and flexes are drawn from the model; the visualizer adds the rest.
     for (const group of ['geomgroup', 'sitegroup', 'skingroup', 'flexgroup']) this.option[group].fill(0)
     this.option.flags[engine.k.vis.PERTFORCE] = 1
+    this.own = new Set()
     for (const name of OVERLAYS) this.setOverlay(name, config.overlays.includes(name))
   }
 
@@ -67,9 +76,17 @@ export class Pictures {
   setOverlay(name, on) {
     const { vis, frame } = this.engine.k
     const flags = { contacts: vis.CONTACTPOINT, forces: vis.CONTACTFORCE, com: vis.COM, inertia: vis.INERTIA, joints: vis.JOINT }
+    if (name === 'forces' && on) this.paintForces()
     if (name === 'frames') this.option.frame = on ? frame.BODY : frame.NONE
+    else if (OWN.includes(name)) this.own[on ? 'add' : 'delete'](name)
     else if (name in flags) this.option.flags[flags[name]] = on ? 1 : 0
     else throw new RangeError(`there is no overlay "${name}"`)
+  }
+
+  /** Give contact forces a colour that is seen, unless the model has its own. */
+  paintForces() {
+    const { contactforce } = this.model.vis.rgba
+    if (PALE.every((x, i) => Math.abs(x - contactforce[i]) < 1e-6)) contactforce.set(FORCE)
   }
 
   /** What does not move. */
@@ -90,16 +107,24 @@ export class Pictures {
     engine.mj.mjv_updateScene(model, data, this.option, perturb, this.camera, engine.k.category.ALL, this.scene)
     const decorations = this.geoms.update()
     const most = layout.trail + 3 * this.sampler.capacity + DECORATION * decorations
-    const fits = buffer && buffer.byteLength >= 4 * most
-    const target = new Float32Array(fits ? buffer : new ArrayBuffer(4 * (most + 10 * DECORATION)))
+    const arrows = this.arrows()
+    const needed = 4 * (most + DECORATION * arrows.length)
+    const target = new Float32Array(buffer && buffer.byteLength >= needed ? buffer : new ArrayBuffer(needed + 40 * DECORATION))
     this.writePoses(target)
     this.writeVertices(target)
     const points = this.sampler.writeTrail(target, layout.trail)
     const start = layout.trail + 3 * points
     this.writeDecorations(target, start, decorations)
-    const length = start + DECORATION * decorations
-    target.set([length, decorations, points, drag.active ? 1 : 0, 0, 0, 0, 0])
+    const count = decorations + arrows.length
+    arrows.forEach((row, i) => target.set(row, start + DECORATION * (decorations + i)))
+    const length = start + DECORATION * count
+    target.set([length, count, points, drag.active ? 1 : 0, 0, 0, 0, 0])
     return target.subarray(0, length)
+  }
+
+  arrows() {
+    const { engine, model, data, own, config } = this
+    return own.size > 0 && config.arrows ? arrowRows(momenta(engine, model, data), own, config.arrows) : []
   }
 
   writePoses(target) {

@@ -4,6 +4,7 @@ import { freshId, h } from './dom.js'
 import { digitsOfStep, formatNumber } from './numbers.js'
 
 const STEPS = 200 // of a slider without a step
+const SIGNS = { momentum: 'p', angularMomentum: 'L', forces: 'F' }
 
 /**
  * @param {object[]} controls of the lab's JSON
@@ -72,15 +73,32 @@ function list({ label, unit, options }, set) {
   return { element, field, show }
 }
 
-/** Boxes to tick for overlays. */
-export function buildOverlays({ toggles, overlays }, words, toggle) {
-  if (toggles.length === 0) return null
-  const boxes = toggles.map((name) => {
+/** Buttons for the arrows that the motion has, by their usual letters, and boxes to tick for the other overlays. */
+export function buildOverlays({ toggles, overlays, arrows }, words, toggle) {
+  const offered = Object.keys(SIGNS).filter((name) => arrows?.[name])
+  const rest = toggles.filter((name) => !offered.includes(name))
+  const ticks = rest.map((name) => {
     const box = h('input', { type: 'checkbox', checked: overlays.includes(name) })
     box.addEventListener('change', () => toggle(name, box.checked))
     return h('label', { class: 'lab-check' }, box, ` ${words(`overlay.${name}`)}`)
   })
-  return h('div', { class: 'lab-overlays', role: 'group', 'aria-label': words('lab.overlays') }, ...boxes)
+  const buttons = offered.map((name) => arrowButton(name, words, overlays, toggle))
+  const group = (kind, parts) =>
+    parts.length > 0 ? h('div', { class: kind, role: 'group', 'aria-label': words('lab.overlays') }, ...parts) : null
+  return { arrows: group('lab-arrows', buttons), boxes: group('lab-overlays', ticks) }
+}
+
+function arrowButton(name, words, overlays, toggle) {
+  let on = overlays.includes(name)
+  const text = words(`overlay.${name}`)
+  const properties = { type: 'button', class: `lab-icon lab-arrow lab-${name}`, title: text, 'aria-label': text, 'aria-pressed': on }
+  const button = h('button', properties, h('i', {}, SIGNS[name]))
+  button.addEventListener('click', () => {
+    on = !on
+    button.setAttribute('aria-pressed', on)
+    toggle(name, on)
+  })
+  return button
 }
 
 /** The readouts: labels, and values that keep the room they once had. */

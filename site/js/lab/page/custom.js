@@ -137,7 +137,7 @@ class Kit {
     lab.controls = lab.controls.map((control) => ({ ...PLAIN_CONTROL, ...control }))
     lab.plots = lab.plots.map((plot) => ({ ...PLAIN_PLOT, ...plot }))
     const name = words('lab.live.view', { title: label })
-    const view = picture ? new View({ height, label: words('lab.live.picture', { title: label }), name }) : null
+    const view = picture ? new View({ height, label: words('lab.live.picture', { title: label }), name, words }) : null
     const simulation = new Simulation({
       config: { ...lab, autoplay: lab.autoplay && !prefersStillness() },
       base: this.base,

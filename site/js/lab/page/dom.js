@@ -37,12 +37,18 @@ export function icon(name) {
 }
 
 /** A picture of one path, in a square of 16, that nobody reads out. */
-export function pictogram(outline) {
-  const svg = document.createElementNS(SVG, 'svg')
+export function pictogram(path) {
+  const svg = outline(path)
   svg.setAttribute('viewBox', '0 0 16 16')
+  return svg
+}
+
+/** A path by itself. */
+export function outline(d) {
+  const svg = document.createElementNS(SVG, 'svg')
   svg.setAttribute('aria-hidden', 'true')
   const path = document.createElementNS(SVG, 'path')
-  path.setAttribute('d', outline)
+  path.setAttribute('d', d)
   svg.append(path)
   return svg
 }

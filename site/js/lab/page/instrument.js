@@ -53,6 +53,7 @@ export class Instrument {
       height: config.height ?? HEIGHT,
       label: words('lab.live.picture', { title }),
       name: words('lab.live.view', { title }),
+      words,
       poster: element.querySelector('.lab-static img'),
     })
     this.hands = new Hands(this.view, {
@@ -70,7 +71,8 @@ export class Instrument {
       set: (index, value) => this.simulation.set(index, value, !this.begun),
       press: (index) => this.simulation.press(index, config.controls[index].play),
     })
-    const overlays = buildOverlays(config, words, (name, on) => this.simulation.overlay(name, on))
+    const { arrows, boxes } = buildOverlays(config, words, (name, on) => this.simulation.overlay(name, on))
+    if (arrows !== null) this.transport.speed.after(arrows)
     this.readouts = buildReadouts(config.readouts, formatReadout)
     this.plots = config.plots.map((plot) => new Plot(plot, words))
     this.body = h(
@@ -80,7 +82,7 @@ export class Instrument {
       this.transport.element,
       this.notices.shown,
       ...this.plots.map((plot) => plot.element),
-      h('div', { class: 'lab-panel' }, this.controls.element, overlays, this.readouts.element, this.foot()),
+      h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.foot()),
       this.notices.spoken,
     )
     this.controls.show(this.values)

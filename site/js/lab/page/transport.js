@@ -38,6 +38,7 @@ export function buildTransport(words, actions) {
   return {
     element,
     full,
+    speed,
     setPlaying(now) {
       if (now === playing) return
       playing = now

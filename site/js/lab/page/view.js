@@ -8,6 +8,7 @@ import { PerspectiveCamera } from 'three'
 import { OrbitCamera } from './camera.js'
 import { h } from './dom.js'
 import { channels, resolve, watchTheme } from './palette.js'
+import { ScaleBar } from './scale.js'
 import { stage } from './stage.js'
 import { BESIDE } from './studio.js'
 import { World, aim } from './world.js'
@@ -18,14 +19,16 @@ export class View {
    * @param {number} options.height CSS pixels, where it is 480 wide
    * @param {string} options.label what the picture shows, for who cannot see it
    * @param {string} options.name of the view, and how keys move it
+   * @param {(key: string, values?: object) => string} options.words
    * @param {HTMLImageElement | null} [options.poster] a picture that is shown until there is a live one
    */
-  constructor({ height, label, name, poster = null }) {
+  constructor({ height, label, name, words, poster = null }) {
     this.label = label
     this.still = h('canvas', { class: 'lab-still', role: 'img', 'aria-label': label })
     this.element = h('div', { class: 'lab-view', tabIndex: 0, role: 'group', 'aria-label': name }, this.still)
     this.poster = poster === null ? null : h('img', { class: 'lab-poster', src: poster.src, alt: '' })
     if (this.poster !== null) this.element.append(this.poster)
+    this.scale = new ScaleBar(words)
     this.element.style.setProperty('--height', height)
     this.lens = new PerspectiveCamera()
     this.lens.matrixAutoUpdate = false
@@ -94,6 +97,9 @@ export class View {
     aim(this.lens, this.camera, this.world.description, this.width, this.height)
     this.world.edges.update(this.width, this.height)
     this.poster?.remove()
+    this.element.append(this.scale.element)
+    const high = 2 * this.camera.distance * Math.tan((this.lens.fov * Math.PI) / 360)
+    this.scale.show(this.width, this.height, this.height / high)
     return true
   }
 

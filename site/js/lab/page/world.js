@@ -19,6 +19,7 @@ const ROW = 19 // floats of a geom or site in a frame
 const SIZE = 12
 const COLOUR = 15
 const DECORATION = 24
+const IN_FRONT = -2 // see `arrows.js` of the core
 const USUAL = 1.6 // width of a view over its height
 
 export class World {
@@ -118,11 +119,12 @@ export class World {
     const used = new Map()
     for (let i = 0, at = start; i < count; i++, at += DECORATION) {
       const type = frame[at]
-      const key = type === GEOM.MESH ? `mesh ${frame[at + 1] >> 1}` : type
+      const data = frame[at + 1]
+      const key = type === GEOM.MESH ? `mesh ${data >> 1}` : data === IN_FRONT ? `${type} in front` : type
       if (!this.decorations.has(key)) this.decorations.set(key, [])
       const pool = this.decorations.get(key)
       const next = used.get(key) ?? 0
-      if (next === pool.length) pool.push(this.decoration(type, frame[at + 1]))
+      if (next === pool.length) pool.push(this.decoration(type, data))
       used.set(key, next + 1)
       const solid = pool[next]
       solid.update(frame, at + 7, at + 4, at + 19, sight, frame[at + 23])
@@ -136,6 +138,10 @@ export class World {
     for (const mesh of solid.meshes) mesh.castShadow = mesh.receiveShadow = false
     // A box of inertia may lie in the faces of a geom: what is added is seen before what it is added to.
     Object.assign(solid.material, { polygonOffset: true, polygonOffsetFactor: -0.1, polygonOffsetUnits: -4 })
+    if (data === IN_FRONT) {
+      solid.material.depthTest = false
+      for (const mesh of solid.meshes) mesh.renderOrder = 1
+    }
     return solid
   }
 

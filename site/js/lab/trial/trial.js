@@ -11,6 +11,7 @@
  */
 
 import { EngineError } from '../core/engine.js'
+import { ArrowScales } from '../core/arrows.js'
 import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, plottable, readable } from '../core/piece.js'
@@ -65,6 +66,7 @@ class Trial {
     this.steps = 0
     this.took = 0
     this.framing = null
+    this.scales = new ArrowScales()
   }
 
   run() {
@@ -108,6 +110,19 @@ class Trial {
     main.scene.floor = this.framing.floor()
     main.fill = this.framing.fill(camera)
     main.mostFill = this.framing.fill(fitting)
+    main.arrows = this.scales.fit(2 * camera.distance * Math.tan((camera.fovy * Math.PI) / 360))
+    if (this.config.overlays.some((name) => name in main.arrows)) main.pictures[0] = packed(this.start(main.arrows))
+  }
+
+  /** The start once more, with its arrows. */
+  start(arrows) {
+    const lab = new Lab(this.engine, this.bytes, { ...this.config, arrows }, this.code)
+    try {
+      lab.start()
+      return picture(lab)
+    } finally {
+      lab.dispose()
+    }
   }
 
   // --- one attempt
@@ -230,13 +245,18 @@ class Trial {
       const started = (progress.last = this.now())
       const { steps, stopped } = lab.step(Math.min(due, left, SLICE))
       this.measure(lab, steps, this.now() - started)
-      if (lab.diverged === null) this.framing.see(lab)
+      if (lab.diverged === null) this.see(lab)
       left -= steps
       this.state(lab)
       if (stopped === 'diverged' || stops.includes(stopped)) return stopped
       if (steps === 0) throw new Error(`no step can be made at t = ${begun}`)
     }
     return 'steps'
+  }
+
+  see(lab) {
+    this.framing.see(lab)
+    this.scales.see(lab)
   }
 
   /** Recording costs time of its own, so those steps do not count. */
@@ -264,7 +284,7 @@ class Trial {
     const due = Math.min(most, Math.ceil(wanted / timestep))
     this.framing = new Framing(lab, lab.scene().camera)
     this.framing.begin()
-    this.framing.see(lab)
+    this.see(lab)
     this.look(lab)
     const start = picture(lab)
     const atStart = lab.state().physics
@@ -298,6 +318,7 @@ class Trial {
       parity,
       fill: null, // see `frame`
       mostFill: null,
+      arrows: null,
       resetDiffers: resetDiffers(lab, atStart),
     }
   }
