@@ -190,12 +190,17 @@ class PageKind(Struct, frozen=True, kw_only=True):
 class ModelPart(Struct, frozen=True, kw_only=True):
     """What a feature adds to the page of every model that compiles."""
 
-    facts: Callable[[Library, MjcfModel], Iterable[tuple[str, str]]]
+    facts: Callable[[Library, MjcfModel], Iterable[tuple[str, str]]] = lambda library, model: ()
     """More of what the model is, as pairs of words."""
-    values: Callable[[Library, Place, MjcfModel], Struct]
-    """All else that it shows of the course: the page is drawn again where this is another."""
+    values: Callable[[Library, Place, MjcfModel], Struct | None]
+    """All else that it shows of the course: the page is drawn again where this is another. `None`:
+    nothing of this model."""
     draw: Callable[[Tools, Any], Markup]
-    """What stands below the facts, made of these values."""
+    """What is made of these values."""
+    opens: bool = False
+    """Whether that stands at the top of the page; if not, below the facts."""
+    picture: Callable[[Library, MjcfModel], Picture | None] = lambda library, model: None
+    """A picture of the model, for lists of models."""
 
 
 class PageCopy(Struct, frozen=True, kw_only=True):

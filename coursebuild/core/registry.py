@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 GROUP = "coursebuild.features"
 """The group of entry points under which packages offer features."""
-CORE_PAGES = ("home", "level", "lesson", "stub", "model", "page", "notfound")
+CORE_PAGES = ("home", "level", "lesson", "stub", "models", "model", "page", "notfound")
 """The kinds of pages that every site has."""
 _FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
 """Folders of every site."""

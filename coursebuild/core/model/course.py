@@ -15,6 +15,9 @@ from coursebuild.core.model.blocks import Comparison, Document, Filter
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.text.source import Source, Span
 
+_COMMENT = re.compile("<!--(.*?)-->", re.DOTALL)
+_LICENCE = re.compile("copyright|licen[cs]e", re.IGNORECASE)
+
 
 class Status(enum.Enum):
     """How far a lesson is."""
@@ -81,6 +84,13 @@ class MjcfModel(Struct, frozen=True):
 
     name: str
     source: Source
+
+    @property
+    def about(self) -> str:
+        """What it is: the first comment above it that is no licence, on one line."""
+        head = self.source.text.partition("<mujoco")[0]
+        comments = (" ".join(text.split()) for text in _COMMENT.findall(head))
+        return next((text for text in comments if not _LICENCE.search(text)), "")
 
 
 class CalloutKind(Struct, frozen=True):

@@ -46,6 +46,7 @@ from coursebuild.core.model.results import (
     Verdict,
 )
 from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, strings_for
 from coursebuild.core.pages.quiz_index import QuizIndex, quiz_index
 from coursebuild.core.pages.strings import Strings
@@ -174,6 +175,12 @@ class Library(Struct, frozen=True, dict=True):
     def menu(self) -> tuple[Page, ...]:
         """The pages in the menu of every page, beside the home page."""
         return tuple(page for page in self.course.pages if page.menu and not page.is_home)
+
+    @property
+    def gallery(self) -> str:
+        """The site path of the page of all models; empty where there are none, or one `index`."""
+        names = {model.name for model in self.course.models}
+        return urls.MODELS if names and "index" not in names else ""
 
     def mathml(self, tex: str, display: bool) -> str:
         """A formula; empty for one that cannot be set."""

@@ -56,6 +56,8 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         yield PageEntry(urls.level_path(level), "level", level.id)
     for lesson in library.order:
         yield PageEntry(urls.lesson_path(lesson), "lesson", lesson.id)
+    if library.gallery:
+        yield PageEntry(library.gallery, "models")
     for model in course.models:
         yield PageEntry(urls.model_page_path(model.name), "model", model.name)
     for kind in library.added_pages:
@@ -96,6 +98,8 @@ def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
             if found.document is None:
                 return lesson.stub_inputs(library, found)
             return lesson.lesson_inputs(library, found, found.document)
+        case "models":
+            return pages.gallery_inputs(library)
         case "model":
             model = next(model for model in library.course.models if model.name == entry.id)
             return pages.model_inputs(library, model)

@@ -6,13 +6,16 @@ each shows.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.features import ModelPart
 from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.cards import galleries, lesson_cards
+from coursebuild.core.pages.cards import PictureLink, galleries, lesson_cards
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
@@ -49,6 +52,17 @@ class Named(Struct, frozen=True):
     remark: str = ""
 
 
+class ModelCard(Struct, frozen=True):
+    """A model in the gallery."""
+
+    name: str
+    about: str
+    href: str
+    picture: PictureLink | None
+    lessons: tuple[LessonLink, ...]
+    """The lessons that use it."""
+
+
 def home_inputs(library: Library, document: Document | None) -> PageInputs:
     """What the home page shows: what can be read, and the whole plan.
 
@@ -65,9 +79,8 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         "start": lesson_link(library, place, written[0]) if written else None,
         "total": len(library.order),
         "written": len(written),
-        "models": tuple(
-            Named(place.href(urls.model_page_path(m.name)), m.name) for m in course.models
-        ),
+        "models": len(course.models),
+        "gallery": place.href(library.gallery) if library.gallery else "",
         "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
         "scripts": len(library.scripts),
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
@@ -122,16 +135,42 @@ def level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
     )
 
 
+def gallery_inputs(library: Library) -> PageInputs:
+    """What the page of all models shows."""
+    place = urls.Place(library.gallery)
+    values = {
+        "home": place.href(urls.HOME),
+        "models": tuple(_model_card(library, place, model) for model in library.course.models),
+    }
+    head = PageHead(place.path, "models", library.words("models.title"), "")
+    return PageInputs(head, "models.html", values)
+
+
+def _model_card(library: Library, place: urls.Place, model: MjcfModel) -> ModelCard:
+    href = place.href(urls.model_page_path(model.name))
+    pictures = (part.picture(library, model) for part in model_parts().values())
+    found = next(filter(None, pictures), None)
+    picture = None
+    if found is not None:
+        src = place.href(found.path)
+        picture = PictureLink(src, found.width, found.height, model.name, href)
+    owners = [use.owner for use in library.uses[model.name]]
+    lessons = tuple(lesson_link(library, place, one) for one in owners if isinstance(one, Lesson))
+    return ModelCard(model.name, model.about, href, picture, lessons)
+
+
 def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
-    """What the page of a model shows: what it holds, its text, where it is used."""
+    """What the page of a model shows: what it is, where it is used, what it holds, its text."""
     place = urls.Place(urls.model_page_path(model.name))
     compiled = library.models.get(model.name)
     title = library.words("model.title", name=model.name)
     facts = None if compiled is None else compiled.facts
     parts = {} if facts is None else model_parts()
     more = [fact for part in parts.values() for fact in part.facts(library, model)]
+    shown = {name: part.values(library, place, model) for name, part in parts.items()}
     values = {
         "home": place.href(urls.HOME),
+        "gallery": place.href(library.gallery) if library.gallery else "",
         "name": model.name,
         "path": model.source.path,
         "anchor": listing_anchor(model.source.path),
@@ -139,12 +178,24 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "href": place.href(urls.model_file_path(model.name)),
         "facts": () if facts is None else (*_facts(library, facts), *more),
         "code": Highlighted("xml", model.source.text.rstrip(), model.source.path),
-        "added": AddedParts(
-            {name: part.values(library, place, model) for name, part in parts.items()}
-        ),
-        "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
+        "about": model.about,
+        "opening": _added(parts, shown, opens=True),
+        "added": _added(parts, shown, opens=False),
+        "uses": model_uses(library, place, model),
     }
-    return PageInputs(PageHead(place.path, "model", title, ""), "model.html", values)
+    return PageInputs(PageHead(place.path, "model", title, model.about), "model.html", values)
+
+
+def _added(
+    parts: Mapping[str, ModelPart], shown: Mapping[str, Struct | None], *, opens: bool
+) -> AddedParts:
+    chosen = ((name, shown[name]) for name, part in parts.items() if part.opens is opens)
+    return AddedParts({name: value for name, value in chosen if value is not None})
+
+
+def model_uses(library: Library, place: urls.Place, model: MjcfModel) -> tuple[Named, ...]:
+    """Who uses a model, and how."""
+    return tuple(_use_link(library, place, use) for use in library.uses[model.name])
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:

@@ -24,6 +24,7 @@ from coursebuild.core.registry import page_kinds
 HOME = "index.html"
 NOT_FOUND = "404.html"
 EXAMPLES_ZIP = "examples.zip"
+MODELS = "models/index.html"
 NUMERICS = "numerics/index.html"
 """In a folder that no page of a course can have."""
 SITEMAP = "sitemap.xml"

@@ -8,9 +8,18 @@ Python script.
 
 from __future__ import annotations
 
-from coursebuild.core.features import Feature, FenceKind, PagePart, TrialContext, TrialRun, Trials
+from coursebuild.core.features import (
+    Feature,
+    FenceKind,
+    ModelPart,
+    PagePart,
+    TrialContext,
+    TrialRun,
+    Trials,
+)
 from coursebuild.features.lab.checks import check_labs, check_model_names
 from coursebuild.features.lab.files import publish_labs
+from coursebuild.features.lab.gallery import draw_model, model_picture, model_view
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
 from coursebuild.features.lab.markdown import lab_markdown
 from coursebuild.features.lab.model import Lab
@@ -47,6 +56,7 @@ FEATURE = Feature(
             picture=lab_picture,
         ),
     ),
+    model_part=ModelPart(values=model_view, draw=draw_model, opens=True, picture=model_picture),
     check=check_labs,
     check_models=check_model_names,
     parts=(_LIVE,),

@@ -19,6 +19,7 @@ from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab
 from coursebuild.features.lab.engines.files import engine_digest
 from coursebuild.features.lab.engines.native import native_digest
+from coursebuild.features.lab.gallery import own_labs
 from coursebuild.features.lab.model import TRIED, Lab
 
 SECONDS = 60.0
@@ -28,10 +29,12 @@ _UNTRIED = ("id", "title", "model", "height", "toggles")
 
 
 def lab_trials(course: Course) -> Iterator[Trial]:
-    """Every lab of a course, in order."""
+    """Every lab of a course, in order; then those of models that have none in a text."""
     for owner, document in owners(course):
         for number, lab in enumerate(labs_in((document,)), 1):
             yield Trial(f"{owner}-lab-{number}", owner, lab)
+    for model, lab in own_labs(course):
+        yield Trial(f"model-{model.name.replace('/', '-')}", model.name, lab)
 
 
 def trial_inputs(trial: Trial) -> Inputs | None:

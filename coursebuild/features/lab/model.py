@@ -19,6 +19,8 @@ MJCF = "mjcf"
 """That of a lab whose model the reader edits."""
 TRIED = (SIMLAB, MJCF)
 """Kinds that are tried; all others are a course's own."""
+START = "if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0);"
+"""The `setup` of labs that say nothing of it: they start from the model's first keyframe."""
 Entry: TypeAlias = tuple[str | int, ...]
 """The way to a value inside the lab's JSON: `("controls", 2, "set")`."""
 _NAMED_BY = {"controls": ("set", "apply", "run", "label"), "expect": ("expr", "diverges")}
@@ -41,6 +43,11 @@ class Lab(FeatureBlock, frozen=True):
     """Where each value of the JSON stands."""
     code: tuple[tuple[Entry, Excerpt], ...] = ()
     """The pieces of JavaScript in it."""
+
+    @property
+    def is_of_text(self) -> bool:
+        """Whether an author wrote it; if not, it is that of a model which no text shows."""
+        return not self.span.path.startswith("models/")
 
     @property
     def verify(self) -> Verify:

@@ -26,7 +26,7 @@ from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.features.lab.model import MJCF, SIMLAB, Entry, Lab
+from coursebuild.features.lab.model import MJCF, SIMLAB, START, Entry, Lab
 from coursebuild.features.lab.relations import check_lab
 from coursebuild.features.lab.schema import (
     OVERLAYS,
@@ -47,8 +47,6 @@ _KEYS = {
     "diverges": (Positive, "a number above 0"),
 }
 """Keys of a fence `lab mjcf`, and what their values are."""
-_START = "if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0);"
-"""Such a lab starts from the model's first keyframe."""
 
 
 def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
@@ -77,7 +75,7 @@ def _parse_mjcf(fence: Fence, name: Word) -> Parsed[Lab | None]:
     verify = Verify(**{key: given.pop(key) for key in ("seconds", "rtol", "deep") if key in given})
     diverges = given.pop("diverges", None)
     claims = () if diverges is None else (Expect(t=diverges, diverges=True),)
-    fields = SimLab(**given, toggles=OVERLAYS, setup=_START, expect=claims, verify=verify)
+    fields = SimLab(**given, toggles=OVERLAYS, setup=START, expect=claims, verify=verify)
     body = fence.body
     lab = Lab(fence.span, MJCF, name.span, body.text, fields, xml=body)
     return Parsed(None if found else lab, tuple(found))

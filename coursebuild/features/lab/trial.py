@@ -111,12 +111,15 @@ class LabTrials:
         assert isinstance(lab, Lab)
         if any(lab.span.contains(diagnostic.span) for diagnostic in context.wrong):
             return None, []
+        if not (lab.is_of_text or context.static):
+            return None, []  # which nothing is claimed of, and nobody looks at
         if lab.kind not in TRIED:
             return custom_lab(context, engines.native, trial, lab)
         model = model_of_lab(context, lab)
         if model is None:
             return None, []
-        return _Attempt(context, engines, self._seconds, trial, lab, model).run()
+        result, found = _Attempt(context, engines, self._seconds, trial, lab, model).run()
+        return result, found if lab.is_of_text else []
 
     def stop(self) -> None:
         """From another thread: end what runs, and let nothing begin."""
@@ -154,10 +157,7 @@ class _Attempt(Struct, frozen=True):
             return self._failed(module, began), [wrong]
         reading, parity = read_trial(reply), _parity(reply)
         seconds, made = float(reply["seconds"]), int(reply["made"])
-        found = [*trial_diagnostics(lab, reading), *self._version(reading)]
-        found += shallow_diagnostics(lab, reading)
-        if parity is not None:
-            found += parity_diagnostics(lab, parity)
+        found = self._failures(reading, parity) if lab.is_of_text else []
         offer = LabExport(None) if found else self._export(reading, parity)
         own = () if lab.xml is not None else (self.model.path,)
         self.context.memory.note_trial(
@@ -188,6 +188,13 @@ class _Attempt(Struct, frozen=True):
         found += [*deep_diagnostics(lab, reading), *reset_diagnostics(lab, reading)]
         found += far_diagnostics(lab, reading)
         return TrialResult(lab.span, line, output), found
+
+    def _failures(self, reading: TrialReply, parity: Parity | None) -> list[Diagnostic]:
+        """What the lab cannot be shown with."""
+        lab = self.lab
+        found = [*trial_diagnostics(lab, reading), *self._version(reading)]
+        found += shallow_diagnostics(lab, reading)
+        return [*found, *(parity_diagnostics(lab, parity) if parity is not None else ())]
 
     def _failed(self, module: LabModule, began: float) -> TrialResult:
         """A lab that could not be tried."""

@@ -98,6 +98,8 @@ def test_the_files_of_a_site(site: dict[str, bytes]) -> None:
         "models/box.html",
         "models/box.md",
         "models/box.xml",
+        "models/index.html",
+        "models/index.md",
         "models/meshes/hand.obj",
         "offline/index.html",
         "progress/index.html",
@@ -368,6 +370,10 @@ def test_the_model_page(site: dict[str, bytes]) -> None:
     assert "(lab, script, link)" in page
     assert '<a href="box.xml" download>Download</a>' in page
     assert '<span class="t">&lt;worldbody/&gt;</span>' in page
+    assert '<li><a href="index.html">Models</a></li>' in page
+    card = pages(site)["models/index.html"].split('<li class="card">')[1]
+    assert '<a href="box.html">box</a>' in card
+    assert '<a href="../lessons/0.1-falling.html" title="Falling">0.1</a>' in card
 
 
 def test_styles_in_elements_become_classes_of_the_sheet(make: Make) -> None:

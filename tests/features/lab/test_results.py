@@ -18,6 +18,14 @@ pytestmark = pytest.mark.engine
 RESETS = '{"model": "ball",\n"setup": "ctx.n = (ctx.n ?? 0) + 1; data.qvel[1] = ctx.n"}'
 
 
+STILL = """<!-- Copyright: nobody. --><!-- A box that nothing
+moves. --><mujoco><worldbody><geom type="box" size=".1 .1 .1"/></worldbody></mujoco>"""
+LOST = """<mujoco><option timestep="1"/><worldbody><body>
+<joint type="slide" stiffness="1e6"/><geom size=".1"/></body></worldbody>
+<keyframe><key qpos="1"/></keyframe></mujoco>"""
+"""It diverges."""
+
+
 class Built(NamedTuple):
     """A course with a lab in which everything holds, and one whose reset leads elsewhere."""
 
@@ -38,6 +46,8 @@ def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Built:
     folder = Folder(tmp_path_factory.mktemp("built") / "course")
     folder.fill([GOOD, "## A lab\n\n" + fence(RIGHT), "## A\n\n" + fence(RESETS)], stores)
     folder.write("models/ball.xml", BALL)
+    folder.write("models/a/still.xml", STILL)
+    folder.write("models/lost.xml", LOST)
     report = checked(folder, status=0)
     done = folder.main("build")
     assert done.status == 0, done.out + done.err
@@ -89,6 +99,17 @@ def test_a_page_shows_what_the_trial_recorded(built: Built) -> None:
     assert "<dt>state</dt><dd>late</dd>" in text
     assert "bit-identical to native MuJoCo over 500 steps" in text
     assert len(list(built.public.glob("assets/labs/1.2-lab-1.*.png"))) == 1
+
+
+def test_models_are_live_on_their_pages_and_seen_in_the_gallery(built: Built) -> None:
+    models = built.public / "models"
+    for name, lab in (("ball", "1.2-lab-1"), ("a/still", "model-a-still"), ("lost", "model-lost")):
+        page = (models / f"{name}.html").read_text("utf-8")
+        assert page.index(f'data-lab="{lab}"') < page.index('id="used"') < page.index('id="facts"')
+        assert re.search(rf'<img src="[./]+assets/labs/{lab}\.\w+\.png"', page), name
+    gallery = (models / "index.html").read_text("utf-8")
+    assert gallery.count('<img src="../assets/labs/') == 3
+    assert "<p>A box that nothing moves.</p>" in gallery
 
 
 def test_files_of_labs_have_compressed_copies(built: Built) -> None:
