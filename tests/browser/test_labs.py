@@ -199,6 +199,7 @@ def test_keys_on_the_picture(lesson: Lesson, swing: Locator) -> None:
     view.focus()
     page.keyboard.press(".")
     expect(swing.locator(".lab-time")).to_have_text(re.compile(r"^0\.00"))
+    expect(view.locator(".lab-scale")).to_have_accessible_name("Scale: the bar is 0.5 m long")
     first = still(page, view)
     page.keyboard.press("ArrowLeft")
     turned = changed(page, view, first)
@@ -284,6 +285,9 @@ def test_every_kind_of_geom_and_overlay_is_drawn_and_a_large_state_fits_into_a_l
     before = still(page, found.locator(".lab-view"))
     for box in found.locator(".lab-check input").all():
         box.check()
+    for arrow in found.locator(".lab-arrow").all():
+        arrow.click()
+        expect(arrow).to_have_attribute("aria-pressed", "true")
     press(found, "Play")
     comes(page, lambda: time_of(found) > 0.6)  # by then bodies touch the ground
     changed(page, found.locator(".lab-view"), before)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from markupsafe import Markup
+from msgspec.structs import replace
 
 from coursebuild.core.features import Picture
 from coursebuild.core.model import Course, Document, FeatureBlock, MjcfModel, document_blocks
@@ -18,7 +19,9 @@ from coursebuild.core.pages.tools import Tools
 from coursebuild.features.lab.files import ShownLab
 from coursebuild.features.lab.model import SIMLAB, START, Lab
 from coursebuild.features.lab.page import LabView, lab_picture, lab_view
-from coursebuild.features.lab.schema import OVERLAYS, SimLab
+from coursebuild.features.lab.schema import Overlay, SimLab
+
+_TOGGLES: tuple[Overlay, ...] = ("frames", "com", "inertia", "joints", "axis")
 
 
 def own_labs(course: Course) -> Iterator[tuple[MjcfModel, Lab]]:
@@ -44,7 +47,7 @@ def _labs_by_model(document: Document) -> dict[str, Lab]:
 def _own_lab(model: MjcfModel) -> Lab:
     """A model that starts from its first keyframe and is left to itself."""
     place = model.source.span(0, 0)
-    fields = SimLab(model=model.name, title=model.name, toggles=OVERLAYS, setup=START)
+    fields = SimLab(model=model.name, title=model.name, toggles=_TOGGLES, setup=START)
     return Lab(place, SIMLAB, place, "", fields)
 
 
@@ -61,7 +64,8 @@ def model_view(library: Library, place: urls.Place, model: MjcfModel) -> LabView
     lab, shown = _find(library, model)
     if shown is None or shown.record is None:
         return None
-    return lab_view(library.words, place, lab, shown, library.results.engine)
+    view = lab_view(library.words, place, lab, shown, library.results.engine)
+    return replace(view, model_href=place.href(place.path))
 
 
 def draw_model(tools: Tools, view: LabView) -> Markup:

@@ -192,7 +192,7 @@ def _recorded(
             t=number(record.time, 4),
         ),
         round(record.scale[1], 1),
-        f"{record.scale[0]:.1g} m",
+        f"{number(record.scale[0])} m",
         record.readouts,
         tuple(Markup(svg) for svg in record.plots),
         words("lab.at", t=seconds(record.end)),

@@ -10,9 +10,9 @@ const PART = 0.3 // of the picture's height is an arrow of the usual length
 const THICK = 0.009 // radius of an arrow, in heights of the picture
 const AXIS = 0.42 // how far an axis reaches to either side, in the same
 const NOTHING = 1e-9
-const ARROW = 100 // mjtGeom
+export const ARROW = 100 // mjtGeom
 const CYLINDER = 5
-const IN_FRONT = -2 // in the place of a data id: nothing covers it, though it begins inside a body
+export const IN_FRONT = -2 // in the place of a data id: nothing covers it, though it begins inside a body
 const INNER = 0.84 // of a double arrow's length is its second head
 const COLOURS = { momentum: [0, 0.45, 0.7, 1], angularMomentum: [0.84, 0.37, 0, 1], axis: [0.62, 0.34, 0.6, 1] }
 

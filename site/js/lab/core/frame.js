@@ -18,7 +18,7 @@
  * arrows of `arrows.js`.
  */
 
-import { arrowRows, momenta } from './arrows.js'
+import { ARROW, IN_FRONT, arrowRows, momenta } from './arrows.js'
 import { describeScene } from './scene.js'
 import { SceneGeoms } from './structs.js'
 
@@ -162,10 +162,12 @@ export class Pictures {
   writeDecorations(target, start, count) {
     const { ints, floats } = this.geoms
     const { CYLINDER } = this.engine.k.geom
+    const { contactforce } = this.model.vis.rgba
     for (let i = 0, at = start; i < count; i++, at += DECORATION) {
       const from = this.geoms.at(i)
       for (let j = 0; j < 4; j++) target[at + j] = ints[from + j]
       target.set(floats.subarray(from + 10, from + 30), at + 4) // size, position, matrix, colour, emission
+      if (ints[from] === ARROW && contactforce.every((x, j) => target[at + 19 + j] === x)) target[at + 1] = IN_FRONT
       // The axes of MuJoCo's frames, long cylinders, are so thick that they cover what they stand in.
       if (ints[from] === CYLINDER && target[at + 6] > target[at + 4]) target.fill(AXIS * target[at + 4], at + 4, at + 6)
     }
