@@ -25,7 +25,6 @@ from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import Seen
 from coursebuild.numerics.pruning.edits import (
     ModelEdit,
-    drop_attribute,
     set_attributes,
     set_option,
 )
@@ -48,6 +47,8 @@ class Item(Struct, frozen=True, eq=False):
     """Where to point at; `None`: at the model."""
     gone: tuple[Element, ...] = ()
     """Elements to take out."""
+    drops: tuple[tuple[Element, str], ...] = ()
+    """Attributes to take out."""
     edits: tuple[ModelEdit, ...] = ()
     """Other changes of the text."""
     view: str = ""
@@ -123,7 +124,7 @@ def unread(text: ModelText, scenarios: Collection[Scenario]) -> list[Item]:
     keys = [one for one in text.elements if one.tag == "key" and section_of(one) == "keyframe"]
     begun = {keys[s.keyframe] for s in scenarios if 0 <= s.keyframe < len(keys)}
     found = [
-        Item(f"{flag}-flag", flag, one, edits=drop_attribute(one, flag))
+        Item(f"{flag}-flag", flag, one, drops=((one, flag),))
         for one in text.elements
         for flag in _FLAGS
         if one.tag == "flag" and one.get(flag) == "enable"

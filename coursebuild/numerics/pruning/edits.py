@@ -1,7 +1,7 @@
 """Changes of MJCF as replacements of bytes: everything else stays as its author wrote it.
 
-Entry points: `ModelEdit`; `remove`, `set_attributes`, `drop_numbers`, `set_option` make them;
-`apply_edits` makes the new bytes, `merge_edits` fewer edits of many.
+Entry points: `ModelEdit`; `remove`, `set_attributes`, `drop_attribute`, `drop_numbers` and
+`set_option` make them; `apply_edits` makes the new bytes, `merge_edits` fewer edits of many.
 
 1. An element that has lines of its own goes with these; one that shares its line goes with the
    blanks beside it. Comments stay, also those beside what goes.
@@ -141,18 +141,26 @@ def set_attributes(element: Element, values: Iterable[tuple[str, str]]) -> tuple
     return tuple(edits)
 
 
-def drop_attribute(element: Element, name: str) -> tuple[ModelEdit, ...]:
-    """Take out an attribute with the blanks before it; the element, where it has no other."""
-    if len(element.attributes) == 1 and not element.children:
-        return remove((element,))
-    return _without(element, name)
+def emptied(drops: Collection[tuple[Element, str]], edits: Collection[ModelEdit]) -> list[Element]:
+    """Elements of which nothing is left without these attributes; not those in which edits are."""
+    return [
+        element
+        for element in dict.fromkeys(element for element, _ in drops)
+        if not element.children
+        and all((element, one.name) in drops for one in element.attributes)
+        and not any(
+            one.path == element.document.path and element.start < one.start < element.end
+            for one in edits
+        )
+    ]
 
 
-def _without(element: Element, name: str) -> tuple[ModelEdit, ...]:
+def drop_attribute(element: Element, name: str) -> ModelEdit:
+    """Take out an attribute with the blanks before it."""
     there = element.attribute(name)
     assert there is not None, name
     start = len(element.document.data[: there.start].rstrip())
-    return (ModelEdit(element.document.path, start, there.end, b""),)
+    return ModelEdit(element.document.path, start, there.end, b"")
 
 
 def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[ModelEdit, ...]:
@@ -166,7 +174,7 @@ def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[
     if len(left) == len(numbers):
         return ()
     if not left:
-        return _without(element, name)
+        return (drop_attribute(element, name),)
     return (ModelEdit(element.document.path, start, end, b"".join(left).rstrip()),)
 
 

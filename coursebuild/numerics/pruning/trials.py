@@ -17,7 +17,13 @@ from coursebuild.numerics.engine import STATE, advance, full_state, initial_data
 from coursebuild.numerics.pruning.candidates import Item
 from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
 from coursebuild.numerics.pruning.differences import ModelDifference, state_difference
-from coursebuild.numerics.pruning.edits import ModelEdit, drop_numbers, remove
+from coursebuild.numerics.pruning.edits import (
+    ModelEdit,
+    drop_attribute,
+    drop_numbers,
+    emptied,
+    remove,
+)
 from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
 from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import ModelText, saved
@@ -164,8 +170,11 @@ def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, .
     elements = list(dict.fromkeys(one for item in items for one in item.gone))
     below = [one for element in elements for one in element.walk()]
     gone = Gone(*(text.ids_of(below, kind) for kind in ("body", "geom", "sensor", "actuator")))
-    edits = [*remove(elements), *_keyframes(text, gone, set(below))]
-    edits += [edit for item in items for edit in item.edits]
+    drops = [drop for item in items for drop in item.drops]
+    edits = [edit for item in items for edit in item.edits]
+    edits += remove([*elements, *emptied(drops, edits)])
+    edits += [drop_attribute(*drop) for drop in drops]
+    edits += _keyframes(text, gone, set(below))
     return tuple(_outermost(edits)), gone
 
 
@@ -173,8 +182,13 @@ def _outermost(edits: Iterable[ModelEdit]) -> Iterator[ModelEdit]:
     """Without those inside of what another one takes out."""
     last: ModelEdit | None = None
     for edit in sorted(set(edits), key=lambda one: (one.path, one.start, -one.end)):
-        inside = last is not None and last.path == edit.path and edit.end <= last.end
-        if inside and last is not None and not last.new and last.start < last.end:
+        if (
+            last is not None
+            and last.path == edit.path
+            and edit.start < last.end
+            and edit.end <= last.end
+            and not last.new
+        ):
             continue
         yield edit
         last = edit

@@ -7,7 +7,6 @@ import pytest
 from coursebuild.numerics.pruning.edits import (
     ModelEdit,
     apply_edits,
-    drop_attribute,
     drop_numbers,
     remove,
     set_option,
@@ -183,26 +182,6 @@ def test_numbers_go_out_of_a_list(gone: list[int], left: str) -> None:
 )
 def test_options_and_flags(before: str, tag: str, name: str, value: str, left: str) -> None:
     assert after(before, *set_option(document(before), tag, name, value)) == left
-
-
-@pytest.mark.parametrize(
-    ("before", "left"),
-    [
-        ("<m>\n  <option>\n    <flag energy='enable'/>\n  </option>\n</m>", "<m>\n</m>"),
-        ("<m><option a='1'><flag energy='enable'/></option></m>", "<m><option a='1'></option></m>"),
-        (
-            "<m><option><!-- --><flag energy='enable'/></option></m>",
-            "<m><option><!-- --></option></m>",
-        ),
-        (
-            "<m><option><flag energy='enable' b='1'/></option></m>",
-            "<m><option><flag b='1'/></option></m>",
-        ),
-    ],
-)
-def test_an_attribute_goes_with_an_element_that_has_no_other(before: str, left: str) -> None:
-    flags = [one for one in document(before).root.walk() if one.tag == "flag"]
-    assert after(before, *drop_attribute(flags[0], "energy")) == left
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:
