@@ -19,6 +19,8 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.core.model.scenarios import (
+    DURATION,
+    MOST_STEPS,
     Declarations,
     DeclaredScenario,
     Visible,
@@ -28,10 +30,6 @@ from coursebuild.core.text.source import Span
 from coursebuild.numerics.problem import Array, Scenario
 from mjcourse import exact
 
-DURATION = 2.0
-"""Seconds of a scenario that does not say how long it takes."""
-MOST_STEPS = 20_000
-"""Steps under the model's own timestep that it takes at most."""
 LOOKS = 100
 """Samples that a scenario has where its author does not say, about."""
 FEWEST = 25

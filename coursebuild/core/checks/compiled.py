@@ -28,6 +28,7 @@ from coursebuild.core.model import (
     document_blocks,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
+from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep
 from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
@@ -201,6 +202,8 @@ def check_scenarios(declared: Declarations, facts: ModelFacts) -> Iterator[Diagn
         yield from _check_lengths(scenario, facts)
         yield from _check_measured(scenario, facts)
         yield from _check_timestep(scenario, facts)
+    for sweep in declared.sweeps:
+        yield from _check_sweep(sweep, declared.scenarios, facts)
 
 
 def _check_keyframe(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
@@ -258,4 +261,34 @@ def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[D
                 message += f" ({length:g} s)"
                 help = f"a multiple near it is {max(count, 1) * step:.12g}"
                 yield diagnose(_RULE, scenario.place(name), message, help=help)
+            return
+
+
+MOST_SWEPT = 2_000_000
+"""Steps of all runs of a sweep together: each is looked at, so that these take minutes."""
+
+
+def _check_sweep(
+    sweep: DeclaredSweep, scenarios: Sequence[DeclaredScenario], facts: ModelFacts
+) -> Iterator[Diagnostic]:
+    own, total = facts.timestep, 0.0
+    run = next((one for one in scenarios if sweep.scenario in ("", one.name)), None)
+    duration = None if run is None else run.duration
+    if duration is None:
+        held = 0.0 if run is None else len(run.controls) * (run.hold or 0.0)
+        duration = max(held, min(DURATION, MOST_STEPS * own))
+    for part in sweep.vary:
+        timed = part.parameter == "option.timestep"
+        for value in part.values:
+            step = own
+            if timed and isinstance(value, float | int):
+                step = own * value if part.relative else value
+            if step <= 0:
+                yield diagnose(_RULE, part.span, f"a timestep cannot be {step:g} s")
+                return
+            total += duration / step
+        if total > MOST_SWEPT:
+            message = f"with `{part.parameter}` the sweep makes {total:.2g} steps"
+            help = f"{MOST_SWEPT:,} are the most: take fewer values, or a shorter scenario"
+            yield diagnose(_RULE, part.span, message, help=help)
             return

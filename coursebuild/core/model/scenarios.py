@@ -17,6 +17,9 @@ VISIBLE = 0.01
 """Share of a model's extent that a learner sees in a picture of it: 2 pixels of 200."""
 VISIBLE_ANGLE = 1.0
 """Degrees by which an attitude must be off for a learner to see it."""
+DURATION, MOST_STEPS = 2.0, 20_000
+"""Seconds of a scenario that does not say how long it takes, and the model's timesteps that it is
+at most."""
 
 
 def keyframe_scenarios(keyframes: Sequence[str]) -> tuple[str, ...]:

@@ -50,6 +50,8 @@ from coursebuild.core.text.source import Source, Span
 
 MOST_SAMPLES = 100_000
 """Looks at the state in a scenario."""
+MOST_VALUES, MOST_THREADS = 100, 256
+"""Of a sweep: values of all parameters together, and threads."""
 _SLACK = 1e-9
 """Relative: decimal fractions are not exact."""
 
@@ -193,6 +195,7 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
         *parsed.diagnostics,
         *decoding.diagnostics,
         *_check_scenarios(root, decoding),
+        *_check_sweeps(root, decoding),
         *_check_names(root, decoding),
     ]
     if found or decoding.value is None:
@@ -289,18 +292,31 @@ def _check_names(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Di
     scenarios = decoding.each(root.objects("scenario"), ScenarioTable)
     names = [(table.name, node.place("name")) for node, table in scenarios]
     yield from repeated(names, "field-value", "two scenarios have the name `{}`")
-    sweeps = list(decoding.each(root.objects("sweep"), SweepTable))
+    sweeps = decoding.each(root.objects("sweep"), SweepTable)
     names = [(table.name, node.place("name")) for node, table in sweeps]
     yield from repeated(names, "field-value", "two sweeps have the name `{}`")
+    keeps = decoding.each(root.objects("keep"), KeepTable)
+    findings = [(table.finding, node.place("finding")) for node, table in keeps]
+    yield from repeated(findings, "field-value", "the finding `{}` is kept twice")
+
+
+def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
     known = [table.name for _, table in decoding.each(root.objects("scenario"), ScenarioTable)]
-    for node, table in sweeps:
+    for node, table in decoding.each(root.objects("sweep"), SweepTable):
         if table.scenario is not None and table.scenario not in known:
             message = f"no scenario is called `{table.scenario}`"
             help = did_you_mean(table.scenario, known)
             yield diagnose("field-value", node.place("scenario"), message, help=help)
-    keeps = decoding.each(root.objects("keep"), KeepTable)
-    findings = [(table.finding, node.place("finding")) for node, table in keeps]
-    yield from repeated(findings, "field-value", "the finding `{}` is kept twice")
+        count = sum(2 if isinstance(one, str) else len(one) for one in table.vary.values())
+        if count > MOST_VALUES:
+            message, help = f"the sweep has {count} values", f"{MOST_VALUES} are the most"
+            yield diagnose("field-value", node.place("vary"), message, help=help)
+        counts = table.vary.get("threads", ())
+        if not all(one in range(1, MOST_THREADS + 1) for one in counts):
+            vary = node.get("vary")
+            assert isinstance(vary, ObjectNode)
+            message = f"`threads` are whole numbers from 1 to {MOST_THREADS}"
+            yield diagnose("field-value", vary.place("threads"), message)
 
 
 def _check_scenarios(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
