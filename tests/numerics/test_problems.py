@@ -20,13 +20,13 @@ from coursebuild.numerics.problems import all_problems, problem_named, problem_n
 OFF = 1 + 1e-6
 DIRECTIONS = ("axis", "zaxis", "condim", "iterations")
 """Attributes of MJCF whose size says nothing."""
-_PLANE = {f"geom size {n}" for n in range(3)}
-_SOFT = {f"geom solimp {n}" for n in (2, 3, 4)}
-_ACROSS = {"inertial diaginertia 0", "inertial diaginertia 2"}
-_FRICTIONS = {"geom friction 1", "geom friction 2"}
-_BODY = {"geom size 0", "geom mass 0"}
+_PLANE = {f"geom size {n}" for n in range(3)}  # it is infinite
+_SOFT = {f"geom solimp {n}" for n in (2, 3, 4)}  # dmin is dmax: how one becomes the other
+_ACROSS = {"inertial diaginertia 0", "inertial diaginertia 2"}  # it turns about the other axis
+_FRICTIONS = {"geom friction 1", "geom friction 2"}  # against twisting and rolling
+_BODY = {"geom size 0", "geom mass 0"}  # it does not turn, and falls or swings by what is given
 IMMATERIAL = {
-    "tumbling-box": {"geom mass 0"},
+    "tumbling-box": {"geom mass 0"},  # without forces all moments may be multiplied alike
     "pendulum": _ACROSS,
     "double-pendulum": _ACROSS,
     "chain-hinges": _ACROSS,
@@ -34,25 +34,26 @@ IMMATERIAL = {
     # What is light beside a body a million times as heavy.
     "chain-heavy-tip": _ACROSS
     | {"inertial diaginertia 1", "inertial mass 0", "solution inertia", "solution masses 2"},
-    "free-top": {"inertial mass 0"},
+    "free-top": {"inertial mass 0"},  # its centre rests, here and in the next ones
     "thin-rod": {"inertial mass 0"},
     "coin": {"inertial mass 0"},
     "flat-plate": {"inertial mass 0"},
-    "millimetre-cube": {"geom density 0"},
+    "millimetre-cube": {"geom density 0"},  # as the box: no forces
     "distant-body": _BODY,
     "projectile": _BODY,
-    "damped-spring": {"geom size 0"},
+    "damped-spring": {"geom size 0"},  # its mass is given
     "stiff-servo": {"geom size 0"},
     "soft-equality": _BODY | {f"joint solimp {n}" for n in (2, 3, 4)},
-    "sliding": _PLANE | _FRICTIONS | {"geom mass 0"},
+    "sliding": _PLANE | _FRICTIONS | {"geom mass 0"},  # friction goes with weight
+    # It does not slip: neither how much friction there could be nor what presses it counts.
     "rolling": _PLANE | _FRICTIONS | {"geom mass 0", "geom friction 0", "option gravity 2"},
-    "sticking": _PLANE
+    "sticking": _PLANE  # it rests under all of these
     | _FRICTIONS
     | {"geom mass 0", "geom friction 0", "option gravity 0", "option gravity 2"}
     | {"solution slope", "solution friction", "solution gravity"},
-    "elastic-impact": _PLANE | _SOFT | {"geom mass 0"},
+    "elastic-impact": _PLANE | _SOFT | {"geom mass 0"},  # its stiffness is of accelerations
     "newtons-cradle": _SOFT,
-    "stack-1000": _PLANE | _SOFT | {"geom solimp 0"},
+    "stack-1000": _PLANE | _SOFT | {"geom solimp 0"},  # deeper than the width: dmax alone counts
     "stack-10000": _PLANE | _SOFT | {"geom solimp 0"},
     "stack": _PLANE | _SOFT,
 }

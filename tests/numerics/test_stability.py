@@ -44,12 +44,13 @@ def test_tops_are_stable_up_to_their_limit() -> None:
             assert attempt(problem, integrator, 100 * limit).stable, (name, integrator)
 
 
-def test_limits_are_within_half_a_percent() -> None:
+def test_limits_are_those_of_theory() -> None:
+    """What is beyond by δ grows by 2δ in a step or more: it shows after a growth of exp 9."""
     wrong = []
-    problems = [problem for problem in all_problems() if problem.case in (5, 6, 12)]
+    problems = [bounded(problem) for problem in all_problems() if problem.case in (5, 6, 12)]
     for problem, integrator in itertools.product(problems, INTEGRATORS):
         limit = limits(problem)[integrator]
-        room = 0.02 if problem.name.endswith("-10") else 0.005  # few of its long steps make a span
+        room = 0.001 + 4.5 * limit / problem.span
         trials = {(1 - room) * limit: True, (1 + room) * limit: False}
         if math.isinf(limit):
             trials = dict.fromkeys((0.1, 1.0, 10.0), True)
