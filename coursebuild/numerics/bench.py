@@ -31,6 +31,7 @@ from coursebuild.numerics.reports.bench import (
     StableRow,
     WorkPrecisionRow,
 )
+from coursebuild.numerics.reports.points import solving
 from coursebuild.numerics.rows import Basis, MeasuredRow, measured
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import own_setting, settings, stable
@@ -93,6 +94,7 @@ def measure_scenario(
         second=known.second,
         agreement=known.agreement,
         lyapunov=first.lyapunov,
+        horizons=None if first.lyapunov is None else first.horizons,
         smooth=first.smooth,
         notes=_notes(basis, largest),
         figure=quantity_name(model, scene),
@@ -163,8 +165,7 @@ def _orders(basis: Basis, found: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, 
         runs = [
             (row.setting.timestep, Errors(row.position, row.attitude, row.velocity))
             for row in found
-            if replace(row.setting, timestep=own.timestep)
-            == replace(own, integrator=integrator.value)
+            if (row.setting.integrator, solving(row.setting)) == (integrator.value, solving(own))
         ]
         orders.append(fitted_orders(integrator.value, runs, known.floor, extent))
     return tuple(orders)

@@ -4,9 +4,9 @@ Entry point: `pilot(model, scene)`.
 
 1. Every step is looked at: a contact, a limit that is reached or dry friction makes accelerations
    jump, so that errors follow no power of the timestep and no smooth integration applies.
-2. Beside it runs a twin whose beginning is off by 1e-10. Where the two are a tenth apart, errors of
-   trajectories mean nothing any more: that is the horizon. The growth until there is the largest
-   Lyapunov exponent, about.
+2. Beside it run eight twins whose beginnings are off by 1e-10, in four directions, to both sides.
+   Where the first of them is a tenth away, errors of trajectories mean nothing any more: that is
+   the horizon. The growth until there is the largest Lyapunov exponent, about.
 3. What was seen of positions, and of energy where nothing drives the motion, else of velocities,
    says what can be, with room for coarse timesteps.
 """
@@ -26,7 +26,9 @@ from coursebuild.numerics.problem import ROOM, Array, Scenario, Setup
 from coursebuild.numerics.scene import Scene, SceneError
 
 NUDGE = 1e-10
-"""Of the twin's beginning: rad, or relative to the model's extent; velocities likewise, per s."""
+"""Of a twin's beginning: rad, or relative to the model's extent; velocities likewise, per s."""
+_DIRECTIONS = 4
+"""In which beginnings are nudged, each to both sides."""
 APART = 0.1
 """Where two motions have nothing in common any more: rad, or relative to the model's extent."""
 _RESTING = 0.01
@@ -47,10 +49,16 @@ class Pilot(Struct, frozen=True):
     """Whether a solver had anything to do."""
     jumps: tuple[str, ...]
     """What makes accelerations jump, in words; none: the scene is smooth."""
-    horizon: float
-    """s, a multiple of the sample; the duration where the twin stays near."""
+    horizons: tuple[float, float]
+    """s, multiples of the sample: until where the first and the last twin stay near; the duration
+    for one that stays near to the end."""
     lyapunov: float | None
-    """1/s; `None` where the twin stays near."""
+    """1/s, of the middle one of the twins that part; `None` where all stay near."""
+
+    @property
+    def horizon(self) -> float:
+        """s: until where all twins stay near."""
+        return self.horizons[0]
 
     @property
     def smooth(self) -> bool:
@@ -67,15 +75,15 @@ def pilot(model: Any, scene: Scene) -> Pilot:
     step, scenario = min(scene.timesteps), scene.scenario
     own = varied(model, integrator_of(model), step)
     own.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    data, twin = initial_data(scenario, own), initial_data(scenario, own)
-    _nudge(own, twin)
+    data, twins = initial_data(scenario, own), _twins(own, scenario)
     look = _Look(own)
     seen = Peaks()
     times, every = scenario.times, scenario.steps(step)
-    gaps = np.full(len(times), np.nan)
+    gaps = np.full((len(twins), len(times)), np.nan)
     for index in range(len(times)):
-        if scenario.controls:
-            data.ctrl[:] = twin.ctrl[:] = scenario.command(index)
+        command = scenario.command(index)
+        for one in (data, *twins) if command else ():
+            one.ctrl[:] = command
         for number in range(every):
             advance(own, data)
             look(data)
@@ -83,18 +91,20 @@ def pilot(model: Any, scene: Scene) -> Pilot:
                 seen = peaks(data, seen)
         if not seen.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
-        if index == 0 or gaps[index - 1] < APART:
-            advance(own, twin, every)
-            gaps[index] = apart(own, data.qpos, twin.qpos)
-    horizon, lyapunov = _horizon(times, gaps)
+        for twin, gap in zip(twins, gaps, strict=True):
+            if index == 0 or gap[index - 1] < APART:
+                advance(own, twin, every)
+                gap[index] = apart(own, data.qpos, twin.qpos)
+    horizons, rates = zip(*(_horizon(times, gap) for gap in gaps), strict=True)
+    grown = [rate for rate in rates if rate is not None]
     return Pilot(
         scene=scene,
         setup=_bounds(own, scenario, seen),
         contact=look.contact,
         constrained=look.constrained,
         jumps=look.jumps(own),
-        horizon=horizon,
-        lyapunov=lyapunov,
+        horizons=(min(horizons), max(horizons)),
+        lyapunov=float(np.median(grown)) if grown else None,
     )
 
 
@@ -165,13 +175,17 @@ def _limited_activations(model: Any) -> tuple[Any, Array]:
     return np.array([number for number, _ in found], dtype=np.intp), limits
 
 
-def _nudge(model: Any, data: Any) -> None:
-    """Push positions and velocities a little, in a direction that is always the same."""
-    direction = np.random.default_rng(1).normal(size=(2, int(model.nv)))
-    direction /= max(float(np.abs(direction).max(initial=0.0)), mujoco.mjMINVAL)
-    push = NUDGE * scales(model)
-    mujoco.mj_integratePos(model, data.qpos, direction[0] * push, 1.0)
-    data.qvel[:] += direction[1] * push
+def _twins(model: Any, scenario: Scenario) -> list[Any]:
+    """The beginning with positions and velocities pushed a little, always in the same ways."""
+    directions = np.random.default_rng(1).normal(size=(_DIRECTIONS, 2, int(model.nv)))
+    push, found = NUDGE * scales(model), []
+    for direction in (*directions, *-directions):
+        size = max(float(np.abs(direction).max(initial=0.0)), mujoco.mjMINVAL)
+        twin = initial_data(scenario, model)
+        mujoco.mj_integratePos(model, twin.qpos, direction[0] / size * push, 1.0)
+        twin.qvel[:] += direction[1] / size * push
+        found.append(twin)
+    return found
 
 
 def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:

@@ -1,6 +1,6 @@
 """The models of a course that can be measured, with what is declared for them.
 
-Entry points: `find_scenes(root, names)`, `scene_digest`, `exact_path`.
+Entry points: `find_scenes(root, names)`, `scene_digest`.
 
 1. A scene is a file of `models/` that others do not include. One that is named is a scene in any
    case.
@@ -32,6 +32,7 @@ from coursebuild.core.text.diagnostics import (
     nearest,
     sort_diagnostics,
 )
+from coursebuild.numerics.reports.course_cases import exact_file
 from coursebuild.pipeline.options import UsageError
 
 _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
@@ -110,16 +111,11 @@ def scene_digest(root: Path, model: MjcfModel, declared: Declarations | None) ->
             # A file elsewhere has another path on another machine.
             shown = path if not path.startswith("/") else f"/{file.name}"
             add(shown.encode("utf-8", "surrogateescape"), _content(file))
-    exact = root / exact_path(model)
+    exact = root / exact_file(model.name)
     if exact.is_file():
         add(exact.name.encode("utf-8", "surrogateescape"), _content(exact))
     add(_said(declared).encode("utf-8", "surrogatepass"))
     return digest.hexdigest()
-
-
-def exact_path(model: MjcfModel) -> str:
-    """Where a course says the exact motion of a model, if it knows it."""
-    return f"{model.source.path.removesuffix('.xml')}.exact.py"
 
 
 def _content(file: Path) -> bytes:

@@ -179,6 +179,7 @@ def awkward() -> ScenarioReport:
         duration=10.0,
         horizon=2.5,
         lyapunov=3.21,
+        horizons=(2.5, 3.75),
         hold=0.02,
         figure="site:tip (m)",
         reference="self",

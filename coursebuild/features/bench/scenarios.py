@@ -98,8 +98,10 @@ def _about(words: Strings, report: ScenarioReport) -> list[str]:
     told = [words("measured.duration", time=seconds_text(report.duration))]
     if report.horizon < report.duration:
         told.append(words("measured.horizon", time=seconds_text(report.horizon)))
-        if report.lyapunov is not None:
-            told.append(said(words, "measured.chaotic", rate=power(report.lyapunov)))
+        if report.lyapunov is not None and report.horizons is not None:
+            first, last = map(seconds_text, report.horizons)
+            rate = power(report.lyapunov)
+            told.append(said(words, "measured.chaotic", first=first, last=last, rate=rate))
     if report.hold:
         told.append(words("measured.hold", time=seconds_text(report.hold)))
     usual = usual_setting(report.rows)

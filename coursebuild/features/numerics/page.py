@@ -6,6 +6,8 @@ Entry point: `numerics_values(library)`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from operator import attrgetter
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -40,6 +42,7 @@ from coursebuild.numerics.reports.cases import (
     FigureLine,
     merged,
 )
+from coursebuild.numerics.reports.course_cases import course_cases
 from coursebuild.numerics.reports.points import KNOWN, Quantity, seconds_text, status_text
 from coursebuild.numerics.reports.records import STABILITY
 
@@ -63,6 +66,7 @@ class MatrixRow(Struct, frozen=True):
     """A case, in the table of all of them."""
 
     name: str
+    """The id of the case below."""
     title: str
     cells: tuple[tuple[str, ...], ...]
     """Orders, largest stable timesteps, and costs, by integrator."""
@@ -79,12 +83,15 @@ class CaseView(Struct, frozen=True):
     grids: tuple[Grid, ...]
     notes: tuple[str, ...]
     command: str
+    page: str
+    """The address of the model, of a case of the course's own; else empty."""
 
 
 class CaseGroup(Struct, frozen=True):
-    """Cases of one number."""
+    """Cases of one number, or of the course's own."""
 
     number: int
+    """0: of the course's own."""
     title: str
     rows: tuple[MatrixRow, ...]
     cases: tuple[CaseView, ...]
@@ -93,11 +100,14 @@ class CaseGroup(Struct, frozen=True):
 def numerics_values(library: Library) -> dict[str, object]:
     """What the page of the hard cases shows."""
     words, place = library.words, urls.Place(urls.NUMERICS)
-    cases = library.reports.cases
-    numbers = sorted({one.case for one in cases})
-    groups = tuple(_group(words, n, [one for one in cases if one.case == n]) for n in numbers)
+    scenes = library.reports.scenes
+    own = [one for name in sorted(scenes) for one in course_cases(scenes[name])]
+    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *own]
     return {
-        "groups": groups,
+        "groups": tuple(
+            _group(words, place, number, tuple(found))
+            for number, found in groupby(cases, key=attrgetter("case"))
+        ),
         "integrators": KNOWN,
         "where": dict.fromkeys(where(words, one.machine) for one in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
@@ -105,12 +115,14 @@ def numerics_values(library: Library) -> dict[str, object]:
     }
 
 
-def _group(words: Strings, number: int, cases: Sequence[CaseReport]) -> CaseGroup:
-    first = cases[0].title
+def _group(
+    words: Strings, place: urls.Place, number: int, cases: Sequence[CaseReport]
+) -> CaseGroup:
     key = f"numerics.case_{number}"
-    title = words(key) if len(cases) > 1 and words.has(key) else first
+    several = not number or len(cases) > 1
+    title = words(key) if several and words.has(key) else cases[0].title
     rows = tuple(_matrix_row(words, one) for one in cases)
-    return CaseGroup(number, title, rows, tuple(_case(words, one) for one in cases))
+    return CaseGroup(number, title, rows, tuple(_case(words, place, one) for one in cases))
 
 
 def _matrix_row(words: Strings, report: CaseReport) -> MatrixRow:
@@ -121,7 +133,7 @@ def _matrix_row(words: Strings, report: CaseReport) -> MatrixRow:
     orders = (fits.get(one) for one in KNOWN)
     costs = (report.cost_to(one, _RIGHT) for one in KNOWN)
     return MatrixRow(
-        report.name,
+        urls.encode(report.name),
         report.title,
         (
             tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
@@ -142,17 +154,20 @@ def _limit(words: Strings, line: BoundaryLine | None) -> str:
 # ------------------------------------------------------------------------------------------ a case
 
 
-def _case(words: Strings, report: CaseReport) -> CaseView:
+def _case(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
+    model = "" if report.case else report.name.rpartition("/")[0]
     grids = (_boundaries(words, report), _figures(words, report), _orders(words, report))
     shown = case_quantities(report)
+    name = urls.encode(report.name)
     return CaseView(
-        report.name,
+        name,
         report.title,
         tuple(_about(words, report, shown)),
-        tuple(Markup(case_svg(report, one, f"{report.name}-{one.name}")) for one in shown),
+        tuple(Markup(case_svg(report, one, f"{name}-{one.name}")) for one in shown),
         tuple(one for one in grids if one is not None),
         tuple(_notes(words, report)),
-        again("stability", report.name),
+        again("stability", model or report.name),
+        place.href(urls.model_page_path(model)) if model else "",
     )
 
 

@@ -191,6 +191,9 @@ class ScenarioReport(Record, frozen=True):
     """Whether accelerations are a smooth function of the state; else there are no orders."""
     notes: tuple[str, ...] = ()
     """What to know when reading the figures, in words."""
+    horizons: tuple[float, float] | None = None
+    """s: the shortest and the longest of runs whose beginnings were nudged in different ways;
+    `None` where the scenario is not chaotic."""
 
 
 class SceneCard(Record, frozen=True):

@@ -98,6 +98,7 @@ class CaseReport(Record, frozen=True):
     name: str
     title: str
     case: int
+    """Its number on the list of hard cases; 0 for one of the course's own."""
     machine: Machine
     note: str
     reference: ReferenceLine

@@ -17,6 +17,7 @@ from coursebuild.features.bench.figures import (
 )
 from coursebuild.numerics.reports import Interval, Reports
 from coursebuild.numerics.reports.cases import ErrorLine, StepCost
+from support.bench_reports import awkward, swing
 from support.model_reports import box, case, diet, finding, reports, row, scenario, scene
 from support.rendered_course import Make
 
@@ -220,6 +221,17 @@ def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> N
     told = text(pages(make, found)["numerics/index.html"])
     assert "4 A &lt;a&gt; No timestep" in told
     assert "99 A &lt;b&gt; A &lt;b&gt; No timestep" in told
+
+
+def test_a_scenario_whose_motion_the_course_knows_is_a_hard_case(make: Make) -> None:
+    known = replace(swing(), source="models/box.exact.py")
+    model = scene(known, replace(awkward(), name="awkward"), model="box")
+    page = pages(make, Reports({"box": model}, cases=(case("a", 4),)))["numerics/index.html"]
+    told = text(page.replace("<details", "<div").replace("</details", "</div"))
+    assert "Cases of this course box: " in told and "coursebuild stability box" in told
+    assert 'href="#box/swing"' in page and 'id="box/swing"' in page
+    assert 'href="../models/box.html">box: ' in page and "box/awkward" not in page
+    assert "References: models/box.exact.py; " in told and "error of position" in page
 
 
 def test_the_same_reports_give_the_same_bytes_and_others_other_ones(

@@ -84,6 +84,9 @@ spring  case 5: A spring
   not finite                     RK4
   order of position       order of velocity
   1.00 ± 0.01, bend 0.02  1.00 ± 0.02, bend 0.10  Euler
+  error of position (m or rad)       RK4     Euler
+  500 ms                        diverged
+  100 ms                                  1.00e-01
   refsafe softens constraints at 0.5 s: that is another model
   RK4 at 0.5 s: diverged: one; two
 """

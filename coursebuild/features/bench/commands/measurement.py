@@ -19,15 +19,18 @@ from coursebuild.features.bench.commands.stable import (
     stable_meaning,
 )
 from coursebuild.numerics.reports.bench import FittedOrder
+from coursebuild.numerics.reports.case_plot import case_quantities
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     Cells,
+    ErrorLine,
     FigureLine,
     ReferenceLine,
     merged,
 )
 from coursebuild.numerics.reports.departures import Checked, Departure
+from coursebuild.numerics.reports.points import seconds_text
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report.terminal import (
     BOLD,
@@ -131,8 +134,8 @@ def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
 
 
 def _case(report: CaseReport, style: Style) -> str:
-    head = style.paint(f"{report.name}", BOLD) + f"  case {report.case}: {report.title}"
-    lines = [head]
+    number = f"case {report.case}: " if report.case else ""
+    lines = [style.paint(f"{report.name}", BOLD) + f"  {number}{report.title}"]
     lines += [f"  {line}" for line in _reference(report.reference)]
     if report.note:
         lines.append(f"  {report.note}")
@@ -152,6 +155,7 @@ def _case(report: CaseReport, style: Style) -> str:
     ]
     if fitted:
         lines += _table(_ORDERS, fitted)
+    lines += _errors(report)
     softened = sorted({line.timestep for line in report.errors if line.refsafe})
     if softened:
         shown = ", ".join(f"{h:g}" for h in softened)
@@ -162,6 +166,26 @@ def _case(report: CaseReport, style: Style) -> str:
         told = f"  {line.integrator} at {line.timestep:g} s: {line.status}: {why}"
         lines.append(style.paint(told, YELLOW))
     return "\n".join(lines) + "\n"
+
+
+def _errors(report: CaseReport) -> list[str]:
+    """The largest error of each run, by timestep and integrator."""
+    shown = next(iter(case_quantities(report)), None)
+    if shown is None:
+        return []
+    runs = {(one.timestep, one.integrator): one for one in report.errors}
+    steps = sorted({step for step, _ in runs}, reverse=True)
+
+    def cell(run: ErrorLine | None) -> str:
+        error = None if run is None else shown.of(run)
+        if run is None or error is None:
+            return "" if run is None else run.status
+        return f"<{shown.least:.1e}" if error <= shown.least * (1 + 1e-9) else f"{error:.2e}"
+
+    columns = [Column(shown.label, tuple(seconds_text(one, 4) for one in steps), left=True)]
+    for name in dict.fromkeys(name for _, name in runs):
+        columns.append(Column(name, tuple(cell(runs.get((step, name))) for step in steps)))
+    return [f"  {line}" for line in table(columns)]
 
 
 def _reference(line: ReferenceLine) -> list[str]:

@@ -23,7 +23,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""
     add_quiet(parser)
     parser.add_argument(
-        "problems", nargs="*", metavar="PROBLEM", help="a hard case or a family (default: all)"
+        "problems",
+        nargs="*",
+        metavar="PROBLEM",
+        help="a hard case, a family, or a model whose exact motion the course says (default: all)",
     )
     add_format(parser, "text", "json")
     add_recorded(parser)

@@ -2,10 +2,12 @@
 
 Entry points: `stability(options, names)`, `check_stability`.
 
-1. Names mean problems, or families of them: `damped-spring` is all of its damping ratios.
+1. Names mean problems, families of them (`damped-spring` is all of its damping ratios), or models
+   of the course whose exact motion stands beside them: these are measured, recorded and checked as
+   `bench` does, and told as the others are.
 2. What was measured is kept under the machine, its versions and the code that measures; what is
    kept is not measured again, but where it is held against a record.
-3. All cases are recorded in one file. Where some are named, recording them leaves the others as
+3. All problems are recorded in one file. Where some are named, recording them leaves the others as
    they are, and checking them says nothing of the others.
 4. Where the two references of a case are further apart than they may be, it is an error, and
    nothing is recorded.
@@ -14,6 +16,7 @@ Entry points: `stability(options, names)`, `check_stability`.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -22,9 +25,12 @@ from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine, one_processor
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
+from coursebuild.features.bench.commands.bench.run import bench, check
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, with_records
+from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.cases import CaseReport
+from coursebuild.numerics.reports.course_cases import course_cases, exact_file
 from coursebuild.numerics.reports.departures import Checked, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
@@ -37,18 +43,25 @@ _CODE = ("coursebuild/numerics", "mjcourse/spatial")
 def stability(
     options: Options, names: tuple[str, ...] = (), *, record: bool = False
 ) -> Measurement[CaseReport]:
-    """What was measured on the problems that the names mean; on all where there are none.
+    """What was measured on the cases that the names mean; on all where there are none.
 
     `record`: it is also written into the course.
 
     Raises:
-        UsageError: no problem is called so.
+        UsageError: no case is called so.
     """
-    found = _CaseRun(options).all(names)
-    if not record or found.failures:
-        return found
+    problems, models = _chosen(options, names)
+    found = _CaseRun(options).all(problems)
+    if record and problems and not found.failures:
+        found = _recorded(options, found, whole=not names)
+    return _with_models(found, bench(options, models, record=record) if models else Measurement(()))
+
+
+def _recorded(
+    options: Options, found: Measurement[CaseReport], *, whole: bool
+) -> Measurement[CaseReport]:
     others: list[CaseReport] = []
-    if names and (options.root / STABILITY.path()).exists():
+    if not whole and (options.root / STABILITY.path()).exists():
         old = read_record(options.root, STABILITY)
         if isinstance(old, ReportFailure):
             return replace(found, failures=(old,))
@@ -59,6 +72,19 @@ def stability(
     return with_records(options.root, found, records)
 
 
+def _with_models(
+    found: Measurement[CaseReport], own: Measurement[SceneReport]
+) -> Measurement[CaseReport]:
+    """With what was measured on models of the course."""
+    return Measurement(
+        (*found.reports, *(case for scene in own.reports for case in course_cases(scene))),
+        own.diagnostics,
+        failures=(*found.failures, *own.failures),
+        checked=(*found.checked, *own.checked),
+        remarks=(*found.remarks, *own.remarks),
+    )
+
+
 def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
     """Measure again, and hold it against what is recorded.
 
@@ -67,12 +93,18 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     Raises:
         UsageError: no case is called so.
     """
+    problems, models = _chosen(options, names)
+    found = _checked(options, problems, whole=not names) if problems else Measurement(())
+    return _with_models(found, check(options, models) if models else Measurement(()))
+
+
+def _checked(options: Options, problems: list[str], *, whole: bool) -> Measurement[CaseReport]:
     recorded = read_record(options.root, STABILITY)
     if isinstance(recorded, ReportFailure):
         return Measurement((), failures=(recorded,))
-    found = _CaseRun(options, again=True).all(names)
+    found = _CaseRun(options, again=True).all(problems)
     new = {case.name for case in found.reports}
-    old = [case for case in recorded if not names or case.name in new]
+    old = [case for case in recorded if whole or case.name in new]
     here = engine_version()
     others = sorted({case.machine.engine for case in old} - {here})
     remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in others)
@@ -83,11 +115,11 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
 class _CaseRun(MeasuringRun):
     """Measures hard cases one after the other."""
 
-    def all(self, names: tuple[str, ...]) -> Measurement[CaseReport]:
-        """Those that the names mean."""
+    def all(self, problems: list[str]) -> Measurement[CaseReport]:
+        """Those of these names."""
         self.here, self.code = machine(pinned=True), code_digest(*_CODE)
         with one_processor():
-            return self.each(_chosen(names), self._one)
+            return self.each(problems, self._one)
 
     def _one(self, name: str) -> CaseReport | None:
         parts = (name, self.code, self.here)
@@ -111,8 +143,10 @@ def _known() -> tuple[str, ...]:
     return problem_names()
 
 
-def _chosen(names: tuple[str, ...]) -> list[str]:
-    known = _known()
+def _chosen(options: Options, names: tuple[str, ...]) -> tuple[list[str], tuple[str, ...]]:
+    """The problems and the models that names mean; all where there are none."""
+    problems, models = _known(), _models(options.root)
+    known = (*problems, *models)
     wanted = set() if names else set(known)
     for name in names:
         found = {one for one in known if one == name or one.startswith(f"{name}-")}
@@ -122,4 +156,12 @@ def _chosen(names: tuple[str, ...]) -> list[str]:
             help = all_of_them if near is None else f"did you mean `{near}`?"
             raise UsageError(f"no hard case is called `{name}`; {help}")
         wanted |= found
-    return [one for one in known if one in wanted]
+    return [one for one in problems if one in wanted], tuple(one for one in models if one in wanted)
+
+
+def _models(root: Path) -> tuple[str, ...]:
+    """Those beside which their exact motion stands."""
+    folder = root / "models"
+    names = (path.relative_to(folder).as_posix() for path in folder.rglob("*.xml"))
+    known = (name.removesuffix(".xml") for name in names)
+    return tuple(sorted(name for name in known if (root / exact_file(name)).is_file()))

@@ -37,11 +37,12 @@ from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.pruning.compare import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
+from coursebuild.numerics.reports.course_cases import exact_file
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.sweep import measure_sweep
-from coursebuild.pipeline.scenes import CourseScene, exact_path
+from coursebuild.pipeline.scenes import CourseScene
 
 _SECONDS = 20.0
 """Processor time that a run may take."""
@@ -123,7 +124,7 @@ def _compiled(root: Path, scene: CourseScene) -> Any:
 
 def _exact(root: Path, scene: CourseScene) -> ExactMotion | None:
     """What the course knows of the motion: its code runs as a script does, in a child."""
-    path = exact_path(scene.model)
+    path = exact_file(scene.name)
     if not (root / path).is_file():
         return None
     span = Source(path, "").span(0, 0)

@@ -120,8 +120,10 @@ def _times(report: ScenarioReport) -> str:
     text = seconds_text(report.duration)
     if report.horizon < report.duration:
         text += f", errors to {seconds_text(report.horizon)}"
-        if report.lyapunov is not None:
-            text += f" (chaotic: Lyapunov exponent {report.lyapunov:.3g}/s)"
+        if report.lyapunov is not None and report.horizons is not None:
+            first, last = map(seconds_text, report.horizons)
+            text += f" (chaotic: nudged runs part after {first} to {last}, "
+            text += f"Lyapunov exponent {report.lyapunov:.3g}/s)"
     text += f", commands held for {seconds_text(report.hold)}" if report.hold else ""
     return text + (f", measures {report.figure}" if report.figure else "")
 

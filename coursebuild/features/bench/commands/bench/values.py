@@ -107,6 +107,7 @@ def _scenario(scene: SceneReport, scenario: ScenarioReport) -> dict[str, object]
         "second_reference": scenario.second,
         "agreement": scenario.agreement,
         "lyapunov_exponent": scenario.lyapunov,
+        "horizons": scenario.horizons,
         "smooth": scenario.smooth,
         "notes": scenario.notes,
         "stable": scenario.stable,
