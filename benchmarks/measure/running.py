@@ -42,12 +42,13 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 root = pathlib.Path.cwd()
-options = Options(root, int(sys.argv[1]), True, Memo(root, fresh=True))
-chosen = extract_scripts(load(root).course, options).runnable
 with ScriptServer() as server:
+    store = Memo(root, fresh=True)
+    options = Options(root, int(sys.argv[1]), True, store, run_all=server.run)
+    chosen = extract_scripts(load(root).course, options).runnable
     for _ in range(2):
         began = time.perf_counter()
-        runs = run(chosen, options, Progress(quiet=True), run_all=server.run)
+        runs = run(chosen, options, Progress(quiet=True))
         print(time.perf_counter() - began)
         assert len(runs) == len(chosen) and all(run.outcome.value == "ok" for run in runs)
 """

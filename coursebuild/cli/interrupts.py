@@ -31,7 +31,7 @@ from typing import Any
 _AGAIN = 0.01
 """Seconds until a signal comes again."""
 _IMPORT = "<frozen importlib."
-_NOT_IN = ("logging/__init__.py", "logging\\__init__.py")
+_NOT_IN = "logging/__init__.py"
 
 
 _own: list[FrameType] = []
@@ -91,8 +91,7 @@ def _hear_no_more(numbers: Iterable[signal.Signals]) -> None:
     After a `KeyboardInterrupt` that went through an `exec` of a text Python would kill itself by
     SIGINT in its place.
     """
-    if sys.platform != "win32":
-        signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
+    signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     for number in numbers:  # other threads do not block them
         signal.signal(number, signal.SIG_IGN)
 
@@ -120,9 +119,6 @@ def _send(number: int) -> None:
     time.sleep(_AGAIN)
     if signal.getsignal(number) is not _hear:  # the command is through
         return
-    if sys.platform == "win32":
-        _thread.interrupt_main(number)
-    else:
-        main = threading.main_thread().ident
-        assert main is not None
-        signal.pthread_kill(main, number)  # which ends what it waits for
+    main = threading.main_thread().ident
+    assert main is not None
+    signal.pthread_kill(main, number)  # which ends what it waits for

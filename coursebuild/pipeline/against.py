@@ -2,7 +2,7 @@
 
 Entry point: `against(options, names, version)`.
 
-1. The scripts run here, or ran: what one of them uses is known from its run.
+1. The scripts run here, or ran.
 2. They run in an environment with the other version and otherwise the same packages (see
    `core.run.environments`). Results are remembered by the versions, like those of here.
 3. Those that do something else run once more there, and in a fresh environment with the version of
@@ -15,14 +15,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import mjcf_texts
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
-from coursebuild.core.run.dependencies import Kind
-from coursebuild.core.run.environments import environment, needed, other_version
+from coursebuild.core.run.environments import environment, other_version
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
@@ -86,7 +86,7 @@ class _Work(Struct):
         """Everything that there is to tell."""
         runs = run(self.chosen, self.options, self.progress)
         self.here = {one.path: one for one in runs}
-        place = self._place(self.other)
+        place = environment(self.options.root, self.other, self.progress.say)
         here = run_standings(self.course, self.here, runs)
         kept = {path: is_comparable(standing) for path, standing in here.items()}
         compared = [e for e in self.chosen if kept[e.path] is None]
@@ -127,20 +127,12 @@ class _Work(Struct):
             failure(extraction, there.run, everything),
         )
 
-    def _place(self, engine: str) -> OtherEnvironment:
-        """The environment with a version of MuJoCo and the packages that the scripts use here."""
-        memory = Memory(self.options.root, self.options.store)
-        noted = [memory.last(extraction.path) for extraction in self.chosen]
-        dependencies = [d for record in noted if record is not None for d in record.dependencies]
-        states = [d.state for d in dependencies if d.kind is Kind.MODULE]
-        return environment(self.options.root, engine, needed(states), self.progress.say)
-
     def _control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:
         """What they do in a fresh environment with the version of here; why there is none."""
         if not scripts:
             return {}, ""
         try:
-            place = self._place(engine_version())
+            place = environment(self.options.root, engine_version(), self.progress.say)
         except EffectError as error:
             return {}, error.message
         stage = f"running scripts in a fresh environment with MuJoCo {engine_version()}"
@@ -160,7 +152,8 @@ class _Work(Struct):
         options = self.options
         memory = Memory(options.root, options.store, fresh=fresh, place=place)
         with ScriptServer(place=place) as server:
-            runs = run(scripts, options, self.progress, stage, memory, server.run)
+            served = replace(options, run_all=server.run)
+            runs = run(scripts, served, self.progress, stage, memory)
         return run_standings(self.course, self.here, runs)
 
     def _models(self, place: OtherEnvironment) -> tuple[ModelLine, ...]:

@@ -40,8 +40,7 @@ class Options(Struct, frozen=True):
     verbose: bool = False
     """Whether it is said of each script why it runs."""
     run_all: RunAll | None = None
-    """What runs scripts, such as a server that stays for the next command; one of this command's
-    own, where nothing is said."""
+    """What runs scripts, where it is not `run_scripts`: a server stays warm from run to run."""
 
     @property
     def store(self) -> Memo:

@@ -9,7 +9,6 @@ longest first, of which no result is remembered that still holds.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
@@ -27,9 +26,6 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import recorded_runs
 from coursebuild.report import ScriptLine
-
-if TYPE_CHECKING:
-    from coursebuild.core.run.runner import RunAll
 
 
 class ExtractedScripts(Struct, frozen=True):
@@ -108,16 +104,14 @@ def run(
     progress: Progress,
     stage: str = "running scripts",
     memory: Memory | None = None,
-    run_all: RunAll | None = None,
     perturbation: int = 0,
     known: Mapping[str, ScriptRun] | None = None,
 ) -> tuple[ScriptRun, ...]:
     """The results of the chosen scripts: remembered ones, and those of the others run now.
 
     What begins and ends is told. `memory` is what is remembered, where it is not that of the
-    options. `run_all` is what runs them, where it is not `run_scripts`. `perturbation`: with
-    initial states moved, in the direction that has this number. `known`: results, by path, that
-    hold.
+    options. `perturbation`: with initial states moved, in the direction that has this number.
+    `known`: results, by path, that hold.
     """
     chosen = tuple(chosen)
     memory = Memory(options.root, options.store) if memory is None else memory
@@ -131,7 +125,7 @@ def run(
     if inputs:
         done |= memory.recall(tuple(inputs.values()))
     left = [job for job in todo if job.path not in done]
-    for finished in _run(left, inputs, options, progress, stage, memory, run_all):
+    for finished in _run(left, inputs, options, progress, stage, memory):
         done[finished.path] = finished
     return tuple(done[job.path] for job in todo)
 
@@ -143,7 +137,6 @@ def _run(
     progress: Progress,
     stage: str,
     memory: Memory,
-    run_all: RunAll | None,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts, the longest first, and remember what they did."""
     if not todo:
@@ -169,7 +162,7 @@ def _run(
             if job.path in inputs:
                 progress.say(f"{job.path}: {'; '.join(memory.reasons(inputs[job.path]))}")
     memory.begin()
-    run_all = run_all or options.run_all or run_scripts
+    run_all = options.run_all or run_scripts
     with progress.stage(stage, count):
         return run_all(
             options.root,

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+from msgspec.structs import replace
+
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.model.sensitivity import HALVED, RUNS, Sensitivity
@@ -80,10 +82,10 @@ def _runs(
         return found
     memory = Memory(options.root, options.store)
     with ScriptServer() as server:
+        served = replace(options, run_all=server.run)
         for number in numbers:
             halving = number == HALVED
             stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
-            runs = run(scripts, options, progress, stage, memory, server.run, perturbation=number)
-            for one in runs:
+            for one in run(scripts, served, progress, stage, memory, perturbation=number):
                 found[one.path].append(one)
     return found

@@ -27,7 +27,7 @@ from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.run.memory import Memory
-from coursebuild.core.run.runner import RunAll, ScriptServer
+from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import apply_edits, updated_body
 from coursebuild.core.scripts.extract import Extraction, extract
@@ -69,8 +69,9 @@ def _update(
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
     with ScriptServer() as server:  # what scripts import stays imported from one run to the other
-        first = run(scripts, options, progress, run_all=server.run)
-        again = _again(course, chosen, scripts, first, options, progress, server.run)
+        served = replace(options, run_all=server.run)
+        first = run(scripts, served, progress)
+        again = _again(course, chosen, scripts, first, served, progress)
     edits, refused = _edits(course, chosen, first, again, _repeated(extracted))
     for told in loaded.diagnostics:
         if told.rule == "source-part" and told.span.path in (chosen.documents or [told.span.path]):
@@ -113,7 +114,6 @@ def _again(
     first: Sequence[ScriptRun],
     options: Options,
     progress: Progress,
-    run_all: RunAll,
 ) -> tuple[ScriptRun, ...]:
     """The second runs; a remembered first one that is recorded already stands for both."""
     edits, refused = _edits(course, chosen, first, first, frozenset())
@@ -128,7 +128,7 @@ def _again(
         if (not one.cached or one.path in wrong) and not extraction.script.once
     ]
     memory = Memory(options.root, options.store, fresh=True)
-    second = run(left, options, progress, "running scripts again", memory, run_all)
+    second = run(left, options, progress, "running scripts again", memory)
     ran = {r.path: r for r in second}
     return tuple(ran.get(one.path, one) for one in first)
 

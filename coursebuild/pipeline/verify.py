@@ -49,7 +49,6 @@ from coursebuild.pipeline.trials import run_with_trials
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
-    from coursebuild.core.run.runner import RunAll
     from coursebuild.pipeline.shards import Shard
 
 
@@ -74,25 +73,21 @@ def verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
-    run_all: RunAll | None = None,
     held: HeldLines | None = None,
     known: Mapping[str, ScriptRun] | None = None,
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `run_all` runs scripts, where it is not `run_scripts`. `held`: the lines
-    by which bound numbers held before. `known`: what scripts do, by path, that need not be looked
-    at.
+    the scripts and labs. `held`: the lines by which bound numbers held before. `known`: what
+    scripts do, by path, that need not be looked at.
     """
     options.store.listen(progress.say)
     extracted = extract_scripts(course, options)
     chosen, trials = _chosen(course, extracted.runnable, documents, shard)
     models, compiled = compile_models(course, options, progress)
     memory = Memory(options.root, options.store)
-    scripts = functools.partial(
-        run, chosen, options, progress, memory=memory, run_all=run_all, known=known
-    )
+    scripts = functools.partial(run, chosen, options, progress, memory=memory, known=known)
     tried: tuple[TrialResult, ...] = ()
     found = [*extracted.diagnostics, *compiled]
     if trials:
@@ -104,7 +99,7 @@ def verify(
         runs = scripts()
     found += check_recorded_runs(chosen, options)
     verdicts = compare_all(course, runs)
-    again = _again(chosen, runs, verdicts, options, progress, run_all) if known is None else {}
+    again = _again(chosen, runs, verdicts, options, progress) if known is None else {}
     broken = [f"models/{name}.xml" for name, model in models if model.error]
     everything = extracted.all
     found += script_findings(course, chosen, runs, verdicts, held, everything, again, broken)
@@ -127,7 +122,6 @@ def _again(
     verdicts: Sequence[Verdict],
     options: Options,
     progress: Progress,
-    run_all: RunAll | None,
 ) -> dict[str, ScriptRun]:
     """Second runs, by path, of quick scripts whose output has drifted: does it vary by itself?"""
     drifted = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
@@ -136,7 +130,7 @@ def _again(
     if not scripts:
         return {}
     memory = Memory(options.root, options.store, fresh=True)
-    again = run(scripts, options, progress, "running again what differs", memory, run_all)
+    again = run(scripts, options, progress, "running again what differs", memory)
     return {one.path: one for one in again}
 
 

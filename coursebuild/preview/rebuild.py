@@ -20,6 +20,8 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
+from msgspec.structs import replace
+
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
@@ -162,10 +164,9 @@ class BackgroundRebuild:
         try:
             verified = verify(
                 course,
-                self._options,
+                replace(self._options, run_all=self._run_all(scripts)),
                 self._progress,
                 static=True,
-                run_all=self._run_all(scripts),
                 held=self._held,
                 known=known,
             )
@@ -202,9 +203,9 @@ class BackgroundRebuild:
         if unsure:
             self._busy("running scripts again")
             memory = Memory(options.root, options.store, fresh=True)
-            stage, run_all = "running scripts again", self._run_all(scripts)
+            served = replace(options, run_all=self._run_all(scripts))
             try:
-                again = run(unsure, options, self._progress, stage, memory, run_all)
+                again = run(unsure, served, self._progress, "running scripts again", memory)
             except RunStoppedError:
                 raise SupersededError from None
             session.take_second_runs(again)

@@ -16,20 +16,15 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import PurePosixPath
 from typing import assert_never
 
 from msgspec import Struct
 
+from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 
 VERSION = "5"
 """To be changed with how scripts are run and watched: older results then count no more."""
-
-ABSENT = "absent"
-FOLDER = "folder"
-SPECIAL = "special"
-"""States of files that are none; other states are hashes, or say why nothing can be read."""
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
 _PERTURBATION = "moved states"
@@ -64,12 +59,6 @@ class Need(Struct, frozen=True, order=True):
 
     kind: Kind
     name: str
-
-
-def need_of(name: str) -> Need:
-    """What the state of a file is asked by: a path of the project, or an absolute one."""
-    outside = PurePosixPath(name).is_absolute()
-    return Need(Kind.OUTSIDE if outside else Kind.FILE, name)
 
 
 class Dependency(Struct, frozen=True):

@@ -1,21 +1,19 @@
 """Environments with another version of MuJoCo and otherwise the packages of here.
 
-Entry points: `other_version`, what the user may name; `needed(states)`, the distributions that
-scripts use; `environment`, which makes one.
+Entry points: `other_version`, what the user may name; `environment`, which makes one.
 
-1. An environment lies in `.coursebuild/environments`, under a name that says everything that is
-   installed in it: one that is there is used again. The ones used last are kept.
+1. An environment lies in `.coursebuild/environments`: one that is there is used again. The ones
+   used last are kept.
 2. A new one is made beside its place and renamed there when MuJoCo can be imported in it, so that
    none is ever half there. The remains of a process that was killed are removed the next time.
-3. pip installs, as the user has configured it. All that MuJoCo and the scripts need is held to the
-   versions of here.
+3. pip, as the user has configured it, installs MuJoCo and nothing else. All other packages are
+   found where they are installed here.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import importlib.metadata
 import importlib.util
 import os
 import platform
@@ -25,23 +23,24 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from coursebuild.core.engine.memo import TEMPORARY
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import make_private_folder
-from coursebuild.core.run.surroundings import OtherEnvironment, library_folder
+from coursebuild.core.run.packages import site_folders
+from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.run.versions import engine_version
 
 _FOLDER = "environments"
 _KEPT = 4
-"""Environments that stay: one takes some 150 MB."""
+"""Environments that stay."""
 _VERSION = re.compile(
     r"\d+(\.\d+){0,3}((a|b|rc)\d+)?(\.post\d+)?(\.dev\d+)?(\+[a-z0-9.]+)?", re.ASCII
 )
 _ENGINE = "mujoco"
-_INSTALL = ("install", "--no-input", "--progress-bar", "off", "--only-binary", _ENGINE)
+_INSTALL = ("install", "--no-deps", "--no-input", "--progress-bar", "off", "--only-binary", _ENGINE)
 _LINES = 4
 """Of what pip says where it fails, so many lines are told."""
 _OFFLINE = (
@@ -68,35 +67,15 @@ def _shortened(version: str) -> str:
     return re.sub(r"(\.0)+(?=$|[a-z+]|\.(?:post|dev))", "", version)
 
 
-def needed(states: Iterable[str]) -> dict[str, str]:
-    """The versions of distributions, by what is known of modules: `numpy 2.4.6, other 1.0`."""
-    found: dict[str, str] = {}
-    for part in (part for state in states for part in state.split(", ")):
-        name, _, version = part.rpartition(" ")
-        if name and name != "files" and _plain(name) != _ENGINE:
-            found[_plain(name)] = version
-    return found
-
-
-def _plain(name: str) -> str:
-    """A distribution's name as PEP 503 has it."""
-    return re.sub(r"[-_.]+", "-", name).lower()
-
-
-def environment(
-    root: Path, engine: str, wanted: Mapping[str, str], say: Callable[[str], None]
-) -> OtherEnvironment:
-    """The environment with this version of MuJoCo and these distributions; made if it is not there.
+def environment(root: Path, engine: str, say: Callable[[str], None]) -> OtherEnvironment:
+    """The environment with this version of MuJoCo; made if it is not there.
 
     Only one process at a time may do this for a course: see `project_lock`.
 
     Raises:
         EffectError: it cannot be made.
     """
-    here = {_plain(one.name): one.version for one in importlib.metadata.distributions() if one.name}
-    here.pop(_ENGINE, None)
-    wanted = {"numpy": here["numpy"], **{name: v for name, v in wanted.items() if name in here}}
-    parts = [sys.version, sys.base_prefix, engine, sorted(wanted.items()), sorted(here.items())]
+    parts = [sys.version, sys.base_prefix, site_folders()]
     name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
     folder = root / ".coursebuild" / _FOLDER
     prefix = folder / name
@@ -107,18 +86,20 @@ def environment(
             shutil.rmtree(remains, ignore_errors=True)
         if not (prefix / "pyvenv.cfg").is_file():
             say(f"installing MuJoCo {engine} into .coursebuild/{_FOLDER}/{name}")
-            _make(prefix, engine, wanted, here)
+            _make(prefix, engine)
         os.utime(prefix)
-        version = f"{sys.version_info.major}.{sys.version_info.minor}"
-        packages = str(prefix / "lib" / f"python{version}" / "site-packages")
-        _link_library(packages)
         _remove_unused(folder, prefix)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
-    return OtherEnvironment(name, f"{prefix}/bin/python", str(prefix), packages)
+    return OtherEnvironment(name, f"{prefix}/bin/python", str(prefix), str(_packages(prefix)))
 
 
-def _make(prefix: Path, engine: str, wanted: Mapping[str, str], here: Mapping[str, str]) -> None:
+def _packages(prefix: Path) -> Path:
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return prefix / "lib" / f"python{version}" / "site-packages"
+
+
+def _make(prefix: Path, engine: str) -> None:
     if importlib.util.find_spec("pip") is None:
         raise EffectError(
             "pip is not installed for this Python, and nothing can be installed without it",
@@ -132,15 +113,13 @@ def _make(prefix: Path, engine: str, wanted: Mapping[str, str], here: Mapping[st
         configured = Path(sys.prefix) / "pip.conf"
         if configured.is_file():
             shutil.copyfile(configured, new / "pip.conf")
-        constraints = new / "constraints.txt"
-        rest = [f"{one}=={version}\n" for one, version in here.items() if one not in wanted]
-        constraints.write_text("".join(rest))
         python = str(new / "bin" / "python")
-        pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL, "-c", str(constraints)]
-        pinned = [f"{one}=={version}" for one, version in wanted.items()]
-        status, said = _run([*pip, f"{_ENGINE}=={engine}", *pinned])
+        pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL]
+        status, said = _run([*pip, f"{_ENGINE}=={engine}"])
         if status:
             raise _pip_error(engine, said)
+        lines = (f"import site; site.addsitedir({folder!r})\n" for folder in site_folders())
+        (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, said = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
         if status:
             beside = f"MuJoCo {engine} cannot be imported beside the other packages of here"
@@ -156,13 +135,6 @@ def _pip_error(engine: str, said: str) -> EffectError:
         where = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
         return EffectError(f"pip finds no MuJoCo {engine} for {where}", help=_OFFLINE)
     lines = [line.strip() for line in said.splitlines() if line.strip()]
-    if "ResolutionImpossible" in said:
-        told = [line for line in lines if " depends on " in line or "user requested" in line]
-        return EffectError(
-            f"MuJoCo {engine} cannot be installed beside the packages of here: "
-            f"{'; '.join(told[:_LINES])}",
-            help="name a version of MuJoCo that goes with them",
-        )
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
     told = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
     return EffectError(
@@ -198,14 +170,6 @@ def _run(command: Sequence[str]) -> tuple[int, str]:
                 os.killpg(process.pid, signal.SIGKILL)
             raise
     return process.returncode, said
-
-
-def _link_library(packages: str) -> None:
-    """Let `mjcourse` be the one that came with this tool."""
-    link, target = Path(packages, "mjcourse"), Path(library_folder(), "mjcourse")
-    if not link.is_symlink() or link.readlink() != target:
-        link.unlink(missing_ok=True)
-        link.symlink_to(target)
 
 
 def _remove_unused(folder: Path, used: Path) -> None:

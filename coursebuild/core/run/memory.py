@@ -46,7 +46,7 @@ from coursebuild.core.run.dependencies import (
     sought,
     state_changes,
 )
-from coursebuild.core.run.packages import Installed
+from coursebuild.core.run.packages import Installed, site_folders
 from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, record_of, to_bytes
 from coursebuild.core.run.surroundings import OtherEnvironment, conditions, places
 
@@ -69,7 +69,7 @@ class States:
         folders = None
         if place is not None:
             self.around = tuple(sorted((*self.around, ("environment", place.name))))
-            folders = (place.packages,)
+            folders = (place.packages, *site_folders())
         self._installed = Installed(store, folders)
         self._known: dict[Need, str] = {}
 

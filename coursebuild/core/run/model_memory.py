@@ -1,6 +1,6 @@
 """Compiled models, remembered: MuJoCo starts only if something that a model is made of changed.
 
-Entry point: `compile_kept`.
+Entry points: `compile_kept`, `model_key`.
 
 A result, an error too, is kept under its text, where that stands, and the state of every other file
 that MuJoCo looks for. What changed while it was compiled is not kept.
@@ -36,7 +36,7 @@ def compile_kept(
 
     `stage` is entered where anything has to be compiled.
     """
-    keys = {each: _key(root, *each) for each in texts}
+    keys = {each: model_key(root, *each) for each in texts}
     kept = {each: store.get_value(_KIND, key, CompileResult) for each, key in keys.items()}
     found = {each: result for each, result in kept.items() if result is not None}
     left = [each for each in keys if each not in found]
@@ -45,14 +45,14 @@ def compile_kept(
             made = mjcf.compile_all(root, left)
         for each, result in zip(left, made, strict=True):
             found[each] = result
-            if not result.error.startswith(_OWN_FAULT) and _key(root, *each) == keys[each]:
+            if not result.error.startswith(_OWN_FAULT) and model_key(root, *each) == keys[each]:
                 with contextlib.suppress(UnicodeEncodeError):  # a name of a file that is no text
                     store.put_value(_KIND, keys[each], result)
     return tuple(found[each] for each in texts)
 
 
-def _key(root: Path, path: str, text: str) -> str:
-    """A hash of all that a result depends on."""
+def model_key(root: Path, path: str, text: str) -> str:
+    """A hash of all that a compiled model depends on."""
     files = mjcf.model_files(root, path, text)
     states = tuple((file, file_state(str(root / file))) for file in files)
     return fingerprint((engine_version(), _code(), path, text, states))

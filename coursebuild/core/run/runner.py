@@ -215,7 +215,7 @@ class _Work:
         self.started = started
         self.finished = finished
         self.environment = _environment(place) | dict(jobs[0].environment if jobs else ())
-        self.library = library_folder() if place is None else place.packages
+        self.library = library_folder()
         self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
             i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
@@ -295,7 +295,7 @@ def _environment(place: OtherEnvironment | None) -> dict[str, str]:
 def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
     """The folders with packages, and when something was installed there."""
     found: list[object] = []
-    for folder in site_folders() if place is None else (place.packages,):
+    for folder in (*site_folders(), *(() if place is None else (place.packages,))):
         with contextlib.suppress(OSError):
             found.append((folder, Path(folder).stat().st_mtime_ns))
     return tuple(found)

@@ -71,7 +71,7 @@ class OtherEnvironment(Struct, frozen=True):
     prefix: str
     """The folder that holds all of it."""
     packages: str
-    """The folder with the installed packages, `mjcourse` among them."""
+    """The folder with the packages that are installed there."""
 
     def environment(self, clean: Mapping[str, str]) -> dict[str, str]:
         """The environment of scripts there, of the one that they have here."""

@@ -428,6 +428,7 @@ def library_folders(root: str, library: str) -> list[str]:
 def installed_folders() -> list[str]:
     """The folders of Python's own modules and of installed packages, also as they really are."""
     found = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
+    found.update(f for f in sys.path if f.endswith(("/site-packages", "/dist-packages")))
     if site.ENABLE_USER_SITE:
         found.add(site.getusersitepackages())
     return sorted({f for folder in found for f in (folder, os.path.realpath(folder))})

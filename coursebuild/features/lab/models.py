@@ -5,15 +5,11 @@ Entry points: `model_of_lab`, `model_of_course`, `saved_model`.
 
 from __future__ import annotations
 
-import hashlib
-import json
-
 from msgspec import Struct
 
 from coursebuild.core.features import TrialContext
-from coursebuild.core.run.dependencies import need_of
 from coursebuild.core.run.mjcf import model_files
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.model_memory import model_key
 from coursebuild.features.lab.engines.native import NativeEngine
 from coursebuild.features.lab.model import Lab
 
@@ -49,14 +45,10 @@ def model_of_course(context: TrialContext, name: str) -> LabModel | None:
 
 def saved_model(context: TrialContext, native: NativeEngine, model: LabModel) -> bytes:
     """A model as an MJB file, from the store where nothing that it is made of has changed."""
-    memory = context.memory
-    needed = [need_of(file) for file in model.files]
-    states = [memory.states(need) for need in needed]
-    parts = json.dumps([engine_version(), model.path, model.text, model.files, states])
-    key = hashlib.sha256(parts.encode()).hexdigest()
-    saved = memory.store.get("mjb", key)
+    store, key = context.memory.store, model_key(context.root, model.path, model.text)
+    saved = store.get("mjb", key)
     if saved is None:
         saved = native.save(model.path, model.text)
-        if states == [memory.states.now(need) for need in needed]:  # none was edited meanwhile
-            memory.store.put("mjb", key, saved)
+        if model_key(context.root, model.path, model.text) == key:  # it was not edited meanwhile
+            store.put("mjb", key, saved)
     return saved

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,16 +16,6 @@ from support.published_sites import pages as pages
 from support.published_sites import root as root
 
 
-def test_only_what_has_another_key_is_made(root: Path, pages: Pages) -> None:
-    out = root / "public"
-    assert publish(root, out, pages(a="1", b="1")) == ("a.html", "b.html")
-    assert publish(root, out, pages(a="1", b="2", c="1")) == ("b.html", "c.html")
-    assert pages.made == ["a.html", "b.html", "b.html", "c.html"]
-    assert texts(out) == {"a.html": "a.html 1", "b.html": "b.html 2", "c.html": "c.html 1"}
-    listed = (out / MARKER).read_text().split("\n")[1:-1]
-    assert listed == ["a.html", "b.html", "c.html"]
-
-
 def test_where_nothing_differs_the_site_stays(root: Path, pages: Pages) -> None:
     out = root / "public"
     both = [*pages(a="1"), OutputFile("x.css", b"x")]
@@ -37,50 +26,6 @@ def test_where_nothing_differs_the_site_stays(root: Path, pages: Pages) -> None:
     assert publish(root, out, [*pages(a="1"), OutputFile("x.css", b"y")]) == ("x.css",)
     assert out.stat().st_ino != before
     assert pages.made == ["a.html"]
-
-
-def edit(file: Path) -> None:
-    file.write_text("a.html 2")  # as long as it was
-
-
-def lengthen(file: Path) -> None:
-    with file.open("a") as opened:
-        opened.write("!")
-
-
-def remove(file: Path) -> None:
-    file.unlink()
-
-
-def replace(file: Path) -> None:
-    file.unlink()
-    file.write_text("a.html 1")
-
-
-def link(file: Path) -> None:
-    file.rename(file.parents[1] / "elsewhere")
-    file.symlink_to(file.parents[1] / "elsewhere")
-
-
-def folder(file: Path) -> None:
-    file.unlink()
-    file.mkdir()
-
-
-@pytest.mark.parametrize("change", [edit, lengthen, remove, replace, link, folder])
-def test_a_published_file_that_is_not_as_it_was_is_made_again(
-    root: Path, pages: Pages, change: Callable[[Path], None]
-) -> None:
-    out = root / "public"
-    publish(root, out, pages(a="1", b="1"))
-    file = out / "a.html"
-    before = file.stat()
-    change(file)
-    if file.exists() and change is not link:
-        os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns + 1))
-    assert publish(root, out, pages(a="1", b="1")) == ("a.html",)
-    assert texts(out) == {"a.html": "a.html 1", "b.html": "b.html 1"}
-    assert not file.is_symlink()
 
 
 def test_a_file_somebody_put_there_by_our_marker_goes(root: Path, pages: Pages) -> None:

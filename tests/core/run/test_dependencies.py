@@ -5,11 +5,9 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
 from coursebuild.core.run.dependencies import (
-    ABSENT,
-    FOLDER,
-    SPECIAL,
     Dependency,
     Inputs,
     Kind,

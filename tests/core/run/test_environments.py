@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.core.run.environments import needed, other_version
+from coursebuild.core.run.environments import other_version
 from coursebuild.core.run.versions import engine_version
 
 
@@ -30,8 +30,3 @@ def test_the_version_of_here_written_in_another_way_is_no_other() -> None:
     for text in (f"{engine_version()}.0", f"{engine_version()}.0.0".removesuffix(".0")):
         with pytest.raises(UsageError, match="is the version installed here"):
             other_version(text)
-
-
-def test_which_distributions_modules_come_from() -> None:
-    states = ["Some.Tool 1.2", "native 3.0rc1, other_part 4", "files 0123abcd", "", "mujoco 3.1"]
-    assert needed(states) == {"some-tool": "1.2", "native": "3.0rc1", "other-part": "4"}
