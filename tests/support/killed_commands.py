@@ -2,9 +2,10 @@
 
     python killed_commands.py < requests > replies
 
-A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N}`. The child runs the
-command in this folder and ends itself, without any cleaning up, just before its call number N that
-changes something in the folder; a write that is hit writes half. With `"fatal": 0` it gets through.
+A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N, "exchanges": …}`. The
+child runs the command in this folder and ends itself, without any cleaning up, just before its call
+number N that changes something in the folder; a write that is hit writes half. With `"fatal": 0` it
+gets through. `exchanges`: whether the system can swap two folders in one step.
 A reply is `{"status": …, "calls": [names]}`; there are no names where it died.
 """
 
@@ -71,6 +72,8 @@ def serve() -> None:
         child = os.fork()
         if child == 0:
             os.close(read)
+            if not request["exchanges"]:
+                publishing.exchange = lambda a, b: False
             run(Path(request["folder"]), request["arguments"], request["fatal"], write)
         os.close(write)
         with os.fdopen(read) as pipe:

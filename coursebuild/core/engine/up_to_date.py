@@ -31,12 +31,10 @@ _FINE = 50_000_000
 """ns: a file changed longer ago than this has a time that another change would not have."""
 _COARSE = 2_100_000_000
 """The same where a file system counts whole milliseconds, or longer."""
-_VARIABLES = (
+DECISIVE = (
     "MUJOCO_GL",
     "MUJOCO_EGL_DEVICE_ID",
     "PYOPENGL_PLATFORM",
-    "PYTHONPATH",
-    "VIRTUAL_ENV",
     "LD_LIBRARY_PATH",
     "DYLD_LIBRARY_PATH",
     "DYLD_FALLBACK_LIBRARY_PATH",
@@ -46,7 +44,8 @@ _VARIABLES = (
     "NVIDIA_VISIBLE_DEVICES",
     "NVIDIA_DRIVER_CAPABILITIES",
 )
-"""Of the environment: what decides which code runs, or how."""
+"""Of the environment of scripts: what decides how something is drawn or computed."""
+_VARIABLES = (*DECISIVE, "PYTHONPATH", "VIRTUAL_ENV")
 
 
 class _UnclearError(Exception):

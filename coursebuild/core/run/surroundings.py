@@ -18,27 +18,17 @@ from pathlib import Path
 
 from msgspec import Struct
 
-_PASSED_ON = (
+from coursebuild.core.engine.up_to_date import DECISIVE
+
+_SAYS_NOTHING = (
     "PATH",
     "HOME",
     "USER",
     "LOGNAME",
-    "LD_LIBRARY_PATH",
-    "DYLD_LIBRARY_PATH",
-    "DYLD_FALLBACK_LIBRARY_PATH",
     "VIRTUAL_ENV",
     "CONDA_PREFIX",
-    "CUDA_HOME",
-    "CUDA_PATH",
-    "CUDA_VISIBLE_DEVICES",
-    "NVIDIA_VISIBLE_DEVICES",
-    "NVIDIA_DRIVER_CAPABILITIES",
-    "MUJOCO_GL",
-    "MUJOCO_EGL_DEVICE_ID",
-    "PYOPENGL_PLATFORM",
-    "SYSTEMROOT",
-    "SYSTEMDRIVE",
 )
+"""Variables that say who runs a script and where programs lie, which its result does not show."""
 _FIXED = {
     "LC_ALL": "C.UTF-8",
     "LANG": "C.UTF-8",
@@ -82,7 +72,8 @@ class OtherEnvironment(Struct, frozen=True):
 
 def clean_environment(outer: Mapping[str, str]) -> dict[str, str]:
     """The environment of scripts, but for their TMPDIR, given the one that the tool runs in."""
-    return {name: outer[name] for name in _PASSED_ON if name in outer} | _FIXED
+    passed_on = (*_SAYS_NOTHING, *DECISIVE)
+    return {name: outer[name] for name in passed_on if name in outer} | _FIXED
 
 
 def library_folder() -> str:
@@ -108,36 +99,16 @@ def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
 
 # --- what a result depends on besides the script
 
-_SAYS_NOTHING = frozenset(
-    {
-        "PATH",
-        "HOME",
-        "USER",
-        "LOGNAME",
-        "VIRTUAL_ENV",
-        "CONDA_PREFIX",
-        "SYSTEMROOT",
-        "SYSTEMDRIVE",
-    }
-)
-"""Variables that say who runs a script and where programs lie, which its result does not show."""
-
 
 def conditions(outer: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     """By name, sorted: what has to be the same for a result to be the same.
 
     `outer` is the environment of the tool.
     """
-    environment = clean_environment(outer)
-    fixed = clean_environment({})
-    told = {
-        f"environment variable {name}": value
-        for name, value in environment.items()
-        if name not in fixed and name not in _SAYS_NOTHING
-    }
+    told = {f"environment variable {name}": outer[name] for name in DECISIVE if name in outer}
     told["Python"] = f"{platform.python_implementation()} {platform.python_version()}"
     told["platform"] = f"{sys.platform} {platform.machine()} {_c_library()}".strip()
-    same = json.dumps(fixed, sort_keys=True).encode()
+    same = json.dumps(_FIXED, sort_keys=True).encode()
     told["the fixed environment of scripts"] = hashlib.sha256(same).hexdigest()[:12]
     return tuple(sorted(told.items()))
 
