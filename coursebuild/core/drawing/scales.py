@@ -33,12 +33,12 @@ class Scale(Struct, frozen=True):
         part = (at - self.low) / (self.high - self.low)
         return self.start + min(max(part, 0.0), 1.0) * (self.end - self.start)
 
-    def ticks(self, most: int) -> list[tuple[float, str]]:
-        """Places and texts of the ticks, no more than `most`."""
+    def ticks(self, about: int) -> list[tuple[float, str]]:
+        """Places and texts of the ticks, about so many; no more on a logarithmic scale."""
         if self.logarithmic:
-            found = log_ticks(self.low, self.high, most)
+            found = log_ticks(self.low, self.high, about)
             return [(self(10.0**exponent), text) for exponent, text in found]
-        values = ticks(self.low, self.high, most)
+        values = ticks(self.low, self.high, about)
         return [(self(v), text) for v, text in zip(values, tick_texts(values), strict=True)]
 
 

@@ -16,8 +16,7 @@ from msgspec import Struct
 
 from coursebuild.core.drawing.marks import apart
 from coursebuild.core.drawing.marks import markup_text as _text
-from coursebuild.core.drawing.scales import tick_texts as tick_texts
-from coursebuild.core.drawing.scales import ticks as ticks
+from coursebuild.core.drawing.scales import Scale
 from coursebuild.features.lab.schema import Plot, TraceFields
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
@@ -26,6 +25,8 @@ _LETTER = 6.2
 """Width of a letter or a digit."""
 _DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
 _LABEL_GAP = 13.0
+_TICKS = 5
+"""About so many of values."""
 _LARGEST = 4e307
 """What is beyond is drawn there, so that the range of an axis is finite."""
 
@@ -84,30 +85,19 @@ def _frame(
 ) -> _Frame:
     """The frame, with room for the ticks at its left and the names of the lines at its right."""
     width = _NARROW if narrow else _WIDE
-    longest = max((len(text) for text in tick_texts(ticks(low, high))), default=0)
+    y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
+    longest = max(len(text) for _, text in y.ticks(_TICKS))
     left = min(26.0 + _LETTER * longest, 0.35 * width)
     room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
-    return _Frame(low_t, high_t, low, high, left, width - room, width)
+    return _Frame(Scale(left, width - room, low_t, high_t, logarithmic=False), y, width)
 
 
 class _Frame(Struct, frozen=True):
-    """From values to places."""
+    """From times and values to places."""
 
-    low_t: float
-    high_t: float
-    low: float
-    high: float
-    left: float
-    right: float
+    x: Scale
+    y: Scale
     width: float
-
-    def x(self, t: float) -> float:
-        part = (t - self.low_t) / (self.high_t - self.low_t)
-        return self.left + part * (self.right - self.left)
-
-    def y(self, v: float) -> float:
-        part = (v - self.low) / (self.high - self.low)
-        return _HEIGHT - _BOTTOM - part * (_HEIGHT - _TOP - _BOTTOM)
 
 
 def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple[float, float]:
@@ -124,16 +114,12 @@ def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple
 
 
 def _axes(frame: _Frame, plot: Plot) -> list[str]:
-    left, right, bottom = frame.left, frame.right, _HEIGHT - _BOTTOM
+    left, right, bottom = frame.x.start, frame.x.end, frame.y.start
     parts = []
-    values = ticks(frame.low, frame.high)
-    for value, text in zip(values, tick_texts(values), strict=True):
-        y = frame.y(value)
+    for y, text in frame.y.ticks(_TICKS):
         parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
         parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{text}</text>')
-    values = _fitting(frame)
-    for value, text in zip(values, tick_texts(values), strict=True):
-        x = frame.x(value)
+    for x, text in _fitting(frame.x):
         parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
         parts.append(f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{text}</text>')
     parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
@@ -150,21 +136,21 @@ def _axes(frame: _Frame, plot: Plot) -> list[str]:
     return parts
 
 
-def _fitting(frame: _Frame) -> list[float]:
+def _fitting(times: Scale) -> list[tuple[float, str]]:
     """Ticks of the time, so many that their texts do not touch."""
     for about in (6, 4, 3, 2):
-        values = ticks(frame.low_t, frame.high_t, about)
-        longest = max(len(text) for text in tick_texts(values))
-        if len(values) * (longest + 1.5) * _LETTER <= frame.right - frame.left:
-            return values
-    return values[:1]
+        found = times.ticks(about)
+        longest = max(len(text) for _, text in found)
+        if len(found) * (longest + 1.5) * _LETTER <= times.end - times.start:
+            return found
+    return found[:1]
 
 
 def _reference(frame: _Frame, y: float, label: str) -> str:
     at = frame.y(y)
     return (
-        f'<path class="lab-reference" d="M{frame.left:.1f} {at:.1f}H{frame.right:.1f}"/>'
-        f'<text x="{frame.left + 4:.1f}" y="{at - 4 if at > _TOP + 12 else at + 11:.1f}">'
+        f'<path class="lab-reference" d="M{frame.x.start:.1f} {at:.1f}H{frame.x.end:.1f}"/>'
+        f'<text x="{frame.x.start + 4:.1f}" y="{at - 4 if at > _TOP + 12 else at + 11:.1f}">'
         f"{_text(label)}</text>"
     )
 
@@ -195,7 +181,7 @@ def _drawn(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
     """A stretch as path commands, cut at the frame's lower and upper edges."""
     if len(run) == 1:
         t, v = run[0]
-        if frame.low <= v <= frame.high:
+        if frame.y.low <= v <= frame.y.high:
             yield from (f"M{frame.x(t):.1f} {frame.y(v):.1f}", "h0")  # round ends make a point seen
         return
     pen = False
@@ -215,16 +201,16 @@ def _between(
 ) -> str:
     """A point of a segment, which is inside the frame but for rounding."""
     t, v = (a + part * (b - a) if part < 1 else b for a, b in zip(first, second, strict=True))
-    return f"{frame.x(t):.1f} {frame.y(min(max(v, frame.low), frame.high)):.1f}"
+    return f"{frame.x(t):.1f} {frame.y(min(max(v, frame.y.low), frame.y.high)):.1f}"
 
 
 def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
     """From where to where (0 to 1) a segment is inside the frame; the end first where nowhere."""
     if v0 == v1:
-        return (0.0, 1.0) if frame.low <= v0 <= frame.high else (1.0, 0.0)
+        return (0.0, 1.0) if frame.y.low <= v0 <= frame.y.high else (1.0, 0.0)
     # Halved, so that the difference of two large numbers is finite.
     change = v1 / 2 - v0 / 2
-    cuts = sorted((edge / 2 - v0 / 2) / change for edge in (frame.low, frame.high))
+    cuts = sorted((edge / 2 - v0 / 2) / change for edge in (frame.y.low, frame.y.high))
     return max(cuts[0], 0.0), min(cuts[1], 1.0)
 
 
@@ -233,7 +219,7 @@ def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
     wanted = [y for y, _, _ in sorted(ends)]
     places = apart(wanted, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
     return [
-        f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.right + 6:.1f}" '
+        f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.x.end + 6:.1f}" '
         f'y="{place + 3.5:.1f}">{_text(label)}</text>'
         for (_, label, n), place in zip(sorted(ends), places, strict=True)
     ]
