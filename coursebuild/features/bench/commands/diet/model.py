@@ -24,7 +24,7 @@ from coursebuild.core.model import Course, Declarations, MjcfModel
 from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.text.diagnostics import diagnose
-from coursebuild.core.text.source import Source, Span
+from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.diet.readers import readers_of
 from coursebuild.features.bench.commands.runs import CannotError
 from coursebuild.numerics.pruning.compare import pruning_scenes
@@ -49,7 +49,8 @@ class DietModel:
         self.root = root
         self.scene = scene
         self.path = scene.model.source.path
-        self.keeps = {} if scene.declared is None else _keeps(scene.declared)
+        kept = () if scene.declared is None else scene.declared.keep
+        self.keeps = {" ".join(one.finding.split()): one for one in kept}
         self.locked = _locked(root, files, self.path, scene.model.source.text)
         self.readers = _readers(root, files, course, scene)
         self.original: dict[str, bytes] = {}
@@ -94,7 +95,7 @@ class DietModel:
                 text,
                 pruning_scenes(text.model, declared, quick=quick),
                 self.readers,
-                self.keeps,
+                {key: one.reason for key, one in self.keeps.items()},
                 self.locked,
                 _numbered(declared),
                 time.thread_time_ns,
@@ -142,9 +143,7 @@ class DietModel:
         )
 
     def _stale(self, key: str) -> StaleKeep:
-        declared = self.scene.declared
-        assert declared is not None
-        place = _place(declared, key)
+        place = self.keeps[key].finding_span
         return StaleKeep(key, place.path, place.line, place.column)
 
     def change(self, survey: Survey, text: ModelText) -> None:
@@ -203,17 +202,6 @@ class DietModel:
     def _another(self) -> CannotError:
         message = f"the changed model `{self.scene.name}` is not the one that was run"
         return CannotError(diagnose("model-error", self.scene.model.source.span(0, 0), message))
-
-
-def _keeps(declared: Declarations) -> dict[str, str]:
-    return {" ".join(one.finding.split()): one.reason for one in declared.keep}
-
-
-def _place(declared: Declarations, key: str) -> Span:
-    for one in declared.keep:
-        if " ".join(one.finding.split()) == key:
-            return one.finding_span
-    return declared.source.span(0, 0)
 
 
 def _numbered(declared: Declarations | None) -> frozenset[str]:
