@@ -6,7 +6,6 @@ import json
 
 from msgspec.structs import replace
 
-from coursebuild.core.model.results import Machine
 from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
@@ -14,11 +13,9 @@ from coursebuild.features.bench.commands.measurement import (
     measured_text,
 )
 from coursebuild.numerics.reports.diet import (
-    PROVED,
     SAME,
     DietReport,
     DietScenario,
-    Finding,
     ModelPlace,
     Saving,
     StaleKeep,
@@ -27,40 +24,17 @@ from coursebuild.numerics.reports.diet import (
 )
 from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.report import Style
+from support.model_reports import diet, finding
 
-PLACE = ModelPlace("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5)
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")
 SURE = Saving(2.2, 0.01, True, 1234, 30)
-FINDING = Finding(
-    kind="sensor-unread",
+FINDING = finding(
     message="nobody reads the sensor gyro",
-    places=(PLACE,),
-    label=PROVED,
-    difference=0.0,
-    scenarios=("go",),
-    proof="what a sensor says changes nothing that moves",
+    places=(ModelPlace("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5),),
     saving=SURE,
     edits=(EDIT,),
-    fixable=True,
-    unfixed="",
-    kept="",
-    doubt="",
 )
-MACHINE = Machine("3.14.0", "3.11.7", "2.4.6", "Linux x86_64", "")
-REPORT = DietReport(
-    model="arm",
-    digest="d",
-    quick=False,
-    machine=MACHINE,
-    readers=(),
-    scenarios=(DietScenario("go", 100, "ok", ()),),
-    findings=(FINDING,),
-    tried=(),
-    fixed=SURE,
-    slim=SURE,
-    slim_difference=0.0,
-    stale=(),
-)
+REPORT = replace(diet(FINDING), model="arm", fixed=SURE, slim=SURE)
 
 
 def lines(report: DietReport, width: int = 100) -> list[str]:
@@ -70,11 +44,11 @@ def lines(report: DietReport, width: int = 100) -> list[str]:
 def test_a_finding_is_told_with_its_saving_reason_and_change() -> None:
     assert lines(REPORT, 90) == [
         "arm",
-        "  in go",
+        "  in swing",
         "",
         "  sensor-unread: nobody reads the sensor gyro",
         "    proved; ×2.2 as fast, 1,234 bytes of memory fewer, 30 bytes of text fewer",
-        "    because what a sensor says changes nothing that moves",
+        "    because its value goes nowhere",
         "    models/arm.xml:9:1",
         "    - <gyro",
         '    - name="gyro"/>',
