@@ -159,7 +159,8 @@ SIGNS = """body => {
 }"""
 UNDRAWN = """[...document.querySelectorAll('math')]
   .filter(one => one.getBoundingClientRect().width === 0).length"""
-PICTURES = """Promise.all([...document.querySelectorAll('main img:not(.figure-dark)')].map(async (one) => {
+PICTURES = """Promise.all(
+[...document.querySelectorAll('main img:not(.figure-dark)')].map(async (one) => {
   one.loading = 'eager'
   await one.decode()
   return [one.alt, one.naturalWidth > 0 && one.getBoundingClientRect().width > 0]
