@@ -1,7 +1,7 @@
 /**
  * Labs in a page: loaded by site.js when a lab comes near. docs/labs.md says how a page holds a lab.
  *
- *   mountLab(element, words) → Promise<Instrument | null>
+ *   mountLab(element, words, progress) → Promise<Instrument | null>
  */
 
 import { h } from './lab/page/dom.js'
@@ -17,8 +17,9 @@ import { fill } from './lab/page/words.js'
  *
  * @param {HTMLElement} element has `data-config`, the address of the lab's JSON
  * @param {(key: string) => string} texts of the interface
+ * @param {object | null} progress where reached goals are kept, see progress/store.js
  */
-export async function mountLab(element, texts) {
+export async function mountLab(element, texts, progress = null) {
   const words = (key, values) => fill(texts(key), values)
   try {
     const lack = missing()
@@ -28,7 +29,7 @@ export async function mountLab(element, texts) {
     if (!response.ok) throw new Error(words('lab.live.not_found', { status: response.status }))
     const config = await response.json()
     const Kind = { simlab: Instrument, mjcf: Workbench }[config.kind ?? 'simlab']
-    const instrument = await (Kind ? new Kind(element, config, base, words) : mountCustom(element, config, base, words))
+    const instrument = await (Kind ? new Kind(element, config, base, words, progress) : mountCustom(element, config, base, words))
     moveFocus(element)
     const link = await readLink(window.location.hash)
     if (link?.id === config.id && link.state !== null) instrument.restore?.(link.state)

@@ -24,7 +24,7 @@ function improve(part) {
   addCopyButtons(part, words)
   markScrolling(part)
   addLineNumbers(part, words) // after it: the numbers stay in reach of the keyboard
-  loadLabs(part, words)
+  loadLabs(part, words, progress)
   mountQuizzes(part, words, progress)
 }
 

@@ -101,9 +101,9 @@ test('a state comes back from a link bit for bit, whatever its values', async ()
   const physics = new Float64Array([0, -0, NaN, 1 / 3, -1e-310, Infinity])
   new DataView(physics.buffer).setBigUint64(16, 0x7ff0_0000_0a0a_0001n, true) // a NaN of another kind, with line ends in it
   const state = { values: [null, 0.1, 'ä?&#\n', true], steps: 1234, time: 2.468, physics }
-  const { link, whole } = await writeLink('4.2-lab-1', state)
+  const { link, only } = await writeLink('4.2-lab-1', state)
   assert.match(link, /^#lab=4\.2-lab-1&z=[\w-]+$/)
-  assert.equal(whole, true)
+  assert.equal(only, null)
   const { id, state: back } = await readLink(link)
   assert.equal(id, '4.2-lab-1')
   assert.deepEqual([back.values, back.steps, back.time], [state.values, 1234, 2.468])
@@ -114,13 +114,13 @@ test('a state of a thousand numbers has room in a link, one of ten thousand keep
   const numbers = (length) => Float64Array.from({ length }, (_, i) => Math.sin(1 + i))
   for (const [length, fits] of [[1200, true], [10_000, false]]) {
     const physics = numbers(length)
-    const { link, whole } = await writeLink('a', { values: [1], steps: 5, time: 1, physics })
-    assert.equal(whole, fits, String(length))
+    const { link, only } = await writeLink('a', { values: [1], steps: 5, time: 1, physics })
+    assert.equal(only, fits ? null : 'controls', String(length))
     assert.ok(link.length < LONGEST + 20)
     assert.deepEqual((await readLink(link)).state, { values: [1], steps: 5, time: 1, physics: fits ? physics : null })
   }
   const resting = await writeLink('a', { values: [], steps: 0, time: 0, physics: new Float64Array(100_000) })
-  assert.ok(resting.whole && resting.link.length < 2000, 'zeros take no room')
+  assert.ok(resting.only === null && resting.link.length < 2000, 'zeros take no room')
 })
 
 test('a browser that cannot deflate makes links too', async (t) => {
@@ -151,13 +151,13 @@ test('a link that unfolds to very much gives no state', async () => {
 test('a model that the reader wrote goes into a link, if it is not too long for one', async () => {
   const state = { values: [], steps: 0, time: 0, physics: new Float64Array() }
   const text = '<mujoco model="Ärm 😀">\n\t<worldbody/>\n</mujoco>'
-  const { link, whole } = await writeLink('a', { ...state, text })
-  assert.ok(whole)
+  const { link, only } = await writeLink('a', { ...state, text })
+  assert.equal(only, null)
   assert.equal((await readLink(link)).state.text, text)
   const long = await writeLink('a', { ...state, text: '<geom size="1"/>\n'.repeat(6000) })
   assert.equal((await readLink(long.link)).state.text, undefined, 'unfolds to more than a page takes')
   const noise = Array.from({ length: 20_000 }, (_, i) => Math.sin(i).toString(36)).join('')
-  assert.ok(!(await writeLink('a', { ...state, text: noise })).whole)
+  assert.equal((await writeLink('a', { ...state, text: noise })).only, 'controls')
 })
 
 test('what MuJoCo says of a model is told with its line, in its words', () => {

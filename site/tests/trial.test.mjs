@@ -26,6 +26,7 @@ function attempt(xml, data, pieces = {}, request = {}) {
     `readouts: ${list(pieces.readouts)}`,
     `plots: [${(pieces.plots ?? []).map(list).join(', ')}]`,
     `expect: ${list(pieces.expect)}`,
+    ...(pieces.goal ? [`goal: ${HEAD} => (${pieces.goal})`] : []),
   ]
   const code = `({${members.join(', ')}})`
   let clock = 0
@@ -119,6 +120,32 @@ test('steps before a claim are done in order, and claims after the same share a 
       'expect.4: claims after "add", then "add"',
     ],
   )
+})
+
+test('a goal is not reached by doing nothing, and by its log it is', () => {
+  const GOAL = 'Math.abs(data.qvel[0]) > 5'
+  const goal = (expr, hold, log, stopAt = 1) =>
+    told(
+      attempt(
+        PENDULUM,
+        { controls: [control({ label: 'torque', min: -1, max: 1, value: 0 }), control({ label: 'kick', type: 'button' })], goal: { hold, log }, stopAt },
+        { controls: [set('data.ctrl[0]'), run('data.qvel[0] += 6')], goal: expr },
+      ),
+    ).map(([entry, kind, message]) => [entry, kind, message])
+  assert.deepEqual(goal(GOAL, 0, [[0.4, 1]]), [])
+  assert.deepEqual(goal(GOAL, 0, [[0, 0, 0], [3, 1]]), [], 'after the time at which the lab stops')
+  assert.deepEqual(goal('data.time > 0.5', 0, []), [], 'a goal that is waited for')
+  assert.deepEqual(goal(GOAL, 1, [[0.4, 1]]), [
+    ['goal.log', 'goal', 'by 2.4 s: it is held for 0.128 s at the most, not 1 s'],
+  ])
+  assert.deepEqual(goal(GOAL, 0, [[0, 0, 0.1]]), [['goal.log', 'goal', 'by 1 s: its condition is never true']])
+  assert.deepEqual(goal('data.time >= 0', 0, [[0.4, 1]]), [['goal.expr', 'goal', 'at the start']])
+  assert.deepEqual(goal('data.time >= 0', 0, []), [['goal.expr', 'goal', 'at the start']])
+  assert.deepEqual(goal('data.time > 2.001', 0, [[3, 1]]), [['goal.expr', 'goal', 'with nothing done, at 2.016 s']])
+  assert.deepEqual(goal('data.qpos[0]', 0, []), [['goal.expr', 'type', 'gives number 0, not true or false']])
+  assert.deepEqual(goal('0 / data.qpos[0]', 0, []), [['goal.expr', 'type', 'gives number NaN, not true or false']])
+  assert.deepEqual(goal('lib.none()', 0, []), [['goal.expr', 'throws', 'TypeError: lib.none is not a function']])
+  assert.deepEqual(goal(GOAL, 0, [[0, 0, 2]]), [['goal.log', 'throws', 'the control "torque" cannot be set to 2']])
 })
 
 test('the same request gives the same reply', () => {

@@ -40,7 +40,7 @@ def test_saving_forgetting_and_bringing_in(calm: BrowserContext, site: str, tmp_
     page = opened(calm, site + "progress/")
     overall = page.locator(OVERALL)
     expect(overall).to_contain_text("1 of 3 lessons read")
-    expect(overall).to_contain_text("0 of 8 questions right")
+    expect(overall).to_contain_text("0 of 8 tasks done")
     today = "() => `progress-motion-${new Date().toISOString().slice(0, 10)}.json`"
     named = [page.evaluate(today)]
     with page.expect_download() as saving:
@@ -83,7 +83,7 @@ def test_forgetting_can_be_undone(calm: BrowserContext, site: str) -> None:
     page.get_by_role("dialog").get_by_role("button", name="Forget", exact=True).click()
     expect(page.locator(OVERALL)).to_contain_text("Nothing yet.")
     page.get_by_role("button", name="Undo").click()
-    expect(page.locator(OVERALL)).to_contain_text("1 of 8 questions right")
+    expect(page.locator(OVERALL)).to_contain_text("1 of 8 tasks done")
     focus_on(page, "Forget everything")
 
 
@@ -155,7 +155,7 @@ def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
     orphans.get_by_role("button", name="Forget all of these").click()
     expect(orphans).to_be_hidden()
     page.reload()
-    expect(page.locator(OVERALL)).to_contain_text("0 of 8 questions right")
+    expect(page.locator(OVERALL)).to_contain_text("0 of 8 tasks done")
     expect(orphans).to_be_hidden()
 
 
@@ -172,9 +172,9 @@ def test_pages_without_a_script_say_so_and_are_complete(
         page.goto(site + "review/")
         expect(said).to_contain_text("scripts are switched off here", use_inner_text=True)
         lessons = [
-            "1.1 Push & <em>pull</em> 3 questions",
-            "1.2 Free fall, from a height that is not small 4 questions",
-            "About 1 question",
+            "1.1 Push & <em>pull</em> 3 tasks",
+            "1.2 Free fall, from a height that is not small 4 tasks",
+            "About 1 task",
         ]
         expect(page.locator(".asking li")).to_have_text(lessons)
         page.goto(site)
@@ -197,7 +197,7 @@ def test_everything_works_from_the_keyboard(calm: BrowserContext, site: str) -> 
     page.keyboard.press("Enter")
     focus_on(page, "Done: 1 of 1 right.")
     page.goto(site + "progress/")
-    expect(page.locator(OVERALL)).to_contain_text("1 of 8 questions right")
+    expect(page.locator(OVERALL)).to_contain_text("1 of 8 tasks done")
     tab_to(page, "Forget everything")
     page.keyboard.press("Space")
     focus_on(page, "Cancel")
@@ -206,7 +206,7 @@ def test_everything_works_from_the_keyboard(calm: BrowserContext, site: str) -> 
     expect(page.locator(OVERALL)).to_contain_text("Nothing yet.")
     tab_to(page, "Undo")
     page.keyboard.press("Enter")
-    expect(page.locator(OVERALL)).to_contain_text("1 of 8 questions right")
+    expect(page.locator(OVERALL)).to_contain_text("1 of 8 tasks done")
 
 
 def tab_to(page: Page, text: str, property: str = "innerText") -> None:

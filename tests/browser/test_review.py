@@ -119,7 +119,7 @@ def test_reworded_question_keeps_its_answer_and_its_turn(
         expect(first).not_to_have_attribute("data-question", old)
         expect(live(first).get_by_label("Up")).to_be_checked()
         page.goto(site + "progress/")
-        expect(page.locator('[data-progress="overall"]')).to_contain_text("0 of 8 questions right")
+        expect(page.locator('[data-progress="overall"]')).to_contain_text("0 of 8 tasks done")
         expect(page.locator('[data-progress="orphans"]')).to_be_hidden()
         page.goto(site + "review/")
         review = page.locator('[data-progress="review"]')

@@ -281,6 +281,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ),
     ("lab-shallow", "error", "A lab says `deep`, and no bodies lay deep in each other."),
     ("lab-expect", "error", "A claim of a lab does not hold."),
+    ("lab-goal", "error", "A lab's goal is reached by doing nothing, or not by its log."),
     ("lab-parity", "error", "A lab runs otherwise in the browser's engine than natively."),
     ("lab-far", "warning", "What moves is small in the picture of a lab."),
     ("lab-reset", "warning", "A reset does not lead a lab back to where it started."),

@@ -21,7 +21,15 @@ from typing import Any, Literal
 from msgspec import Struct, to_builtins
 
 from coursebuild.features.lab.model import MJCF, Entry, Lab
-from coursebuild.features.lab.schema import Button, Control, Overlays, Plot, Select, SimLab
+from coursebuild.features.lab.schema import (
+    Button,
+    Control,
+    LogEntry,
+    Overlays,
+    Plot,
+    Select,
+    SimLab,
+)
 
 _NAMES = "{model, data, mj, sim, ctx, lib}"
 
@@ -88,6 +96,8 @@ def _pieces(lab: Lab) -> Iterator[LabCode]:
     for i, claim in enumerate(lab.fields.expect):
         if claim.expr is not None:
             yield LabCode(("expect", i, "expr"), "expression", claim.expr)
+    if lab.fields.goal is not None:
+        yield LabCode(("goal", "expr"), "expression", lab.fields.goal.expr)
 
 
 def compile_lab(lab: Lab, name: str) -> LabModule:
@@ -113,6 +123,8 @@ def _members(lab: Lab) -> Iterator[tuple[str, str]]:
     yield "plots", _list(plots)
     claims = (functions.get(("expect", i, "expr"), "null") for i in range(len(fields.expect)))
     yield "expect", _list(claims)
+    if fields.goal is not None:
+        yield "goal", functions["goal", "expr"]
 
 
 def _list(items: Iterator[str]) -> str:
@@ -155,10 +167,22 @@ def config_json(lab: Lab, name: str) -> str:
             for c in fields.expect
         ],
     }
+    if fields.goal is not None:
+        config["goal"] = {"hold": fields.goal.hold, "log": list(_log_data(fields, fields.goal.log))}
     if lab.kind == MJCF and lab.xml is not None:
         config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n")}
     data = to_builtins(config)
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
+def _log_data(fields: SimLab, log: tuple[LogEntry, ...]) -> Iterator[tuple[float | str, ...]]:
+    """Each act: its time, the number of the control and, but for a button, the value."""
+    numbers = {control.label: i for i, control in enumerate(fields.controls)}
+    for entry in log:
+        if isinstance(entry.do, str):
+            yield entry.t, numbers[entry.do]
+        else:
+            yield from ((entry.t, numbers[label], value) for label, value in entry.do.items())
 
 
 def _overlays(fields: SimLab) -> list[str]:

@@ -36,6 +36,8 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     record = live.record if live is not None else None
     if live is not None and record is not None:
         parts += _recorded(writer, title, live.picture, record)
+    if lab.goal:
+        parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
     parts.append(_about(writer, lab))
     if lab.kind == MJCF and lab.xml is not None:
         parts.append(fence("xml", lab.xml.text))

@@ -5,11 +5,12 @@ Entry point: `Lab`.
 
 from __future__ import annotations
 
+import hashlib
 from typing import TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import Block, FeatureBlock
+from coursebuild.core.model import Block, FeatureBlock, Inline
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.schema import SimLab, Verify
 
@@ -38,6 +39,8 @@ class Lab(FeatureBlock, frozen=True):
     fields: SimLab
     """What the author says; of a kind of the course's own, what labs of every kind have."""
     note: tuple[Block, ...] = ()
+    goal: tuple[Inline, ...] = ()
+    """The text of its goal."""
     xml: Excerpt | None = None
     places: tuple[tuple[Entry, Span], ...] = ()
     """Where each value of the JSON stands."""
@@ -67,9 +70,23 @@ class Lab(FeatureBlock, frozen=True):
         """Its note."""
         return self.note
 
+    def child_inlines(self) -> tuple[Inline, ...]:
+        """The text of its goal."""
+        return self.goal
+
+    def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
+        """Of its goal: another condition is another goal."""
+        goal = self.fields.goal
+        if goal is None:
+            return None
+        condition = f"{self.fields.title}\n{goal.expr}\n{goal.hold}"
+        digest = hashlib.sha256(condition.encode("utf-8", "surrogatepass")).hexdigest()
+        key = f"goal-{digest[:8]}"
+        return key, (key,)
+
     def summary(self) -> Lab:
-        """The lab without its note."""
-        return replace(self, note=())
+        """The lab without its Markdown."""
+        return replace(self, note=(), goal=())
 
     def models(self) -> tuple[str, ...]:
         """The model that it names."""

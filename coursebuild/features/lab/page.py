@@ -103,6 +103,8 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
         lab=replace(view, start=start_name(page, block)),
         docked=block.fields.dock,
         paper=_paper(page, live.name) if live is not None else None,
+        goal=page.inlines(block.goal),
+        goal_key=(block.progress_keys() or ("",))[0],
         source=_source(page, block),
         note=page.blocks(block.note),
     )
@@ -156,6 +158,7 @@ def lab_picture(block: Lab, shown: Struct | None) -> Picture | None:
 def index_lab(reader: IndexReader, lab: Lab) -> None:
     """Give the search a lab's title, note, labels and model."""
     reader.add("text", lab.fields.title)
+    reader.add("text", reader.text(lab.goal))
     reader.blocks(lab.note)
     labels = [control.label for control in lab.fields.controls]
     labels += [readout.label for readout in lab.fields.readouts]

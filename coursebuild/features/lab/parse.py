@@ -114,7 +114,7 @@ def sim_lab(
     prose: Prose,
 ) -> Lab | None:
     """The simulation that a node describes; none when its fields are not right."""
-    fields, xml = structs.get(node), node.get("xml")
+    fields, xml, goal = structs.get(node), node.get("xml"), node.get("goal")
     if not isinstance(fields, SimLab):
         return None
     return Lab(
@@ -124,6 +124,7 @@ def sim_lab(
         config=node.raw,
         fields=fields,
         note=prose.blocks(node.get("note")),
+        goal=prose.inlines(goal.get("text") if isinstance(goal, ObjectNode) else None),
         xml=xml.excerpt if isinstance(xml, StringNode) else None,
         places=tuple((way, value.mark) for way, value in _values(node, ())),
         code=tuple(

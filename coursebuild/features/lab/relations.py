@@ -46,8 +46,12 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
         struct = structs.get(plot)
         if isinstance(struct, Plot):
             yield from _check_axis(plot, struct)
+    known = {label.value: structs.get(c) for c in controls if (label := _label(c)) is not None}
     for claim in node.objects("expect"):
-        yield from _check_expect(claim, controls, structs)
+        yield from _check_expect(claim, known, structs)
+    goal = node.get("goal")
+    if isinstance(goal, ObjectNode):
+        yield from _check_log(goal, known)
 
 
 def _check_axis(node: ObjectNode, plot: Plot) -> Iterator[Diagnostic]:
@@ -106,9 +110,7 @@ def _check_choice(
     yield diagnose("field-value", node.mark, message, help=help)
 
 
-def _check_expect(
-    node: ObjectNode, controls: tuple[ObjectNode, ...], structs: Structs
-) -> Iterator[Diagnostic]:
+def _check_expect(node: ObjectNode, known: Known, structs: Structs) -> Iterator[Diagnostic]:
     claim = structs.get(node)
     if not isinstance(claim, Expect):
         return
@@ -122,7 +124,6 @@ def _check_expect(
     if claim.min is not None and claim.max is not None and claim.min > claim.max:
         message = f"`max` must be at least `min`, which is {claim.min:g}"
         yield diagnose("field-value", node.place("max"), message)
-    known = {label.value: structs.get(c) for c in controls if (label := _label(c)) is not None}
     after = node.get("after")
     if isinstance(after, ArrayNode):
         for i, step in enumerate(after.items):
@@ -131,8 +132,22 @@ def _check_expect(
         yield from _check_step(after, "after", known)
 
 
+def _check_log(goal: ObjectNode, known: Known) -> Iterator[Diagnostic]:
+    """What is done to reach a goal: by controls that there are, and in order."""
+    before = 0.0
+    for entry in goal.objects("log"):
+        step, time = entry.get("do"), entry.get("t")
+        if step is not None:
+            yield from _check_step(step, "do", known)
+        if isinstance(time, NumberNode):
+            if time.value < before:
+                message = f"`t` must be at least that of the entry before, {before:g}"
+                yield diagnose("field-value", time.mark, message)
+            before = time.value
+
+
 def _check_step(node: Node, name: str, known: Known) -> Iterator[Diagnostic]:
-    """One thing to do before a claim; messages call it `name`."""
+    """One thing to do; messages call it `name`."""
     match node:
         case StringNode():
             yield from _check_pressed(node, known)
@@ -141,19 +156,14 @@ def _check_step(node: Node, name: str, known: Known) -> Iterator[Diagnostic]:
                 yield diagnose("field-value", node.mark, f"`{name}` names no control")
             for member in node.members:
                 if isinstance(known.get(member.key.value), Button):
-                    help = _pressed_instead(member.key.value, node, name)
+                    alone = "write" if len(node.members) == 1 else "press it in a step of its own:"
+                    help = f'{alone} `"{member.key.value}"`'
                     message = f"`{member.key.value}` is a button and has no value"
                     yield diagnose("lab-name", member.key.span, message, help=help)
                 else:
                     yield from _check_moved(member.key, member.value, known)
         case _:
             pass
-
-
-def _pressed_instead(label: str, node: ObjectNode, name: str) -> str:
-    if len(node.members) > 1:
-        return f'press it in a step of its own, as in `"after": [{{…}}, "{label}"]`'
-    return f'write `"{label}"`' if name != "after" else f'write `"after": "{label}"`'
 
 
 def _check_pressed(label: StringNode, known: Known) -> Iterator[Diagnostic]:

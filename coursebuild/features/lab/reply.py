@@ -20,8 +20,8 @@ class TrialFailure(Struct, frozen=True):
 
     entry: Entry
     kind: str
-    """`throws`, `nan`, `type`, `warning`, `diverged`, `deep`, `expect`, `stopAt`, `timeout`,
-    `engine` or `shared`."""
+    """`throws`, `nan`, `type`, `warning`, `diverged`, `deep`, `expect`, `goal`, `stopAt`,
+    `timeout`, `engine` or `shared`."""
     message: str
     time: float | None
     """Simulated time, s."""

@@ -12,7 +12,14 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.syntax.fields import Digits, NotNegative, OptionalBlocks, Positive, Text
+from coursebuild.core.syntax.fields import (
+    Digits,
+    Inlines,
+    NotNegative,
+    OptionalBlocks,
+    Positive,
+    Text,
+)
 
 Overlay: TypeAlias = Literal[
     "frames",
@@ -200,6 +207,27 @@ class Expect(Struct, frozen=True, forbid_unknown_fields=True):
         )
 
 
+class LogEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """Something that is done while a lab runs."""
+
+    t: Annotated[NotNegative, Meta(description="simulated time in seconds")]
+    do: Annotated[
+        Step,
+        Meta(description="the label of a button to press, or values of controls by their labels"),
+    ]
+
+
+class Goal(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the reader is asked to reach; the build proves that the log reaches it."""
+
+    text: Annotated[Inlines, Meta(description="what is asked, a line of Markdown")]
+    expr: Annotated[Text, Meta(description="an expression that gives `true` or `false`")]
+    log: Annotated[tuple[LogEntry, ...], Meta(description="what is done to reach it, in order")]
+    hold: Annotated[
+        NotNegative, Meta(description="how long `expr` has to stay true, in simulated seconds")
+    ] = 0
+
+
 class Verify(Struct, frozen=True, forbid_unknown_fields=True):
     """How much of the lab the build runs."""
 
@@ -249,6 +277,7 @@ class SimLab(Struct, frozen=True, forbid_unknown_fields=True):
     plots: tuple[Plot, ...] = ()
     trail: Annotated[Text | None, Meta(description="a site whose path is drawn")] = None
     expect: Annotated[tuple[Expect, ...], Meta(description="claims that the build proves")] = ()
+    goal: Annotated[Goal | None, Meta(description="what the reader is asked to reach")] = None
     seed: Annotated[
         Annotated[int, Meta(ge=0, le=4294967295)] | None, Meta(description="of random numbers")
     ] = None

@@ -30,6 +30,7 @@ _RULES = {
     "deep": "lab-penetration",
     "expect": "lab-expect",
     "stopAt": "lab-expect",
+    "goal": "lab-goal",
     "timeout": "lab-timeout",
     "engine": "lab-engine",
     "shared": "lab-shared",
@@ -80,6 +81,8 @@ def _named(lab: Lab, entry: Entry) -> str:
             return f"the trace `{lab.fields.plots[i].traces[j].label}`"
         case ("expect", int(i), *_) if i < len(lab.fields.expect):
             return "the claim"
+        case ("goal", *_):
+            return "the goal"
         case (str(name),):
             return f"`{name}`"
         case _:
@@ -209,6 +212,11 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
             expr = lab.fields.expect[int(failure.entry[1])].expr
             what = f"`{_short(expr)}` {message}" if expr is not None else message
             return f"the claim does not hold: {what}", ""
+        case "goal" if failure.entry[-1] == "log":
+            help = "reach it in the preview (`coursebuild serve`), and take what `Copy log` gives"
+            return f"the log does not reach the goal {message}", help
+        case "goal":
+            return f"the goal is reached {message}", "ask for something that has to be done"
         case "timeout" if message == "did not finish in time":
             return f"trying {name} takes too long", f"run less of it: {_written(lab, 'seconds')}"
         case "timeout":

@@ -9,8 +9,9 @@ const leave = new WeakMap() // lab → how to end what was begun for it
 /**
  * @param {Document | Element} part of the page
  * @param {(key: string) => string} words
+ * @param {object} progress see progress/store.js
  */
-export function loadLabs(part, words) {
+export function loadLabs(part, words, progress) {
   const labs = within(part, '[data-lab][data-config]')
   if (labs.length === 0) return
   // A page opened from disk may load neither modules nor data: the recorded form stays.
@@ -19,7 +20,7 @@ export function loadLabs(part, words) {
     near.unobserve(lab)
     // Relative to the page: a script that is no module would take its own address.
     const mounted = import(new URL(lab.dataset.script, document.baseURI).href).then(
-      ({ mountLab }) => mountLab(lab, words),
+      ({ mountLab }) => mountLab(lab, words, progress),
       () => tell(lab, words('lab.live.no_script')),
     )
     leave.set(lab, () => mounted.then((instrument) => instrument?.dispose?.()))

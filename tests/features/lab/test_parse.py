@@ -51,6 +51,8 @@ COMPLETE = r"""{
              {"t": 1, "expr": "2", "max": 2},
              {"after": [{"mass": 2}, "Spin", {"mode": "f", "gain": 1}], "t": 0, "expr": "1",
               "min": 1}],
+  "goal": {"text": "Let it *fly*.", "expr": "up", "hold": 2,
+           "log": [{"t": 0, "do": {"gain": 1, "mass": 2}}, {"t": 0.5, "do": "Spin"}]},
   "seed": 4294967295, "verify": {"seconds": 3, "rtol": 0}
 }"""
 
@@ -82,6 +84,13 @@ def test_a_complete_lab() -> None:
         (),
         ({"mass": 2.0}, "Spin", {"mode": "f", "gain": 1.0}),
     ]
+    goal = fields.goal
+    assert goal is not None and (goal.expr, goal.hold) == ("up", 2)
+    assert [(entry.t, entry.do) for entry in goal.log] == [
+        (0, {"gain": 1, "mass": 2}),
+        (0.5, "Spin"),
+    ]
+    assert [inline.span.text for inline in lab.child_inlines()] == ["Let it *fly*."]
     assert (lab.verify.seconds, lab.verify.rtol, lab.verify.deep) == (3.0, 0.0, False)
 
 

@@ -15,6 +15,7 @@ CLAIM = LAB % (
     ' {"type": "select", "label": "int", "options": [["x", 1], ["y", "b"]], "set": "i"}],\n'
     '"expect": [{%s}]'
 )
+GOAL = CLAIM.replace('"expect": [{%s}]', '"goal": {"text": "Up", "expr": "up", %s}')
 
 
 @pytest.mark.parametrize(
@@ -133,10 +134,10 @@ CLAIM = LAB % (
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"mm": 1}',
          "3:54-58 lab-name: the lab has no control `mm` [did you mean `m`?]"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"Go": 1}',
-         '3:54-58 lab-name: `Go` is a button and has no value [write `"after": "Go"`]'),
+         '3:54-58 lab-name: `Go` is a button and has no value [write `"Go"`]'),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"m": 1, "Go": 1}',
          "3:62-66 lab-name: `Go` is a button and has no value"
-         ' [press it in a step of its own, as in `"after": [{…}, "Go"]`]'),
+         ' [press it in a step of its own: `"Go"`]'),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"m": 1.5}',
          "3:59-62 field-value: `m` goes from 0 to 1, and cannot be `1.5`"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"m": "x"}',
@@ -167,6 +168,22 @@ CLAIM = LAB % (
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", {"int": null}]',
          "3:68-72 field-type: `int` must be a number or a string, not `null`"
          " [leave the field out]"),
+        # goals
+        (GOAL % '"hold": 1', "3:9-10 field-missing: `log` is missing"
+         " [`log`: what is done to reach it, in order]"),
+        (GOAL % '"log": [], "hold": -1', "3:57-59 field-value: `hold` must be at least 0, not -1"),
+        (GOAL % '"log": [{"t": 0, "do": "Goo"}]',
+         "3:61-66 lab-name: the lab has no button `Goo` [did you mean `Go`?]"),
+        (GOAL % '"log": [{"t": 0, "do": {"m": -0.1}}]',
+         "3:67-71 field-value: `m` goes from 0 to 1, and cannot be `-0.1`"),
+        (GOAL % '"log": [{"t": 0, "do": {"int": "x"}}]', "3:69-72 field-value: `int` cannot be `x`:"
+         " no option has this value [`x` is the label of an option whose value is `1`]"),
+        (GOAL % '"log": [{"t": 0, "do": {"Go": 1}}]',
+         '3:62-66 lab-name: `Go` is a button and has no value [write `"Go"`]'),
+        (GOAL % '"log": [{"t": 0.5, "do": "Go"}, {"t": 0.25, "do": {"m": 1}}]',
+         "3:76-80 field-value: `t` must be at least that of the entry before, 0.5"),
+        (GOAL % '"log": [{"t": 0}]', "3:46-47 field-missing: `do` is missing [`do`: the label"
+         " of a button to press, or values of controls by their labels]"),
     ],
 )  # fmt: skip
 def test_what_an_author_is_told(body: str, expected: str) -> None:

@@ -46,21 +46,31 @@ export class Controls {
     if (control.set && value !== null) call(['controls', i], () => control.set(this.env, value))
   }
 
-  /** Take a new value, which is not yet applied; one that the page could not have sent is refused. */
-  take(i, value) {
+  /** Refuse what the page could not have sent; without a value it is the press of a button. */
+  check(i, value) {
     const control = this.data[i]
-    if (control === undefined || control.type === 'button') throw new RangeError(`control ${i} takes no value`)
+    const presses = value === undefined
+    if (control === undefined || (control.type === 'button') !== presses) {
+      throw new RangeError(`control ${i} ${presses ? 'is not a button' : 'takes no value'}`)
+    }
+    if (presses) return
     const fits =
-      control.type === 'select' ? control.options.some((option) => option[1] === value) : Number.isFinite(value)
+      control.type === 'select'
+        ? control.options.some((option) => option[1] === value)
+        : Number.isFinite(value) && value >= (control.min ?? -Infinity) && value <= (control.max ?? Infinity)
     if (!fits) throw new RangeError(`the control "${control.label}" cannot be set to ${JSON.stringify(value)}`)
+  }
+
+  /** Take a new value, which is not yet applied. */
+  take(i, value) {
+    this.check(i, value)
     this.values[i] = value
   }
 
   /** Run the code of a button. */
   press(i) {
-    const control = this.code[i]
-    if (!control?.run) throw new RangeError(`control ${i} is not a button`)
-    call(['controls', i, 'run'], () => control.run(this.env))
+    this.check(i)
+    call(['controls', i, 'run'], () => this.code[i].run(this.env))
   }
 }
 

@@ -20,6 +20,9 @@ import { Sampler } from './sampler.js'
 import { State } from './state.js'
 import { Watch } from './watch.js'
 
+const MOST_EVENTS = 10_000 // of a log
+const TOLERANCE = 1e-9 // s, of the times in it
+
 export class Lab {
   /**
    * @param {import('./engine.js').Engine} engine
@@ -63,6 +66,7 @@ export class Lab {
     this.view = environment(this, shown, false)
     this.controls = new Controls(config.controls, code.controls, this.env)
     this.warnings = []
+    this.queue = [] // what is left of a log that is replayed
     this.forget()
   }
 
@@ -79,6 +83,7 @@ export class Lab {
 
   /** The keyframe, the parameters, `setup`, then the controls with `init`. */
   reset() {
+    this.queue = []
     this.controls.applyParams()
     this.toKeyframe()
     this.prepare()
@@ -104,6 +109,7 @@ export class Lab {
   forget() {
     this.steps = 0
     this.diverged = null
+    this.log = this.stepping ? null : { values: [...this.values], events: [] }
     this.sampler.clear()
     this.watch.restart()
     this.dirty = true
@@ -144,18 +150,70 @@ export class Lab {
 
   /** Set a slider or a list to a value. */
   setControl(i, value) {
-    this.controls.take(i, value)
-    this.engine.mj.mj_forward(this.model, this.data)
-    this.controls.apply(i)
-    if (this.config.controls[i].reset) this.reset()
-    else this.settle()
+    this.act([i, value], () => {
+      this.controls.take(i, value)
+      this.engine.mj.mj_forward(this.model, this.data)
+      this.controls.apply(i)
+      if (this.config.controls[i].reset) this.reset()
+      else this.settle()
+    })
   }
 
   /** Press a button. */
   press(i) {
-    this.engine.mj.mj_forward(this.model, this.data)
-    this.controls.press(i)
-    this.settle()
+    this.act([i], () => {
+      this.engine.mj.mj_forward(this.model, this.data)
+      this.controls.press(i)
+      this.settle()
+    })
+  }
+
+  /** Do what a reader does, and log it; where a new run begins with it, it is the first event of that. */
+  act(event, action) {
+    const { log } = this
+    const values = [...this.values]
+    const time = Number(this.time.toFixed(9))
+    this.queue = []
+    action()
+    if (this.log === null) return
+    if (this.log !== log) this.log = { values, events: [[0, ...event]] }
+    else if (log.events.length < MOST_EVENTS) log.events.push([time, ...event])
+    else this.log = null
+  }
+
+  // --- the log: what was done in a run since its reset; `null` where the controls alone do not tell the motion
+
+  /**
+   * Begin a run in which all is done again that a log says, each before the first step at its time or later.
+   *
+   * @param {{values: unknown[], events: [number, number, unknown?][], end?: number}} log the values of the controls at its reset; then
+   *   a time, the number of a control and, but for a button, a value; it stops at `end` (s)
+   */
+  replay({ values, events, end = Infinity }) {
+    for (const [, i, value] of events) this.controls.check(i, value)
+    this.restore({ values })
+    this.queue = [...events, [end]]
+    this.log.replayed = true
+  }
+
+  /** Do what the log says is due; `stopAt` at its end. */
+  follow() {
+    const { queue } = this
+    while (queue.length > 0 && this.data.time >= queue[0][0] - TOLERANCE) {
+      const [, i, value] = queue.shift()
+      if (i === undefined) return 'stopAt'
+      if (value === undefined) this.press(i)
+      else this.setControl(i, value)
+      this.queue = queue
+      if (this.log !== null) this.log.replayed = true
+    }
+    return null
+  }
+
+  /** How far the goal is; it counts where the reader has used the controls alone. */
+  get goal() {
+    const { goal } = this.sampler
+    return goal && { held: goal.held, reached: goal.reached, counts: this.log !== null && !this.log.replayed }
   }
 
   setPaused(paused) {
@@ -175,17 +233,19 @@ export class Lab {
    */
   step(n) {
     if (this.stepping) throw new Error('sim.step() within a step is not possible')
-    this.stepping = true
     this.interrupted = false
     let steps = 0
     let stopped = this.diverged === null ? null : 'diverged'
-    try {
-      while (stopped === null && steps < n) {
+    while (stopped === null && steps < n) {
+      stopped = this.follow()
+      if (stopped !== null) break
+      this.stepping = true
+      try {
         stopped = this.one()
-        steps += 1
+      } finally {
+        this.stepping = false
       }
-    } finally {
-      this.stepping = false
+      steps += 1
     }
     return { steps, stopped }
   }
@@ -272,6 +332,8 @@ export class Lab {
    */
   perturb(request) {
     if (request === null) return this.drag.release()
+    this.log = null
+    this.queue = []
     if (request.point) {
       this.engine.mj.mj_forward(this.model, this.data)
       this.drag.grab(request.body, request.point)
@@ -284,7 +346,7 @@ export class Lab {
 
   /** All that the motion depends on, given model and code: can be cloned and sent. */
   state() {
-    return { values: [...this.values], steps: this.steps, time: this.data.time, physics: this.physics.read() }
+    return { values: [...this.values], steps: this.steps, time: this.data.time, physics: this.physics.read(), log: this.log }
   }
 
   /** Go to a state: its controls, a reset, and then its physics where it holds any. */
@@ -298,6 +360,7 @@ export class Lab {
     this.physics.write(physics)
     this.forget()
     this.steps = steps
+    this.log = null
     this.settle()
   }
 }

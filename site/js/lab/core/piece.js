@@ -50,6 +50,12 @@ export function numeric(entry, value) {
   throw new LabError('type', entry, `gives ${describe(value)}, not a number`)
 }
 
+/** A value for a goal. */
+export function condition(entry, value) {
+  if (typeof value === 'boolean') return value
+  throw new LabError('type', entry, `gives ${describe(value)}, not true or false`)
+}
+
 function describe(value) {
   if (value === null || value === undefined) return String(value)
   if (typeof value === 'string') return `the text ${JSON.stringify(value)}`

@@ -1,10 +1,11 @@
 /**
- * What a lab records while it runs: the traces of its plots, and the trail of a site.
+ * What a lab records while it runs: the traces of its plots, the trail of a site, and how long its goal is held.
  *
  * Samples lie on a grid of steps counted from the reset, never on the clock, so that the same run gives the same samples in
  * the page and in the build, at any speed.
  */
 
+import { Goal } from './goal.js'
 import { call, plottable } from './piece.js'
 
 const PER_WINDOW = 600 // samples in the width of a plot
@@ -24,7 +25,8 @@ export class Sampler {
     const windows = config.plots.map((plot) => plot.window ?? DEFAULT_WINDOW)
     this.interval = Math.min(DEFAULT_WINDOW, ...windows) / PER_WINDOW
     this.site = site
-    this.active = this.traces.length > 0 || site >= 0
+    this.goal = config.goal ? new Goal(config.goal, code.goal) : null
+    this.active = this.traces.length > 0 || site >= 0 || this.goal !== null
     this.trail = new Float32Array(site >= 0 ? 3 * TRAIL : 0)
     this.epoch = 0
     this.clear()
@@ -37,6 +39,7 @@ export class Sampler {
     this.values = []
     this.points = 0
     this.last = -Infinity
+    this.goal?.clear()
   }
 
   /** Whether a sample is due after so many steps. */
@@ -60,6 +63,7 @@ export class Sampler {
       const from = 3 * this.site
       this.trail.set(env.data.site_xpos.subarray(from, from + 3), at)
     }
+    this.goal?.look(env)
     this.last = env.data.time
   }
 

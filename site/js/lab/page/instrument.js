@@ -1,19 +1,21 @@
 /**
  * A `simlab` as an instrument: picture, transport, controls, readouts and plots.
  *
- *   const instrument = new Instrument(element, config, base, words)
+ *   const instrument = new Instrument(element, config, base, words, progress)
  *
- * `element` is the lab's place in the page, `config` its JSON, `base` the address of that JSON, to which its addresses are relative.
+ * `element` is the lab's place in the page, `config` its JSON, `base` the address of that JSON, to which its addresses are relative;
+ * `progress` is where a reached goal is kept (progress/store.js), or null.
  */
 
 import { buildControls, buildOverlays, buildReadouts } from './controls.js'
 import { download, h } from './dom.js'
 import { fillScript } from './export.js'
+import { GoalView } from './goal.js'
 import { Notices } from './notices.js'
 import { formatReadout, formatTime } from './numbers.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
-import { writeLink } from './share.js'
+import { writeLink, writeLog } from './share.js'
 import { watchSight } from './sight.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
@@ -27,9 +29,9 @@ const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
 export class Instrument {
-  constructor(element, config, base, words) {
-    Object.assign(this, { element, config, words })
-    this.values = config.controls.map(({ value }) => value ?? null)
+  constructor(element, config, base, words, progress = null) {
+    Object.assign(this, { element, config, words, progress })
+    this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
     this.rest = 0 // timer of what is to be said of a pause
     this.pressed = false
@@ -75,12 +77,23 @@ export class Instrument {
     if (arrows !== null) this.transport.speed.after(arrows)
     this.readouts = buildReadouts(config.readouts, formatReadout)
     this.plots = config.plots.map((plot) => new Plot(plot, words))
+    const goal = config.goal && element.querySelector('.lab-goal')
+    this.goal = goal
+      ? new GoalView(goal, config.goal, words, {
+          progress: this.progress,
+          say: (text) => this.notices.say(text),
+          show: () => this.simulation.replay({ values: this.initial, events: config.goal.log }),
+        })
+      : null
+    this.motion = h('p', { class: 'lab-motion', hidden: true })
     this.body = h(
       'div',
       { class: 'lab-live' },
       h('div', { class: 'lab-screen' }, this.view.element, this.transport.full),
       this.transport.element,
+      this.motion,
       this.notices.shown,
+      this.goal?.element ?? null,
       ...this.plots.map((plot) => plot.element),
       h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.foot()),
       this.notices.spoken,
@@ -104,6 +117,7 @@ export class Instrument {
       { class: 'lab-foot' },
       act(...this.sharing()),
       config.exportPython ? act('export', () => this.export()) : null,
+      document.querySelector('script[data-state]') && !config.kind ? this.logging() : null,
       help,
     )
   }
@@ -124,7 +138,7 @@ export class Instrument {
       diverged: ({ time, message }) => notices.show(words('lab.live.diverged', { t: formatTime(time), message }), 'wrong'),
       warning: ({ time, message }) => notices.show(words('lab.live.warning', { t: formatTime(time), message }), 'warning'),
       error: (error) => notices.failure(error, config),
-      saved: (state) => this.share(state),
+      saved: (state) => this.saved(state),
       noPicture: () =>
         this.view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
     }
@@ -171,9 +185,10 @@ export class Instrument {
   }
 
   /** Numbers and plots follow the picture, though not as often. */
-  refresh({ time, readouts, realtime }, now) {
+  refresh({ time, readouts, realtime, goal }, now) {
     const resting = this.state !== 'playing'
     if (resting || now - this.textAt >= TEXT_EVERY) {
+      this.goal?.show(goal)
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
       this.transport.setTime(time)
@@ -219,22 +234,46 @@ export class Instrument {
     else this.element.requestFullscreen().catch(() => {})
   }
 
-  /** Go to a state of a link, now or when the lab is there. */
+  /** Go to a state of a link, now or when the lab is there; the motion that led to it is offered. */
   restore(state) {
+    const { log } = state
+    const replay = () => this.simulation.replay(log)
+    const button = h('button', { type: 'button', class: 'lab-button', onclick: replay }, this.words('lab.live.motion'))
+    this.motion.replaceChildren(button)
+    this.motion.hidden = !log
     if (this.state === 'loading') this.wanted = state
     else this.simulation.restore(state)
   }
 
   /** What the button for a link says, and does. */
   sharing() {
-    return ['link', () => this.simulation.save()]
+    return ['link', () => this.save((state) => this.share(state))]
+  }
+
+  /** Ask for the state; `saved` is called with it. */
+  save(saved) {
+    this.saved = saved
+    this.simulation.save()
+  }
+
+  /** In the preview: a button for what the author has done, as the `log` of a goal. */
+  logging() {
+    const copy = ({ log }) => {
+      const text = log ? writeLog(log, this.config.controls) : ''
+      const told = text ? navigator.clipboard.writeText(text) : Promise.reject(new Error('no log of a pulled body, or of a link'))
+      told.then(
+        () => this.notices.show('The log is copied.', 'note'),
+        (error) => this.notices.show(text || error.message, 'warning'),
+      )
+    }
+    return h('button', { type: 'button', class: 'lab-text', onclick: () => this.save(copy) }, 'Copy log')
   }
 
   async share(state) {
-    const { link, whole } = await writeLink(this.config.id, state)
+    const { link, only } = await writeLink(this.config.id, state)
     const key = await this.copy(link)
-    if (whole) this.notices.show(this.words(key), 'note')
-    else this.notices.show(`${this.words(key)} ${this.words('lab.live.link_controls')}`, 'warning')
+    if (only === null) this.notices.show(this.words(key), 'note')
+    else this.notices.show(`${this.words(key)} ${this.words(`lab.live.link_${only}`)}`, 'warning')
   }
 
   /** Put a link into the address bar and, where that is allowed, the clipboard; gives the key of the text that says so. */
@@ -257,6 +296,7 @@ export class Instrument {
     this.unwatch()
     clearTimeout(this.rest)
     this.hands.dispose()
+    this.goal?.dispose()
     this.plots.forEach((plot) => plot.dispose())
     this.simulation.dispose()
     this.body.remove()

@@ -1,9 +1,9 @@
 /**
- * A state of a lab in the fragment of a link: `#lab=ID&z=TEXT`.
+ * A state of a lab, and the motion that led to it, in the fragment of a link: `#lab=ID&z=TEXT`.
  *
  * TEXT is base64url of a deflated content: JSON on one line (`v` the values of the controls, `n` the steps since the reset, `t` the
- * time in s), and after the line's end the whole physics as 64-bit floats, to the last bit. Where all this is too long for a link,
- * the physics is left out, and it holds the controls only. A browser that cannot deflate writes `s=TEXT`, the content as it is; in
+ * time in s; `l` the log: the values of the controls at the reset, and what was done since), and after the line's end the whole physics
+ * as 64-bit floats, to the last bit. Where all this is too long for a link, the log is left out, then the physics. A browser that cannot deflate writes `s=TEXT`, the content as it is; in
  * older links that has the physics in the JSON, as base64 (`p`). A model that the reader has written is in the JSON, as `x`.
  */
 
@@ -13,23 +13,33 @@ export const LONGEST = 16_000
 /** Characters of a model. */
 export const LONGEST_MODEL = 100_000
 
+const MOST_EVENTS = 10_000 // of a log
 const LARGEST = 8 << 20 // bytes that a link may unfold to
 const LINE_END = 10
 
 /**
  * @param {string} id
- * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string}} state
- * @returns {Promise<{link: string, whole: boolean}>} `whole`: all of it is there
+ * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string, log?: object | null}} state
+ * @returns {Promise<{link: string, only: 'state' | 'controls' | null}>} `only`: what it holds where not all fitted
  */
-export async function writeLink(id, { values, steps, time, physics, text }) {
-  const head = new TextEncoder().encode(`${JSON.stringify({ v: values, n: steps, t: time, x: text })}\n`)
-  const floats = new Uint8Array(physics.slice().buffer)
-  const all = new Uint8Array(head.length + floats.length)
-  all.set(head)
-  all.set(floats, head.length)
-  const whole = await field(all)
-  const fits = whole.length <= LONGEST
-  return { link: `#lab=${encodeURIComponent(id)}&${fits ? whole : await field(head)}`, whole: fits }
+export async function writeLink(id, { values, steps, time, physics, text, log = null }) {
+  const state = { v: values, n: steps, t: time, x: text }
+  const motion = log && steps > 0 ? { ...state, l: [log.values, log.events] } : state
+  const link = (text) => `#lab=${encodeURIComponent(id)}&${text}`
+  for (const [head, only] of [[motion, null], [state, motion === state ? null : 'state']]) {
+    const whole = await field(content(head, physics))
+    if (whole.length <= LONGEST) return { link: link(whole), only }
+  }
+  return { link: link(await field(content(state, []))), only: 'controls' }
+}
+
+function content(head, physics) {
+  const line = new TextEncoder().encode(`${JSON.stringify(head)}\n`)
+  const floats = new Uint8Array(Float64Array.from(physics).buffer)
+  const all = new Uint8Array(line.length + floats.length)
+  all.set(line)
+  all.set(floats, line.length)
+  return all
 }
 
 async function field(bytes) {
@@ -43,7 +53,7 @@ async function field(bytes) {
  *
  * @param {string} fragment
  * @returns {Promise<{id: string, state: null | {values: unknown[], steps: number, time: number, physics: Float64Array | null,
- *   text?: string}} | null>}
+ *   text?: string, log?: {values: unknown[], events: unknown[][], end: number}}} | null>}
  */
 export async function readLink(fragment) {
   if (!fragment.startsWith('#lab=')) return null
@@ -60,12 +70,31 @@ export async function readLink(fragment) {
 
 function parse(bytes) {
   const end = bytes.includes(LINE_END) ? bytes.indexOf(LINE_END) : bytes.length
-  const { v, n, t, p, x } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
+  const { v, n, t, p, x, l } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
   if (!Array.isArray(v)) return null
   const floats = typeof p === 'string' ? fromBase64(p) : bytes.slice(end + 1)
   const physics = floats.length > 0 ? new Float64Array(floats.buffer) : null
   const state = { values: v, steps: Number.isInteger(n) && n >= 0 ? n : 0, time: Number(t) || 0, physics }
+  if (isLog(l)) state.log = { values: l[0], events: l[1], end: state.time }
   return typeof x === 'string' && x.length <= LONGEST_MODEL ? { ...state, text: x } : state
+}
+
+/** A log as the JSON that an author gives a goal: one line for each thing that was done. */
+export function writeLog({ values, events }, controls) {
+  const changed = values.flatMap((value, i) => (value === (controls[i].value ?? null) ? [] : [[0, i, value]]))
+  const entries = [...changed, ...events].map(([t, i, value]) => {
+    const { label } = controls[i]
+    return JSON.stringify({ t, do: value === undefined ? label : { [label]: value } })
+  })
+  return `"log": [${entries.join(',\n  ')}]`
+}
+
+/** Whether a value has the form of a log; that its controls are there and take its values is for the lab to say. */
+function isLog(value) {
+  if (!Array.isArray(value) || !value.slice(0, 2).every(Array.isArray) || value.length !== 2) return false
+  const isValue = (one) => typeof one === 'string' || Number.isFinite(one)
+  const isEvent = ([time, control, ...rest]) => time >= 0 && Number.isFinite(time) && Number.isInteger(control) && rest.length <= 1 && rest.every(isValue)
+  return value[1].length <= MOST_EVENTS && value[0].every((one) => one === null || isValue(one)) && value[1].every((event) => Array.isArray(event) && isEvent(event))
 }
 
 /** Bytes through a stream that deflates or inflates them. */

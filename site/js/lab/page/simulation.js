@@ -9,7 +9,7 @@
  *   state(state, reason)   'loading', 'paused', 'playing', 'ended' (it will not run again)
  *   ready({scene, values, time, version})
  *   samples({epoch, times, values}, fresh)   `fresh`: a new run began, samples before these are of another
- *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts}
+ *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal}
  *   controls(values)       lab code may have changed them
  *   diverged({time, kind, message}), warning({time, kind, message}), error({message, entry, kind, fatal}), saved(state)
  *   noPicture()            the browser has no WebGL
@@ -118,6 +118,11 @@ export class Simulation {
 
   restore(state) {
     this.send({ type: 'restore', state })
+  }
+
+  /** Play what a log says, from its reset. */
+  replay(log) {
+    this.send({ type: 'replay', log })
   }
 
   /** What is out of sight makes no steps. */

@@ -70,8 +70,8 @@ export class Workbench extends Instrument {
   async shareModel() {
     const { words, notices, config, editor } = this
     const state = { values: [], steps: 0, time: 0, physics: new Float64Array(), text: editor.text }
-    const { link, whole } = await writeLink(config.id, state)
-    if (whole) notices.show(words(await this.copy(link)), 'note')
+    const { link, only } = await writeLink(config.id, state)
+    if (only === null) notices.show(words(await this.copy(link)), 'note')
     else notices.show(words('lab.live.link_long'), 'warning')
   }
 

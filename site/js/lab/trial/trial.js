@@ -6,6 +6,7 @@
  * 1. The main run: from the start, stepping as Play does. It gives the lab's static form and the material for parity.
  * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and with some steps after.
  * 3. Every claim (`expect`), from a fresh start; claims after the same steps share a run.
+ * 4. The goal: its log has to reach it, and doing nothing must not.
  *
  * The same request gives the same reply, but for `stepsPerSecond`.
  */
@@ -46,6 +47,8 @@ export function runTrial(engine, request, bytes, now, guard = null) {
   return new Trial(engine, request, request.config.xml ?? bytes, now, guard).run()
 }
 
+const rounded = (time) => Number(time.toFixed(3))
+
 class Trial {
   constructor(engine, { config, code, seconds = null, parity = true }, bytes, now, guard) {
     this.engine = engine
@@ -81,6 +84,7 @@ class Trial {
         })
       }
       this.claims()
+      this.goal()
       if (reply.main !== null && this.took === 0) this.pace(reply.main)
       if (reply.main !== null) this.frame(reply.main)
     } catch (error) {
@@ -354,6 +358,34 @@ class Trial {
       claims.sort((a, b) => a.t - b.t)
       this.attempt(['expect', claims[0].i], this.describe(claims[0].after), (lab) => this.prove(lab, claims))
     }
+  }
+
+  goal() {
+    const { goal, stopAt } = this.config
+    if (!goal) return
+    const { hold, log } = goal
+    const wanted = this.seconds ?? stopAt ?? SECONDS
+    const reached = this.attempt(['goal', 'log'], 'the log of the goal', (lab) => {
+      lab.replay({ values: [...lab.values], events: log })
+      const found = this.pursue(lab, (log.at(-1)?.[0] ?? 0) + hold + wanted)
+      const held = hold > 0 ? `it is held for ${rounded(found.longest)} s at the most, not ${hold} s` : 'its condition is never true'
+      if (found.reached === null) this.fail(['goal', 'log'], 'goal', `by ${rounded(lab.time)} s: ${held}`, lab.time)
+      return found.reached
+    })
+    this.attempt(['goal', 'expr'], 'the goal with nothing done', (lab) => {
+      const found = this.pursue(lab, log.length > 0 ? Math.max(wanted, reached ?? 0) : lab.time)
+      if (found.reached === null) return
+      const when = lab.steps === 0 ? 'at the start' : `with nothing done, at ${rounded(found.reached)} s`
+      this.fail(['goal', 'expr'], 'goal', when, found.reached)
+    })
+  }
+
+  /** Step until the goal is reached, or until time `t`. */
+  pursue(lab, t) {
+    const { goal } = lab.sampler
+    const open = () => goal.reached === null && lab.diverged === null && t - lab.time > lab.option.timestep / 2
+    while (open()) this.advance(lab, Math.min(t, lab.time + Math.max(0.5, lab.option.timestep)))
+    return goal
   }
 
   /** @param {(string | Record<string, number | string>)[]} after buttons to press and values of controls, in order */

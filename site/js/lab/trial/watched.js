@@ -40,6 +40,7 @@ export function watchedCode(code, guard) {
     readouts: list('readouts'),
     plots: code.plots.map((traces, i) => traces.map((run, j) => watch(['plots', i, 'traces', j, 'expr'], run))),
     expect: list('expect'),
+    goal: watch(['goal', 'expr'], code.goal),
   }
   return { code: watched, entry: () => guilty }
 }

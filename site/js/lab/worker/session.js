@@ -137,7 +137,7 @@ export class Session {
     this.guard(() => {
       while (owed > 0 && this.playing && this.now() - begun < budget) {
         const started = this.now()
-        const made = this.lab.step(Math.min(owed, this.chunk))
+        const made = this.advance(Math.min(owed, this.chunk))
         steps += made.steps
         owed -= made.steps
         this.adapt(this.now() - started, made.steps)
@@ -149,6 +149,14 @@ export class Session {
     if (steps > 0) this.stale = true
     if (!this.playing) return Infinity
     return owed > 0 ? 0 : Math.max(1, 1000 * this.clock.wait(timestep))
+  }
+
+  /** Step, and tell what a log that is replayed has done meanwhile. */
+  advance(steps) {
+    const { length } = this.lab.queue
+    const made = this.lab.step(steps)
+    if (this.lab.queue.length !== length) this.changed()
+    return made
   }
 
   /** Choose how many steps to make between two looks at the clock. */
@@ -179,7 +187,7 @@ export class Session {
     const frame = lab.frame(this.buffers.pop())
     const samples = lab.sampler.take()
     const realtime = this.playing ? this.clock.ratio() : 1
-    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon }
+    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal }
     this.post('frame', rest, [frame.buffer, samples.times.buffer, samples.values.buffer])
   }
 }
@@ -190,7 +198,7 @@ const HANDLERS = {
   pause: (session) => session.stop('user'),
   step(session, { n }) {
     session.stop('user')
-    const { stopped } = session.lab.step(n ?? 1)
+    const { stopped } = session.advance(n ?? 1)
     session.stale = true
     session.report()
     if (stopped === 'stopAt') session.post('paused', { reason: 'stopAt' })
@@ -222,6 +230,12 @@ const HANDLERS = {
     session.lab.restore(state)
     session.clock.stop()
     session.changed()
+  },
+  replay(session, { log }) {
+    session.lab.replay(log)
+    session.clock.stop()
+    session.changed()
+    session.play()
   },
 }
 
