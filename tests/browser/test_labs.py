@@ -348,6 +348,58 @@ def test_motion_that_is_not_welcome_begins_with_a_press_or_a_move(
         reach(page, SWING, "playing")
 
 
+# ------------------------------------------------------------------------------- the goal
+
+
+def test_goal_is_reached_kept_and_its_motion_shown_to_others(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    with browsers["webgl"].new_context(has_touch=True) as context:
+        page, said = watched(context)
+        page.goto(base + PAGE)
+        swing = lab(page)
+        goal = swing.locator(".lab-live .lab-goal")
+        expect(goal).to_contain_text("Push it over the top.")
+        expect(goal).to_contain_text("0.00 s of 0.2 s")
+        swing.get_by_role("button", name="Push").tap()
+        page.keyboard.press("Enter")  # a second push
+        swing.get_by_role("button", name="Play").tap()
+        expect(goal).to_contain_text(re.compile(r"Reached at 0\.\d\d s\."))
+        expect(swing.locator(".lab-announce")).to_have_text(re.compile(r"^Reached at 0\."))
+        assert violations(page, ".lab") == []
+        press(swing, "Pause")
+        state = state_of(page, swing)
+        assert state["l"] == [[9.8, 2.5, None], [[0, 2], [0, 2]]]
+        link = page.evaluate("() => location.href")
+
+        other, also_said = watched(context)
+        other.goto(link)
+        again = lab(other)
+        expect(again.locator(".lab-live .lab-goal")).to_contain_text("Reached before.")
+        press(again, "Play the motion of this link")
+        reach(other, SWING, "playing")
+        reach(other, SWING, "paused")
+        shown = state_of(other, again)
+        assert (shown["n"], shown["l"]) == (state["n"], state["l"])
+        assert floats(shown).tobytes() == floats(state).tobytes()
+        other.goto(base + "progress/index.html")
+        expect(other.locator('[data-progress="overall"]')).to_contain_text("1 of 1 task done")
+        assert [*said, *also_said] == []
+
+
+def test_goal_that_was_shown_does_not_count(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    goal = swing.locator(".lab-live .lab-goal")
+    press(swing, "Show me")
+    comes(page, lambda: float(readout(swing, "angle")) > 4)
+    expect(goal).to_contain_text("This run does not count")
+    press(swing, "Reset")
+    expect(goal).to_contain_text("0.00 s of 0.2 s")
+    expect(goal).not_to_contain_text("Reached")
+
+
 # ------------------------------------------------------------------------- what goes wrong
 
 
