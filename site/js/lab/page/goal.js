@@ -47,9 +47,9 @@ export class GoalView {
     const { words, hold, now } = this
     const { held, reached, counts } = now
     let text = hold > 0 ? words('lab.live.goal_held', { t: formatTime(held), hold }) : ''
-    if (!counts) text = words('lab.live.goal_other')
-    else if (reached !== null) text = words('lab.live.goal_reached', { t: formatTime(reached) })
+    if (reached !== null) text = words('lab.live.goal_reached', { t: formatTime(reached) })
     else if (this.kept) text = `${words('lab.live.goal_kept')} ${text}`
+    if (!counts && !this.kept) text += ` ${words('lab.live.goal_other')}`
     this.bar.value = reached === null ? held : hold
     if (text === this.shown) return
     this.shown = text
