@@ -177,7 +177,7 @@ def test_the_labs_of_lesson_4_2_are_exported(tmp_path: Path) -> None:
     assert found == ()
     ours = {r.line.name: r for r in results if r.line.tried}
     assert {name: r.line.unexported for name, r in ours.items()} == dict.fromkeys(ours, "")
-    assert len(ours) == 2
+    assert len(ours) == 3
     (root / "examples").mkdir()
     first = ours["4.2-lab-1"]
     printed = script(root / "examples", first, *[0] * 3, 1)
