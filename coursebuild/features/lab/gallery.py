@@ -70,7 +70,9 @@ def model_view(library: Library, place: urls.Place, model: MjcfModel) -> LabView
 
 def draw_model(tools: Tools, view: LabView) -> Markup:
     """The lab on the page of its model."""
-    return tools.render("lab/lab.html", lab=view, docked=False, paper=None, source="", note="", goal="")
+    return tools.render(
+        "lab/lab.html", lab=view, docked=False, paper=None, source="", note="", goal=""
+    )
 
 
 def model_picture(library: Library, model: MjcfModel) -> Picture | None:
