@@ -10,8 +10,11 @@ as they were, what it printed counts as if it had run now.
 
 from __future__ import annotations
 
+import os
+import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 import msgspec
 from msgspec import Struct
@@ -20,6 +23,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
+    Dependency,
     Inputs,
     Kind,
     input_changes,
@@ -34,9 +38,6 @@ from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.reports.records import FOLDER
 from coursebuild.pipeline.options import Options
-
-_OF_THE_PROJECT = (Kind.FILE, Kind.LISTING, Kind.SOUGHT)
-"""What is the same on every machine that has the course."""
 
 
 class RecordedRun(Struct, frozen=True):
@@ -97,7 +98,7 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         looked = looked_at(run, (), states.places, states)
         record = record_of(
             _inputs(extraction),
-            tuple(one for one in looked if one.kind in _OF_THE_PROJECT),
+            tuple(_of_the_project(looked, options.root)),
             int(time.time()),
             "",
             replace(run, seconds=round(run.seconds, 1), stderr="", figures=()),
@@ -111,6 +112,16 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         data = msgspec.json.format(msgspec.json.encode(kept), indent=2) + b"\n"
         expected = file.read_bytes() if file.exists() else None
         write_atomic(options.root, path, data, expected=expected)
+
+
+def _of_the_project(looked: Iterable[Dependency], root: Path) -> Iterator[Dependency]:
+    """What is the same on every machine; an environment in the folder of the course is not."""
+    environment = os.path.relpath(sys.prefix, root) + os.sep
+    for one in looked:
+        if one.kind in (Kind.FILE, Kind.LISTING, Kind.SOUGHT) and not one.name.startswith(
+            environment
+        ):
+            yield one
 
 
 def _inputs(extraction: Extraction) -> Inputs:
