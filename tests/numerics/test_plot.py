@@ -120,8 +120,9 @@ def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
 def test_a_cost_has_a_bar_as_wide_as_its_interval() -> None:
     wide = Interval(1.0, 0.5, 2.0)
     root = drawn(scenario([replace(row(), cost=wide), row("RK4", 0.01), row("RK4", 1e-4)]))
-    bars = [p.attrib["d"] for p in root.iter("path") if re.search(r"v6M\S+ \S+v6$", p.attrib["d"])]
-    widths = [float(d.split("H")[1].split("M")[0]) - float(d.split()[0][1:]) for d in bars]
+    paths = " ".join(one.attrib["d"] for one in root.iter("path"))
+    bars = re.findall(r"M([\d.]+) [\d.]+H([\d.]+)M\S+ [\d.]+v6M", paths)
+    widths = [float(end) - float(start) for start, end in bars]
     assert len(bars) == 3 and widths[0] > 20 * max(widths[1:])
 
 

@@ -42,6 +42,7 @@ from coursebuild.numerics.reports.strokes import (
     ring,
     svg,
     symbol,
+    symbols,
 )
 
 WIDE, NARROW, BESIDE = (620.0, 320.0), (350.0, 260.0), (430.0, 236.0)
@@ -156,8 +157,7 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
             d = "M" + "L".join(f"{across:.1f} {down:.1f}" for across, down in joined)
             yield path(d, line_look(line.number))
     for line in chart.lines:
-        for point in sorted(line.points, key=lambda point: point.small):
-            yield from _mark(point, line.number, x, y)
+        yield from _marks(line, x, y)
         yield from (ring(*_place(one, x, y), RING) for one in line.points if one.ringed)
     if not chart.marks:
         yield from _names(chart, x, y)
@@ -183,16 +183,20 @@ def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
     return x(point.x.value), y.end - 6 if point.y is None else y(point.y)
 
 
-def _mark(point: Point, number: int, x: Scale, y: Scale) -> Iterator[str]:
-    """A run with its interval."""
-    across, down = _place(point, x, y)
-    if point.y is None:
-        yield cross(across, down, colour(number), point.title)
-    else:
+def _marks(line: Line, x: Scale, y: Scale) -> Iterator[str]:
+    """The runs of a line with their intervals."""
+    paint, bars, marks = colour(line.number), "", []
+    for point in sorted(line.points, key=lambda point: point.small):
+        across, down = _place(point, x, y)
+        if point.y is None:
+            yield cross(across, down, paint, point.title)
+            continue
         if point.x.high > point.x.low:
-            yield bar(x(point.x.low), x(point.x.high), down, number)
+            bars += bar(x(point.x.low), x(point.x.high), down)
         size = SMALL if point.small else MARK
-        yield symbol(number, across, down, size, full=point.full, title=point.title)
+        marks.append(symbol(line.number, across, down, size, full=point.full, title=point.title))
+    yield path(bars, f'stroke="{paint}"') if bars else ""
+    yield symbols(line.number, marks)
 
 
 def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:

@@ -94,23 +94,25 @@ def cross(x: float, y: float, paint: str, title: str = "") -> str:
     return f'<path d="{d}" fill="none" stroke="{paint}" stroke-width="1.8">{_title(title)}</path>'
 
 
-def symbol(number: int, x: float, y: float, size: float, *, full: bool, title: str = "") -> str:
-    """The mark of a run; `full` where it is on the front."""
+def symbols(number: int, marks: Iterable[str]) -> str:
+    """Marks of a line, in its colour."""
     paint = colour(number)
-    return (
-        f'<path d="{mark(number, x, y, size)}" fill="{paint if full else PAPER}" '
-        f'stroke="{paint}" stroke-width="1.5">{_title(title)}</path>'
-    )
+    return f'<g fill="{paint}" stroke="{paint}" stroke-width="1.5">{"".join(marks)}</g>'
+
+
+def symbol(number: int, x: float, y: float, size: float, *, full: bool, title: str = "") -> str:
+    """The mark of a run, among `symbols`; `full` where it is on the front."""
+    look = "" if full else f' fill="{PAPER}"'
+    return f'<path d="{mark(number, x, y, size)}"{look}>{_title(title)}</path>'
 
 
 def _title(text: str) -> str:
     return f"<title>{markup_text(text)}</title>" if text else ""
 
 
-def bar(low: float, high: float, y: float, number: int) -> str:
-    """The interval of a value, with an end at each side."""
-    d = f"M{low:.1f} {y:.1f}H{high:.1f}M{low:.1f} {y - 3:.1f}v6M{high:.1f} {y - 3:.1f}v6"
-    return path(d, f'stroke="{colour(number)}"')
+def bar(low: float, high: float, y: float) -> str:
+    """The path of an interval, with an end at each side."""
+    return f"M{low:.1f} {y:.1f}H{high:.1f}M{low:.1f} {y - 3:.1f}v6M{high:.1f} {y - 3:.1f}v6"
 
 
 def ring(x: float, y: float, radius: float) -> str:
@@ -138,7 +140,7 @@ def _key_mark(entry: Entry, x: float, y: float) -> Iterator[str]:
     """The mark that stands before an entry of the key."""
     if entry.number is not None:
         yield path(f"M{x - 13:.1f} {y:.1f}h26", line_look(entry.number))
-        yield symbol(entry.number, x, y, MARK, full=True)
+        yield symbols(entry.number, [symbol(entry.number, x, y, MARK, full=True)])
     elif entry.kind == "own":
         yield ring(x, y, 6)
     elif entry.kind == "lost":

@@ -22,6 +22,7 @@ from coursebuild.numerics.reports.strokes import (
     TICK_SIZE,
     Entry,
     bar,
+    colour,
     key,
     label,
     line_look,
@@ -29,6 +30,7 @@ from coursebuild.numerics.reports.strokes import (
     ring,
     svg,
     symbol,
+    symbols,
 )
 from coursebuild.numerics.reports.sweep import (
     FIGURES,
@@ -131,8 +133,8 @@ def _group(
             yield label(scale.start, y + 4, text, FINE)
             continue
         x, title = scale(found.value), f"{row.parameter} {row.value}: {cell(row, figure)}"
-        yield bar(scale(found.low), scale(found.high), y, number)
-        yield symbol(number, x, y, MARK, full=True, title=title)
+        yield path(bar(scale(found.low), scale(found.high), y), f'stroke="{colour(number)}"')
+        yield symbols(number, [symbol(number, x, y, MARK, full=True, title=title)])
         if row.own:
             yield ring(x, y, 7)
 
