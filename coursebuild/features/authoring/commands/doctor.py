@@ -19,7 +19,7 @@ from msgspec import Struct
 from coursebuild.cli.output import CLEAN, WRONG, style_of, write
 from coursebuild.core.engine.memo import SIZE
 from coursebuild.core.files.course_root import find_course_root
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.run.versions import engine_version, python_version
@@ -62,6 +62,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Try each, and print a line at once."""
     folder = Path(arguments.root or find_course_root(".") or ".").resolve()
+    if not folder.is_dir():
+        raise UsageError(f"there is no folder {arguments.root}")
     style, status = style_of(sys.stdout), CLEAN
     for find in (_python, _mujoco, _lab_engine, _fonts, _folder, _locks, _disk, _rendering):
         for found in find(folder):
