@@ -2,6 +2,7 @@
 
 import { addCopyButtons } from './page/copy.js'
 import { followContents } from './page/contents.js'
+import { followPredictions, gatePredictions } from './page/gates.js'
 import { leaveLabs, loadLabs } from './page/labs.js'
 import { keepOffline } from './page/offline.js'
 import { addLineNumbers, followLines } from './page/lines.js'
@@ -32,6 +33,8 @@ addThemeSwitch(document, words)
 addSearch(document, words)
 settleAnswers(document, progress)
 improve(document)
+gatePredictions(document, words, progress)
+followPredictions(document, progress)
 let leaveProgress = showProgress(document, words, progress, improve)
 let leaveContents = followContents(document)
 let leaveNotes = placeNotes(document)
@@ -47,6 +50,7 @@ document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }
   if (!document.querySelector('.theme')) addThemeSwitch(document, words)
   addSearch(document, words)
   added.forEach(improve)
+  gatePredictions(document, words, progress)
   addLineNumbers(document, words) // of a listing of which only lines were replaced
   leaveContents()
   leaveContents = followContents(document)

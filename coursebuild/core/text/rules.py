@@ -301,6 +301,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("question-id-repeated", "error", "Two questions of a quiz have the same id."),
     ("quiz-answer", "error", "The answer of a question is not one of its options."),
     ("quiz-output", "error", "An output question names a script or a line that no run has."),
+    ("quiz-gate", "error", "A prediction has nothing to hide below it, or no lab to run."),
     (
         "package-reduced",
         "warning",

@@ -1,6 +1,6 @@
 """What hangs together inside a `simlab`.
 
-Entry point: `check_lab(node, structs)`.
+Entry points: `check_lab(node, structs)`; `check_steps`, of a field that presses and sets controls.
 
 Each part is checked as far as its own fields are right, so that one misspelt field does not hide
 what is wrong elsewhere.
@@ -124,12 +124,17 @@ def _check_expect(node: ObjectNode, known: Known, structs: Structs) -> Iterator[
     if claim.min is not None and claim.max is not None and claim.min > claim.max:
         message = f"`max` must be at least `min`, which is {claim.min:g}"
         yield diagnose("field-value", node.place("max"), message)
-    after = node.get("after")
-    if isinstance(after, ArrayNode):
-        for i, step in enumerate(after.items):
-            yield from _check_step(step, f"after[{i}]", known)
-    elif after is not None:
-        yield from _check_step(after, "after", known)
+    if (after := node.get("after")) is not None:
+        yield from check_steps(after, "after", known)
+
+
+def check_steps(node: Node, name: str, known: Known) -> Iterator[Diagnostic]:
+    """The field `name`: what is done with the controls, one thing or a list of them."""
+    if isinstance(node, ArrayNode):
+        for i, step in enumerate(node.items):
+            yield from _check_step(step, f"{name}[{i}]", known)
+    else:
+        yield from _check_step(node, name, known)
 
 
 def _check_log(goal: ObjectNode, known: Known) -> Iterator[Diagnostic]:

@@ -5,7 +5,7 @@ with the course and with what scripts printed, `page`, `markdown` and `search` s
 """
 
 from coursebuild.core.features import Feature, FenceKind, PagePart
-from coursebuild.features.quiz.checks import check_output_lines, check_quizzes
+from coursebuild.features.quiz.checks import check_output_lines, check_predictions, check_quizzes
 from coursebuild.features.quiz.markdown import quiz_markdown
 from coursebuild.features.quiz.model import Quiz
 from coursebuild.features.quiz.page import quiz
@@ -24,8 +24,10 @@ FEATURE = Feature(
             draw=quiz,
             markdown=quiz_markdown,
             index=index_quiz,
+            wide=False,
         ),
     ),
+    summary=check_predictions,
     check=check_quizzes,
     check_runs=check_output_lines,
     parts=(PagePart(mark="data-quiz=", bundled="quiz.js", late=True, texts=("quiz.live.",)),),

@@ -1,16 +1,33 @@
-"""Quizzes across the course: ids are unique, `output` questions name a script of the course.
+"""Quizzes across the course: ids are unique, questions name scripts and labs that there are.
 
-Entry points: `check_quizzes`; `check_output_lines`, once the scripts have run.
+Entry points: `check_quizzes`; `check_predictions`, in the text of a document; `check_output_lines`,
+once the scripts have run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 
-from coursebuild.core.model import Course, Document, Heading, document_blocks, document_scripts
+from msgspec import Struct
+
+from coursebuild.core.features import Mathml
+from coursebuild.core.model import (
+    Block,
+    CodeBlock,
+    Course,
+    Document,
+    Heading,
+    ThematicBreak,
+    document_blocks,
+    document_scripts,
+)
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.features.quiz.model import Quiz
+from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.source import Excerpt
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
 
 
 def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
@@ -58,6 +75,46 @@ def _taken_anchors(document: Document) -> Iterator[Diagnostic]:
                     help="it is the address of a question; choose another one here",
                     notes=[Note("in this quiz", quiz.id_span)],
                 )
+
+
+def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:
+    """Predictions with nothing below them to hide, or no lab there to run: from all of a text."""
+    found = (_predictions(quiz, _below(quiz, document)) for quiz in quizzes(document))
+    return Parsed(None, tuple(chain.from_iterable(found)))
+
+
+def _below(quiz: Quiz, document: Document) -> tuple[Block, ...]:
+    """What follows a quiz, up to the next heading or rule; nothing where it is inside a block."""
+    at = next((at for at, block in enumerate(document.blocks) if block is quiz), None)
+    rest = () if at is None else document.blocks[at + 1 :]
+    ends = (i for i, block in enumerate(rest) if isinstance(block, Heading | ThematicBreak))
+    return rest[: next(ends, None)]
+
+
+def _predictions(quiz: Quiz, below: tuple[Block, ...]) -> Iterator[Diagnostic]:
+    labs = [block for block in below if isinstance(block, Lab)]
+    for question in quiz.questions:
+        if not isinstance(question, ChoiceQuestion):
+            continue
+        if question.gate and below in ((), tuple(labs[:1])):
+            message = "nothing follows that could be hidden"
+            help = "what answers the question stands below the quiz, before the next heading"
+            yield diagnose("quiz-gate", question.gate_span, message, help=help)
+        if question.run is not None:
+            yield from _run(question.run, labs, below)
+
+
+def _run(run: Excerpt, labs: list[Lab], below: tuple[Block, ...]) -> Iterator[Diagnostic]:
+    if labs:
+        from coursebuild.features.lab.relations import check_steps
+
+        node = parse_json(run, run.span()).value
+        controls = {control.label: control for control in labs[0].fields.controls}
+        yield from () if node is None else check_steps(node, "run", controls)
+    elif not any(isinstance(block, CodeBlock) and block.language == "lab" for block in below):
+        message = "no lab follows that could be run"
+        help = "the lab stands below the quiz, before the next heading"
+        yield diagnose("quiz-gate", run.span(), message, help=help)
 
 
 def _output_questions(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagnostic]:

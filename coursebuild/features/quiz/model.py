@@ -12,7 +12,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Block, FeatureBlock, Inline
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.model import Lab
 
 
@@ -50,6 +50,11 @@ class ChoiceQuestion(Question, frozen=True):
     sim: Lab | None
     """For `predict`: opened once the learner has committed to an answer."""
     predict: bool
+    gate: bool
+    """Whether what follows the quiz is hidden until the learner has answered."""
+    gate_span: Span
+    run: Excerpt | None
+    """What is then done with the next lab of the section, as JSON."""
 
 
 class NumericQuestion(Question, frozen=True):

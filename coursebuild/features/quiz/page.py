@@ -116,10 +116,13 @@ def _question(page: PageContext, block: Quiz, question: AnyQuestion, number: int
         case ChoiceQuestion():
             kind = "predict" if question.predict else "several" if question.several else "mcq"
             options = _options(page, question)
+            right = " ".join(option.key for option in options if option.right)
+            gate = (("gate", ""),) if question.gate else ()
+            run = () if question.run is None else (("run", question.run.text),)
             return replace(
                 view,
                 kind=kind,
-                data=(("answer", " ".join(option.key for option in options if option.right)),),
+                data=(("answer", right), *gate, *run),
                 options=options,
                 several=question.several,
                 simulation=page.block(question.sim) if question.sim is not None else Markup(),

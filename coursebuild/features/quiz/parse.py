@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.fields import repeated
+from coursebuild.core.syntax.fields import has_value, repeated
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
@@ -207,7 +207,19 @@ def _question(
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
             options = _choices(node, fields.options, prose)
             predict = isinstance(fields, Predict)
-            return ChoiceQuestion(*common, options, tuple(sorted(answers)), several, lab, predict)
+            gate = isinstance(fields, Predict) and fields.gate
+            run = node.get("run") if has_value(node, "run") else None
+            return ChoiceQuestion(
+                *common,
+                options=options,
+                answers=tuple(sorted(answers)),
+                several=several,
+                sim=lab,
+                predict=predict,
+                gate=gate,
+                gate_span=node.place("gate"),
+                run=None if run is None else run.body.slice(run.start, run.end),
+            )
         case Numeric():
             answer: Node | None = node.get("answer")
             written = answer.raw if answer is not None else ""

@@ -12,7 +12,7 @@ from typing import Annotated, TypeAlias
 from msgspec import Meta, Struct
 
 from coursebuild.core.syntax.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
-from coursebuild.features.lab.schema import SimLab
+from coursebuild.features.lab.schema import SimLab, Step
 
 Index: TypeAlias = Annotated[int, Meta(extra_json_schema={"minimum": 0})]
 """Of an option; that it is one is checked in `quiz`."""
@@ -64,9 +64,22 @@ class MultipleChoice(Chosen, frozen=True, kw_only=True, tag_field="kind", tag="m
 
 
 class Predict(Chosen, frozen=True, kw_only=True, tag_field="kind", tag="predict"):
-    """A prediction: the simulation opens once the learner has committed to an answer."""
+    """A prediction: what shows the answer opens once the learner has committed to one."""
 
     sim: Annotated[SimLab | None, Meta(description="the simulation that shows the answer")] = None
+    gate: Annotated[
+        bool,
+        Meta(
+            description="hides what follows the quiz, up to the next heading, but for the next lab"
+        ),
+    ] = False
+    run: Annotated[
+        Step | tuple[Step, ...] | None,
+        Meta(
+            description="starts the next lab of the section: the label of a button to press, or "
+            "values of controls by their labels; or a list of these, done in order"
+        ),
+    ] = None
 
 
 class Numeric(Common, frozen=True, kw_only=True, tag_field="kind", tag="numeric"):

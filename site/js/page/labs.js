@@ -1,10 +1,14 @@
-/** Loads labs when they come near. A page without labs loads nothing. */
+/**
+ * Loads labs when they come near. A page without labs loads nothing.
+ *
+ * The event `coursebuild:run` has a lab load at once, and do what the event's detail lists: labels of buttons, and values by label.
+ */
 
 import { within } from './within.js'
 
 const NEAR = '600px 0px' // of the window's edge
 
-const leave = new WeakMap() // lab → how to end what was begun for it
+const mounted = new WeakMap() // lab → a promise of its instrument
 
 /**
  * @param {Document | Element} part of the page
@@ -19,11 +23,10 @@ export function loadLabs(part, words, progress) {
   const start = (lab) => {
     near.unobserve(lab)
     // Relative to the page: a script that is no module would take its own address.
-    const mounted = import(new URL(lab.dataset.script, document.baseURI).href).then(
-      ({ mountLab }) => mountLab(lab, words, progress),
-      () => tell(lab, words('lab.live.no_script')),
-    )
-    leave.set(lab, () => mounted.then((instrument) => instrument?.dispose?.()))
+    const module = mounted.has(lab) ? null : import(new URL(lab.dataset.script, document.baseURI).href)
+    const told = () => tell(lab, words('lab.live.no_script'))
+    if (module) mounted.set(lab, module.then(({ mountLab }) => mountLab(lab, words, progress), told))
+    return mounted.get(lab)
   }
   const near = new IntersectionObserver(
     (entries) => entries.filter((entry) => entry.isIntersecting).forEach(({ target }) => start(target)),
@@ -32,16 +35,19 @@ export function loadLabs(part, words, progress) {
     },
   )
   for (const lab of labs) {
-    leave.set(lab, () => near.unobserve(lab))
     near.observe(lab)
+    lab.addEventListener('coursebuild:run', async ({ detail }) => (await start(lab))?.run?.(detail))
   }
-  const linked = new URLSearchParams(location.hash.slice(1)).get('lab')
+  const linked = linkedLab(location.hash)
   if (part === document) labs.find((lab) => lab.dataset.lab === linked)?.scrollIntoView()
 }
 
+/** The lab whose state an address holds; null where it holds none. */
+export const linkedLab = (hash) => new URLSearchParams(hash.slice(1)).get('lab')
+
 /** End what runs in a part that has gone from the page. */
 export function leaveLabs(part) {
-  for (const lab of within(part, '[data-lab]')) leave.get(lab)?.()
+  for (const lab of within(part, '[data-lab]')) mounted.get(lab)?.then((instrument) => instrument?.dispose?.())
 }
 
 function tell(lab, text) {

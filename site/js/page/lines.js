@@ -28,7 +28,8 @@ export function lineAt(y, height, first, count) {
   return Math.min(Math.max(line, first), first + count - 1)
 }
 
-function decoded(text) {
+/** What a part of an address says. */
+export function decoded(text) {
   try {
     return decodeURIComponent(text)
   } catch {
@@ -46,6 +47,7 @@ function mark(document, lines) {
     line.classList.add('marked')
     const fold = line.closest('details')
     if (fold) fold.open = true
+    line.closest('[hidden]')?.dispatchEvent(new Event('beforematch'))
     found.push(line)
   }
   return found

@@ -75,7 +75,7 @@ function arrange(prose, list, wide) {
 const markOf = (note) => note.ownerDocument.getElementById(note.id.replace('fn:', 'fnref:'))
 
 function heightOf(mark, origin) {
-  const folded = mark?.closest('details:not([open]) > :not(summary)')
+  const folded = mark?.closest('details:not([open]) > :not(summary), [hidden]')
   const box = folded ? null : mark?.getClientRects()[0]
   return box ? box.top - origin - 4 : null
 }

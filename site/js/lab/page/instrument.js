@@ -36,7 +36,7 @@ export class Instrument {
     this.rest = 0 // timer of what is to be said of a pause
     this.pressed = false
     this.begun = false // whether it has moved, or the reader has begun to step
-    this.wanted = null
+    this.wanted = null // what is done when the lab is there
     this.build()
     this.simulation = new Simulation({
       config: { ...config, autoplay: Boolean(config.autoplay) && !prefersStillness() },
@@ -149,7 +149,7 @@ export class Instrument {
     const { wanted, pressed } = this
     this.wanted = null
     this.pressed = false
-    if (wanted !== null) this.simulation.restore(wanted)
+    wanted?.()
     if (pressed) this.simulation.play()
   }
 
@@ -241,8 +241,26 @@ export class Instrument {
     const button = h('button', { type: 'button', class: 'lab-button', onclick: replay }, this.words('lab.live.motion'))
     this.motion.replaceChildren(button)
     this.motion.hidden = !log
-    if (this.state === 'loading') this.wanted = state
-    else this.simulation.restore(state)
+    this.whenReady(() => this.simulation.restore(state))
+  }
+
+  /** From the first state of the controls, press the buttons and set the controls that are listed by their labels, and start. */
+  run(steps) {
+    this.whenReady(() => {
+      const { simulation, config } = this
+      const control = (label) => config.controls.findIndex((one) => one.label === label)
+      simulation.restore({ values: config.controls.map(({ value }) => value ?? null) })
+      if (steps.length === 0) simulation.play()
+      for (const step of steps) {
+        if (typeof step === 'string') simulation.press(control(step), config.controls[control(step)].play)
+        else for (const [label, value] of Object.entries(step)) simulation.set(control(label), value, true)
+      }
+    })
+  }
+
+  whenReady(act) {
+    if (this.state === 'loading') this.wanted = act
+    else act()
   }
 
   /** What the button for a link says, and does. */
