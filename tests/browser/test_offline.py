@@ -286,9 +286,9 @@ def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> Non
     assert page.evaluate("caches.keys()") == []
     assert page.evaluate("navigator.serviceWorker.getRegistrations()") == []
     page.goto(f"{host.url}offline/")
-    page.get_by_label("what was read").check()
+    page.get_by_label("what you have read").check()
     see(page, "files of the course are here.")
-    expect(page.get_by_label("what was read")).to_be_checked()
+    expect(page.get_by_label("what you have read")).to_be_checked()
     assert said == []
 
 

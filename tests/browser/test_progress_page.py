@@ -106,8 +106,8 @@ def test_file_goes_to_another_device(
 
 START = '{"coursebuild":"progress","version":'
 WRONG_FILES = (
-    (b"\xff\xfe\x00", "The file is no saved progress: it can’t be read as JSON"),
-    (b'{"a": 1}', "The file is no saved progress of a course. Nothing was changed."),
+    (b"\xff\xfe\x00", "The file is not saved progress: it can’t be read as JSON"),
+    (b'{"a": 1}', "The file does not hold the progress of a course. Nothing was changed."),
     (f"{START}9}}".encode(), "The file was saved by a newer version of this site."),
     (
         f'{START}1,"course":"<img src=x onerror=alert(1)>"}}'.encode(),

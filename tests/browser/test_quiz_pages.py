@@ -75,7 +75,7 @@ def test_answers_are_there_again_when_the_page_is_loaded_again(page: Page) -> No
     expect(verdict(page, SEVERAL)).to_contain_text("Right.")
     expect(question(page, NUMBER).get_by_label("Your answer")).to_have_value("")
     expect(question(page, ANGLE).get_by_label("Your answer")).to_have_value("pi/2")
-    expect(verdict(page, PREDICT)).to_contain_text("It happens otherwise.")
+    expect(verdict(page, PREDICT)).to_contain_text("Something else happens.")
     chosen = question(page, PREDICT).get_by_role("radio", name="it rests")
     expect(chosen).to_be_checked()
     expect(chosen).to_be_disabled()  # there is no way back
@@ -145,7 +145,7 @@ def test_quizzes_work_from_a_disk(
         press(page, NUMBER)
         expect(verdict(page, NUMBER)).to_contain_text("Right.")
         question(page, PREDICT).get_by_role("radio").last.check()
-        press(page, PREDICT, "Commit to this")
+        press(page, PREDICT, "Commit to this answer")
         expect(verdict(page, PREDICT)).to_contain_text("It happens as you predicted.")
         expect(question(page, PREDICT).locator(".lab-message")).to_be_visible()
         visit(page, page.url)
@@ -208,7 +208,7 @@ def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> 
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     quiz = page.locator(".quiz")
     expect(quiz.locator("button:visible")).to_have_count(0)
-    for text in ("twice as long, 2T", "So much.", "0.08 kg m2", "It happens otherwise."):
+    for text in ("twice as long, 2T", "So much.", "0.08 kg m2", "Something else happens."):
         expect(quiz.get_by_text(text).locator("visible=true").first).to_be_visible()
     expect(verdict(page, NUMBER)).to_be_hidden()  # that it could not be read
     page.evaluate("dispatchEvent(new Event('afterprint'))")

@@ -168,11 +168,11 @@ def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
 def test_prediction_is_committed_to_before_its_simulation_opens(lesson: Page) -> None:
     one = question(lesson, PREDICT)
     expect(one.locator(".lab")).to_be_hidden()
-    press(lesson, PREDICT, "Commit to this")
+    press(lesson, PREDICT, "Commit to this answer")
     expect(verdict(lesson, PREDICT)).to_have_text("Choose what you predict first.")
     one.get_by_role("radio", name="it rests").check()
-    press(lesson, PREDICT, "Commit to this")
-    expect(verdict(lesson, PREDICT)).to_contain_text("It happens otherwise.")
+    press(lesson, PREDICT, "Commit to this answer")
+    expect(verdict(lesson, PREDICT)).to_contain_text("Something else happens.")
     columns = one.locator(".outcome > div")
     expect(columns.nth(0)).to_have_text("You predicted" + "it rests")
     expect(columns.nth(1)).to_have_text("What happens" + "it swings")
@@ -238,7 +238,7 @@ def test_order_by_dragging_and_by_buttons(lesson: Page) -> None:
         f"{before[0]}: place 4 of 4"
     )
     press(lesson, ORDER)
-    expect(verdict(lesson, ORDER)).to_contain_text("of 4 stand where they belong.")
+    expect(verdict(lesson, ORDER)).to_contain_text("of 4 are where they belong.")
     said = question(lesson, ORDER).locator("p[role=status]")
     for place, name in enumerate(("1 m", "2 m", "3 m", "4 m")):
         while items(lesson).index(name) > place:

@@ -114,9 +114,9 @@ def test_a_misspelt_word_is_set_right_and_it_is_said(opened: Opened) -> None:
     page = opened()
     open_by_key(page)
     ask(page, "drfit")
-    expect(status(page)).to_have_text("1 page. Shown for “drift”.")
+    expect(status(page)).to_have_text("1 page. Showing results for “drift”.")
     assert ask(page, "qzxwv") == []
-    expect(status(page)).to_have_text(re.compile("^Nothing is found for “qzxwv”. "))
+    expect(status(page)).to_have_text(re.compile("^Nothing found for “qzxwv”. "))
 
 
 def test_by_keyboard_alone(opened: Opened) -> None:
@@ -292,7 +292,7 @@ def test_what_was_searched_before_is_offered_and_can_be_forgotten(opened: Opened
     page.wait_for_url("**/lessons/1.2-two.html")
     open_by_key(page)
     options = page.locator(".search-option")
-    becomes(page, lambda: options.all_inner_texts()[:2], ["mj_forward", "Forget these"])
+    becomes(page, lambda: options.all_inner_texts()[:2], ["mj_forward", "Clear these"])
     options.first.click()
     until(page, "() => document.querySelector('.search-dialog').dataset.shown === 'mj_forward'")
     expect(page.locator(".search-input")).to_be_focused()

@@ -76,7 +76,7 @@ def answer_all(page: Page) -> None:
     question(page, ANGLE).get_by_label("Your answer").fill("pi/2")
     press(page, ANGLE)
     question(page, PREDICT).get_by_role("radio").first.check()
-    press(page, PREDICT, "Commit to this")
+    press(page, PREDICT, "Commit to this answer")
     question(page, OPEN).get_by_label("Your answer").fill("So.")
     press(page, OPEN, "Compare")
     question(page, OPEN).get_by_role("radio", name="In part").check()

@@ -135,7 +135,7 @@ def test_the_receipt_of_an_output_says_how_it_was_compared(
     ("outcome", "missing", "expected"),
     [
         (Outcome.SKIPPED, ("torch", "mjx"),
-         "unverified: Not verified: torch, mjx was not there when the site was built."),
+         "unverified: Not verified: torch, mjx was not installed when the site was built."),
         (Outcome.NORUN, (),
          "unverified: Not verified: this script is not run when the site is built."),
         (Outcome.TIMEOUT, (), "unverified: Not verified: the script was not run to its end."),

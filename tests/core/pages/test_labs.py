@@ -43,9 +43,9 @@ def test_a_lab_with_every_field_is_described_in_full(make: Make) -> None:
         "It starts from keyframe <code>start</code>. It stops at 5 s.</p>\n"
         '<div class="table" tabindex="0" role="group" aria-label="Controls">\n<table>\n'
         '<thead><tr><th scope="col">Control</th><th scope="col">Range</th></tr></thead>\n<tbody>\n'
-        '<tr><th scope="row">mass</th><td>0.5 to 2 kg in steps of 0.1; at first 1.0 kg</td></tr>\n'
-        '<tr><th scope="row">tilt</th><td>−1 to 1; at first 0</td></tr>\n'
-        '<tr><th scope="row">integrator</th><td>RK4, Euler; at first Euler</td></tr>\n'
+        '<tr><th scope="row">mass</th><td>0.5 to 2 kg in steps of 0.1; initially 1.0 kg</td></tr>\n'
+        '<tr><th scope="row">tilt</th><td>−1 to 1; initially 0</td></tr>\n'
+        '<tr><th scope="row">integrator</th><td>RK4, Euler; initially Euler</td></tr>\n'
         '<tr><th scope="row">kick</th><td>button</td></tr>\n</tbody>\n</table>\n</div>\n'
         '<dl class="lab-shows">\n'
         "<div><dt>Shown while it runs</dt><dd>energy (J)</dd></div>\n"

@@ -84,7 +84,7 @@ def test_a_prediction_keeps_its_simulation_behind_the_answer(make: Make) -> None
     sim = {"model": "box", "title": "The simulation"}
     question = {"kind": "predict", "q": "What?", "options": ["a", "b"], "answer": 0, "sim": sim}
     html = make(quiz(question)).html()
-    assert "Decide first, then open." in html
+    assert "Decide before you look." in html
     before, after = html.split("<summary>Answer</summary>")
     assert "The simulation" not in before
     assert 'data-kind="simlab"' in after.split("</details>")[0]
@@ -192,7 +192,7 @@ def test_a_prediction_with_several_right_options_says_so(make: Make) -> None:
     html = make(quiz(question)).html()
     keys = " ".join(text_key("option", option) for option in ("a", "c"))
     assert f'data-kind="predict" data-answer="{keys}" data-several>' in html
-    assert "Decide first, then open. Choose all that are right." in html
+    assert "Decide before you look. Choose all that are right." in html
 
 
 def test_questions_work_without_any_form_control(make: Make) -> None:

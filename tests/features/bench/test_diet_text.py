@@ -66,9 +66,7 @@ def test_a_saving_that_is_none_or_uncertain_is_said_to_be_so() -> None:
     none = replace(FINDING, saving=Saving(None, None, False, 0, 0))
     assert "    proved; saves nothing that is measured" in lines(replace(REPORT, findings=(none,)))
     more = replace(FINDING, label=SAME, difference=3e-12, saving=Saving(1.01, 0.1, False, -5, 0))
-    text = (
-        "    the same in what was run (3.0e-12); no time that can be told, 5 bytes of memory more"
-    )
+    text = "    the same in what was run (3.0e-12); no measurable time, 5 bytes of memory more"
     assert text in lines(replace(REPORT, findings=(more,)))
 
 

@@ -137,7 +137,7 @@ def _edit(edit: TextEdit, style: Style) -> list[str]:
 def _saving(saving: Saving) -> str:
     parts = []
     if saving.time is not None:
-        sure = f"×{saving.time:.3g} as fast" if saving.certain else "no time that can be told"
+        sure = f"×{saving.time:.3g} as fast" if saving.certain else "no measurable time"
         parts.append(sure)
     for count, where in ((saving.memory, "memory"), (saving.text, "text")):
         if count:
