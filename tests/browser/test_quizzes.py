@@ -101,9 +101,9 @@ def test_several_right_options(lesson: Page) -> None:
 NUMBERS = [
     (NUMBER, "-0.08", "Not right. The size is right, the sign is not."),
     (NUMBER, "80", "the power of ten is not"),
-    (NUMBER, "0.08 kg m", "The unit measures something else"),
+    (NUMBER, "0.08 kg m", "The unit measures something other"),
     (NUMBER, "0.08 g cm^2", "not in the one that you wrote"),
-    (NUMBER, "0.16", "A factor of two"),
+    (NUMBER, "0.16", "off by a factor of two"),
     (NUMBER, "12.5", "reciprocal"),
     (NUMBER, "0,08", "Right."),
     (NUMBER, "2*1*0.2^2", "Right.Read as 0.08 kg m2"),
