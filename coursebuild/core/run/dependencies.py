@@ -23,7 +23,7 @@ from msgspec import Struct
 from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 
-VERSION = "5"
+VERSION = "6"
 """To be changed with how scripts are run and watched: older results then count no more."""
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)

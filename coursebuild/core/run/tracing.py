@@ -343,9 +343,10 @@ class Tracer:
         if not isinstance(folder, str):
             return None
         at = self._relevant(folder or ".")
-        if at is not None and f"{at}/".startswith(self.root):
-            return at
-        return None
+        if at is None or not f"{at}/".startswith(self.root):
+            return None
+        # An environment in the folder of the course holds packages, which count by their versions.
+        return None if f"{at}/".startswith(self._inside or ("\0",)) else at
 
     def _note(self, record: str) -> None:
         if record in self._noted:

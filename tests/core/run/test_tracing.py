@@ -6,11 +6,14 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from coursebuild.core.model.results import Outcome, Trace
 from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.tracing import Sink, Tracer
 from support.runners import Run, both_ways, hangs, job
 
 pytestmark = pytest.mark.site
@@ -164,6 +167,17 @@ class TestImports:
         assert {"json", "numpy", "functools", "inspect"} <= set(names.split(","))
         assert "sys" not in names.split(",")
         assert "numpy" in trace.modules and "json" not in trace.modules
+
+    def test_an_environment_in_the_course_s_folder(self, tmp_path: Path) -> None:
+        """Its packages count by their versions, as those of any other environment."""
+        packages = tmp_path / ".venv/lib/python3.11/site-packages"
+        (packages / "thing").mkdir(parents=True)
+        (packages / "thing/__init__.py").write_text("")
+        records = bytearray()
+        sink = cast("Sink", SimpleNamespace(write=records.extend))
+        tracer = Tracer(str(tmp_path), "/nowhere/t", [str(packages)], "/nowhere/o", sink)
+        tracer.imported("thing", [str(packages)])
+        assert bytes(records) == b"mthing\0"
 
     def test_what_is_not_installed(self, traced: Traced) -> None:
         trace = traced("try: import no_such_module\nexcept ImportError: pass")
