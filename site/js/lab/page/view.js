@@ -92,7 +92,7 @@ export class View {
 
   /** Make ready for drawing; false if there is nothing to draw. */
   prepare() {
-    if (this.world === null || this.frame === null || this.width === 0) return false
+    if (this.world === null || this.frame === null || this.width === 0 || this.height === 0) return false
     this.world.update(this.frame, this.camera)
     aim(this.lens, this.camera, this.world.description, this.width, this.height)
     this.world.edges.update(this.width, this.height)
