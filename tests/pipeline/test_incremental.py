@@ -15,7 +15,7 @@ from support.edited_course import course as course
 
 pytestmark = pytest.mark.site
 
-SERVED = ("compressed", "fonts", "parts", "published", "unchanged")
+SERVED = ("compressed", "fonts", "mjb", "parts", "published", "unchanged")
 """Kinds of entries that are bytes of the site, or none of the memo's."""
 GLOSSARY, SYMBOLS = "glossary/index.html", "symbols/index.html"
 
