@@ -11,10 +11,8 @@ as they were, what it printed counts as if it had run now.
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
 
 import msgspec
 from msgspec import Struct
@@ -98,7 +96,7 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         looked = looked_at(run, (), states.places, states)
         record = record_of(
             _inputs(extraction),
-            tuple(_of_the_project(looked, options.root)),
+            tuple(_of_the_project(looked, states)),
             int(time.time()),
             "",
             replace(run, seconds=round(run.seconds, 1), stderr="", figures=()),
@@ -114,13 +112,18 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         write_atomic(options.root, path, data, expected=expected)
 
 
-def _of_the_project(looked: Iterable[Dependency], root: Path) -> Iterator[Dependency]:
-    """What is the same on every machine; an environment in the folder of the course is not."""
-    environment = os.path.relpath(sys.prefix, root) + os.sep
+def _of_the_project(looked: Iterable[Dependency], states: States) -> Iterator[Dependency]:
+    """What is the same on every machine.
+
+    An environment in the folder of the course is not, nor is our library, which elsewhere is
+    installed.
+    """
+    places = dict(states.places)
+    folders = (places["prefix"], f"{places['library']}/mjcourse")
+    others = tuple(f"{os.path.relpath(folder, states.root)}/" for folder in folders)
     for one in looked:
-        if one.kind in (Kind.FILE, Kind.LISTING, Kind.SOUGHT) and not one.name.startswith(
-            environment
-        ):
+        of_course = one.kind in (Kind.FILE, Kind.LISTING, Kind.SOUGHT)
+        if of_course and not one.name.startswith(others):
             yield one
 
 

@@ -163,7 +163,9 @@ class SiteMaker:
         """Compressed copies."""
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return prepared_copy(key) or self.store.get_or_create("compressed", key, make)
+            return prepared_copy(key) or self.store.get_or_create(
+                "compressed", key, make, local=True
+            )
 
         return compressed_files(files, keep)
 
@@ -195,7 +197,7 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
 
         return subset_font(job)
 
-    return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make)
+    return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make, local=True)
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:

@@ -74,6 +74,7 @@ def test_explain_labs_of_a_lesson_before_and_after_trials(course: Folder) -> Non
         "depending on it:\n"
         " 1.1-lab-1 would be tried again\n because models/part.xml changed\n"
         " 1.1-lab-2 would be tried again\n because models/part.xml changed\n"
+        " model-part would be tried\n because there is no result of it on this machine\n"
     )
     assert tried(course) == ["1.1-lab-1", "1.1-lab-2"]
     course.write("models/part.xml", PART)

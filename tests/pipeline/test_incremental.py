@@ -15,8 +15,8 @@ from support.edited_course import course as course
 
 pytestmark = pytest.mark.site
 
-SERVED = ("compressed", "fonts", "mjb", "parts", "published", "unchanged")
-"""Kinds of entries that are bytes of the site, or none of the memo's."""
+SERVED = ("compressed", "fonts", "mjb", "parts", "pictures", "published", "unchanged")
+"""Kinds of entries that are bytes of the site, or none of the memo's, which are not shared."""
 GLOSSARY, SYMBOLS = "glossary/index.html", "symbols/index.html"
 
 

@@ -286,6 +286,7 @@ class _Attempt(Struct, frozen=True):
             "pictures",
             hashlib.sha256(text.encode()).hexdigest(),
             lambda: draw_picture(self.lab, main),
+            local=True,
         )
         return replace(output, record=lab_record(self.lab, main), picture=picture)
 

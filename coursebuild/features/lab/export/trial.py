@@ -12,7 +12,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from msgspec import Struct
 from msgspec.structs import asdict
 
@@ -70,14 +69,14 @@ def exported(
     made_of = (_digest(), lab.config, asdict(metadata), main.get("recorded"), readouts, same)
     key = hashlib.sha256(json.dumps(made_of).encode()).hexdigest()
     store = context.memory.store
-    found = store.get("exports", key)
+    found = store.get_value("exports", key, LabExport, local=True)
     if found is not None:
-        return msgspec.json.decode(found, type=LabExport)
+        return found
     try:
         offer = _offered(context.root, native, lab, metadata, main, same)
     except NativeError as error:
         return LabExport(None, f"the script {error}")
-    store.put("exports", key, msgspec.json.encode(offer))
+    store.put_value("exports", key, offer, local=True)
     return offer
 
 
