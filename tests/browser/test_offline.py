@@ -308,7 +308,7 @@ def test_page_on_keeping_says_what_is_so_without_scripts_and_without_workers(
     with browsers["plain"].new_context(java_script_enabled=False) as context:
         page = context.new_page()
         page.goto(f"{host.url}offline/")
-        see(page, "Nothing is kept by this browser now.")
+        see(page, "This browser keeps nothing now.")
     with browsers["plain"].new_context(service_workers="block") as context:
         page, said = watched(context)
         page.clock.install()

@@ -68,7 +68,7 @@ def test_saving_forgetting_and_bringing_in(calm: BrowserContext, site: str, tmp_
     expect(told).to_contain_text("2 things in the file are not here")
     expect(overall).to_contain_text("Nothing yet.")  # what was forgotten stays so
     told.get_by_role("button", name="Bring back what was forgotten").click()
-    expect(told).to_contain_text("Brought in: 1 answer and 1 lesson")
+    expect(told).to_contain_text("Imported: 1 answer and 1 lesson")
     expect(overall).to_contain_text("1 of 3 lessons read")
     page.locator("input[type=file]").set_input_files(file)
     expect(told).to_have_text("Everything in the file was here already.")
@@ -100,7 +100,7 @@ def test_file_goes_to_another_device(
         phone.get_by_role("button", name="Mark as read").click()
         phone.goto(site + "progress/")
         phone.locator("input[type=file]").set_input_files(file)
-        expect(phone.locator(TOLD)).to_contain_text("Brought in: 0 answers and 1 lesson ")
+        expect(phone.locator(TOLD)).to_contain_text("Imported: 0 answers and 1 lesson ")
         expect(phone.locator(OVERALL)).to_contain_text("2 of 3 lessons read")
 
 

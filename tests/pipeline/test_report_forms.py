@@ -62,7 +62,8 @@ def test_the_stages_of_a_build(make: Make) -> None:
     folder.write("docs/guide.md", "One.\n")  # read apart from the lessons, and told with them
     done = folder.main("build")
     said = done.err.splitlines()
-    assert said[:3] == ["reading lessons and pages", "compiling models", "drawing pages"]
+    assert said[:2] == ["reading lessons and pages", "compiling models"]
+    assert said[2:4] == ["trying labs", "drawing pages"], "the model's own page has a lab"
     assert said[-1] == "publishing"
     assert re.search("^published [0-9]+ files in public$", done.out, re.MULTILINE)
 

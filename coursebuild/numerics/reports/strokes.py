@@ -158,7 +158,8 @@ def svg(
 
     With a `style` it is for a file of its own.
     """
-    key, (title, text) = markup_text(name), map(markup_text, said)
+    key = markup_text(name.replace("/", "-"))  # a name in XML has no slash
+    title, text = map(markup_text, said)
     head = ' xmlns="http://www.w3.org/2000/svg"' if style else ""
     return (
         f'<svg{head} class="work-precision" viewBox="0 0 {size[0]:g} {size[1]:g}" '

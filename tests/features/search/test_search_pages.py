@@ -66,7 +66,8 @@ def sections_of(make: Make, text: str) -> tuple[Section, ...]:
 
 
 def inputs_of(library: Library, kind: str, id: str = "") -> PageInputs:
-    pages = (page for page in page_list(library) if (page.kind, page.id) == (kind, id))
+    of_kind = (page for page in page_list(library) if page.kind == kind)
+    pages = (page for page in of_kind if id in ("", page.id))
     return next(pages).inputs(library)
 
 
