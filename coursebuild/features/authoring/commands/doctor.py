@@ -45,7 +45,7 @@ renderer.render()
 _BACKENDS = ("egl", "osmesa")
 
 
-class Finding(Struct, frozen=True):
+class Probe(Struct, frozen=True):
     """Whether something works."""
 
     what: str
@@ -73,52 +73,52 @@ def run(arguments: argparse.Namespace) -> int:
     return status
 
 
-def _line(found: Finding, style: Style) -> str:
+def _line(found: Probe, style: Style) -> str:
     word, colour = ("ok", GREEN) if found.ok else ("broken", RED) if found.needed else ("-", YELLOW)
     line = f"{style.paint(f'{word:<8}', colour)} {visible(found.what)}\n"
     return line if found.ok else f"{line}         help: {visible(found.cure)}\n"
 
 
-def _python(_: Path) -> Iterator[Finding]:
-    yield Finding(f"Python {python_version()} at {sys.executable}", True)
+def _python(_: Path) -> Iterator[Probe]:
+    yield Probe(f"Python {python_version()} at {sys.executable}", True)
 
 
-def _mujoco(_: Path) -> Iterator[Finding]:
+def _mujoco(_: Path) -> Iterator[Probe]:
     try:
         wrong = _fails(_STEP)
         what = f"MuJoCo {engine_version()}" + (f": {wrong}" if wrong else "")
-        yield Finding(what, not wrong, "install coursebuild again, into an environment of its own")
+        yield Probe(what, not wrong, "install coursebuild again, into an environment of its own")
     except EffectError as error:
-        yield Finding(error.message, False, error.help)
+        yield Probe(error.message, False, error.help)
 
 
-def _lab_engine(_: Path) -> Iterator[Finding]:
+def _lab_engine(_: Path) -> Iterator[Probe]:
     try:
         with LabEngine() as engine:
             engine.mistakes(())
-            yield Finding(f"MuJoCo {engine.version} of the browser, in V8, for labs", True)
+            yield Probe(f"MuJoCo {engine.version} of the browser, in V8, for labs", True)
     except EffectError as error:
-        yield Finding(error.message, False, error.help or "install coursebuild again")
+        yield Probe(error.message, False, error.help or "install coursebuild again")
 
 
-def _fonts(_: Path) -> Iterator[Finding]:
+def _fonts(_: Path) -> Iterator[Probe]:
     try:
         fonts = [name for name in Bundle() if name.endswith(".ttf")]
         templates = template_texts()
     except EffectError as error:
-        yield Finding(error.message, False, error.help)
+        yield Probe(error.message, False, error.help)
         return
     what = f"{len(fonts)} fonts and {len(templates)} templates of pages"
-    yield Finding(what, bool(fonts and templates), "install coursebuild again")
+    yield Probe(what, bool(fonts and templates), "install coursebuild again")
 
 
-def _folder(folder: Path) -> Iterator[Finding]:
+def _folder(folder: Path) -> Iterator[Probe]:
     ok = os.access(folder, os.W_OK)
     cure = "give yourself the right to write there, or go to another folder"
-    yield Finding(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, cure)
+    yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, cure)
 
 
-def _locks(folder: Path) -> Iterator[Finding]:
+def _locks(folder: Path) -> Iterator[Probe]:
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
             ok = try_lock(file.fileno()) is not None
@@ -126,22 +126,22 @@ def _locks(folder: Path) -> Iterator[Finding]:
         return
     what = "locks, by which two commands on one course wait for each other"
     cure = "use a disk of this machine, or run one command at a time"
-    yield Finding(what if ok else f"no {what}", ok, cure, needed=False)
+    yield Probe(what if ok else f"no {what}", ok, cure, needed=False)
 
 
-def _disk(folder: Path) -> Iterator[Finding]:
+def _disk(folder: Path) -> Iterator[Probe]:
     free = shutil.disk_usage(folder).free
     cure = "make room, or let .coursebuild take less: `--cache-size 200M`"
-    yield Finding(f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure, needed=False)
+    yield Probe(f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure, needed=False)
 
 
-def _rendering(_: Path) -> Iterator[Finding]:
+def _rendering(_: Path) -> Iterator[Probe]:
     """Scripts can draw with `mujoco.Renderer`; pictures of labs need nothing of it."""
     chosen = os.environ.get("MUJOCO_GL")
     wrong = _fails(_DRAW)
     if not wrong:
         by = f" (MUJOCO_GL={chosen})" if chosen else ""
-        yield Finding(f"offscreen rendering{by}, for scripts that use `mujoco.Renderer`", True)
+        yield Probe(f"offscreen rendering{by}, for scripts that use `mujoco.Renderer`", True)
         return
     works = next((name for name in _BACKENDS if not _fails(_DRAW, MUJOCO_GL=name)), "")
     cure = (
@@ -152,7 +152,7 @@ def _rendering(_: Path) -> Iterator[Finding]:
             "`apt install libosmesa6`, and set MUJOCO_GL=osmesa"
         )
     )
-    yield Finding(f"no offscreen rendering: {wrong}", False, cure, needed=False)
+    yield Probe(f"no offscreen rendering: {wrong}", False, cure, needed=False)
 
 
 def _fails(code: str, **environment: str) -> str:
