@@ -31,7 +31,7 @@ from coursebuild.numerics.reports.bench import (
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.points import solving
+from coursebuild.numerics.reports.text import solving
 from coursebuild.numerics.rows import Basis, MeasuredRow, measured
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import own_setting, settings, stable

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict, WorkPrecisionRow
-from coursebuild.numerics.reports.points import seconds_text
+from coursebuild.numerics.reports.text import seconds_text
 
 COST_SLACK, ERROR_SLACK = 0.03, 0.05
 """Relative: costs repeat to a few per cent only."""

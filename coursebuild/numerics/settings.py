@@ -21,7 +21,7 @@ from coursebuild.numerics.engine import choose, integrator_of, varied
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import STANDARD, Integrator
 from coursebuild.numerics.reports.bench import MeasuredSetting, StableRow
-from coursebuild.numerics.reports.points import FEWEST_STEPS
+from coursebuild.numerics.reports.text import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
 from coursebuild.numerics.stability import (
     DENSE,

@@ -15,7 +15,7 @@ from coursebuild.core.drawing.marks import text_width
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.plot import STYLE, plot_svg, work_precision
-from coursebuild.numerics.reports.points import quantities, telling
+from coursebuild.numerics.reports.text import quantities, telling
 from support.bench_reports import lost, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")

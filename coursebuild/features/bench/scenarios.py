@@ -31,7 +31,8 @@ from coursebuild.numerics.reports.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.cases import ErrorLine
-from coursebuild.numerics.reports.points import (
+from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, SweepRow, cell
+from coursebuild.numerics.reports.text import (
     FEWEST_STEPS,
     Quantity,
     interval_text,
@@ -43,7 +44,6 @@ from coursebuild.numerics.reports.points import (
     status_text,
     usual_setting,
 )
-from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, SweepRow, cell
 
 _QUANTITIES = {
     "seen": "measured.seen",

@@ -43,8 +43,8 @@ from coursebuild.numerics.reports.cases import (
     merged,
 )
 from coursebuild.numerics.reports.course_cases import course_cases
-from coursebuild.numerics.reports.points import KNOWN, Quantity, seconds_text, status_text
 from coursebuild.numerics.reports.records import STABILITY
+from coursebuild.numerics.reports.text import KNOWN, Quantity, seconds_text, status_text
 
 _RIGHT = 1e-3
 """m or rad: the error that costs are compared at."""

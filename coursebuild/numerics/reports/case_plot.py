@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.chart import BESIDE, Chart, Line, Point, chart_svg
-from coursebuild.numerics.reports.points import KNOWN, Quantity, seconds_text, status_text
+from coursebuild.numerics.reports.text import KNOWN, Quantity, seconds_text, status_text
 
 
 def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:

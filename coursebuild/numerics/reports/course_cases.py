@@ -20,7 +20,7 @@ from coursebuild.numerics.reports.cases import (
     ReferenceLine,
     StepCost,
 )
-from coursebuild.numerics.reports.points import solving, usual_setting
+from coursebuild.numerics.reports.text import solving, usual_setting
 
 
 def exact_file(model: str) -> str:

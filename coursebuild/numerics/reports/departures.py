@@ -28,8 +28,8 @@ from coursebuild.numerics.reports.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.cases import CaseReport, ErrorLine, FigureLine
-from coursebuild.numerics.reports.points import seconds_text, setting_text, status_text
 from coursebuild.numerics.reports.sweep import SweepReport
+from coursebuild.numerics.reports.text import seconds_text, setting_text, status_text
 
 _STABLE = 0.01
 """Relative band of a largest stable timestep: a bisection ends where its bounds are near."""

@@ -19,7 +19,8 @@ from collections.abc import Iterator, Sequence
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.reports.chart import NARROW, WIDE, Chart, Line, Point, chart_svg
-from coursebuild.numerics.reports.points import (
+from coursebuild.numerics.reports.strokes import Entry
+from coursebuild.numerics.reports.text import (
     KNOWN,
     Quantity,
     integrator_rank,
@@ -30,7 +31,6 @@ from coursebuild.numerics.reports.points import (
     telling,
     usual_setting,
 )
-from coursebuild.numerics.reports.strokes import Entry
 
 STYLE = """\
 :root{color-scheme:light dark;background:light-dark(#fcfbf8,#17191c);color:light-dark(#484742,\

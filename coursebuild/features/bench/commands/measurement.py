@@ -30,8 +30,8 @@ from coursebuild.numerics.reports.cases import (
     merged,
 )
 from coursebuild.numerics.reports.departures import Checked, Departure
-from coursebuild.numerics.reports.points import seconds_text
 from coursebuild.numerics.reports.records import ReportFailure
+from coursebuild.numerics.reports.text import seconds_text
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,

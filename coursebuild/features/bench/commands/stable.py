@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coursebuild.numerics.reports.bench import StableRow
-from coursebuild.numerics.reports.points import seconds_text
+from coursebuild.numerics.reports.text import seconds_text
 from coursebuild.report.terminal import visible
 
 STABLE = ("largest stable", "steps", "tried")

@@ -13,7 +13,7 @@ from coursebuild.numerics.reports.bench import (
     ScenarioReport,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.points import (
+from coursebuild.numerics.reports.text import (
     quantities,
     seconds_text,
     solving_parts,

@@ -28,7 +28,8 @@ from coursebuild.numerics.reports.bench import (
     SceneReport,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.points import (
+from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, cell, shown_figures
+from coursebuild.numerics.reports.text import (
     FEWEST_STEPS,
     is_cut_short,
     seconds_text,
@@ -36,7 +37,6 @@ from coursebuild.numerics.reports.points import (
     status_text,
     usual_setting,
 )
-from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, cell, shown_figures
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
-from coursebuild.numerics.reports.points import quantities
+from coursebuild.numerics.reports.text import quantities
 from coursebuild.report.values import plain
 
 _QUANTITIES = ("position", "attitude", "velocity")
