@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from coursebuild.features.bench.commands.measurement import stability_text
+from coursebuild.features.numerics.commands.text import stability_text
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import FittedOrder, OrderRow
 from coursebuild.numerics.reports.cases import (

@@ -8,8 +8,9 @@ from typing import Any
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.features.bench.commands import add_recorded, measured, write_measured
-from coursebuild.features.bench.commands.measurement import Measurement, stability_text
+from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.numerics.commands.stability import check_stability, stability
+from coursebuild.features.numerics.commands.text import stability_text
 from coursebuild.pipeline.options import Options
 from coursebuild.report.values import json_text
 
