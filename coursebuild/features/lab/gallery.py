@@ -71,7 +71,14 @@ def model_view(library: Library, place: urls.Place, model: MjcfModel) -> LabView
 def draw_model(tools: Tools, view: LabView) -> Markup:
     """The lab on the page of its model."""
     return tools.render(
-        "lab/lab.html", lab=view, docked=False, paper=None, source="", note="", goal=""
+        "lab/lab.html",
+        lab=view,
+        docked=False,
+        opens_page=True,
+        paper=None,
+        source="",
+        note="",
+        goal="",
     )
 
 

@@ -102,6 +102,7 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
         "lab/lab.html",
         lab=replace(view, start=start_name(page, block)),
         docked=block.fields.dock,
+        opens_page=page.document.blocks[:1] == (block,),
         paper=_paper(page, live.name) if live is not None else None,
         goal=page.inlines(block.goal),
         goal_key=(block.progress_keys() or ("",))[0],

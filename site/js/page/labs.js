@@ -34,8 +34,11 @@ export function loadLabs(part, words, progress) {
       rootMargin: NEAR,
     },
   )
+  // What the page itself shows comes first.
+  const watch = () => labs.forEach((lab) => near.observe(lab))
+  if (document.readyState === 'complete') watch()
+  else window.addEventListener('load', watch, { once: true })
   for (const lab of labs) {
-    near.observe(lab)
     lab.addEventListener('coursebuild:run', async ({ detail }) => (await start(lab))?.run?.(detail))
   }
   const linked = linkedLab(location.hash)
