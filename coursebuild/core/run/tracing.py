@@ -239,6 +239,8 @@ class Tracer:
     def by_import(self) -> bool:
         """Whether what happens is done by a package while it is imported, not by the script."""
         frame: FrameType | None = sys._getframe(1)
+        while frame is not None and frame.f_code.co_filename == __file__:
+            frame = frame.f_back  # in the tool's own repository it is a file of the course
         while frame is not None:
             name = frame.f_code.co_filename
             if name == _BOOTSTRAP:

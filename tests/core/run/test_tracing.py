@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import cast
 import pytest
 
 from coursebuild.core.model.results import Outcome, Trace
+from coursebuild.core.run import tracing
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.tracing import Sink, Tracer
 from support.runners import Run, both_ways, hangs, job
@@ -178,6 +181,21 @@ class TestImports:
         tracer = Tracer(str(tmp_path), "/nowhere/t", [str(packages)], "/nowhere/o", sink)
         tracer.imported("thing", [str(packages)])
         assert bytes(records) == b"mthing\0"
+
+    def test_a_package_writes_as_it_is_imported_where_the_tool_lies_in_the_course(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        records = bytearray()
+        sink = cast("Sink", SimpleNamespace(write=records.extend))
+        root = str(Path(tracing.__file__).parents[3])
+        tracer = Tracer(root, "/nowhere/t", [str(tmp_path)], "/nowhere/o", sink)
+        (tmp_path / "begins.py").write_text("import sys; sys.write_of_test('/home/me/folder')")
+        monkeypatch.setattr(sys, "write_of_test", tracer.write, raising=False)
+        monkeypatch.syspath_prepend(tmp_path)
+        importlib.import_module("begins")
+        assert not records
+        tracer.write("/home/me/other")
+        assert records
 
     def test_what_is_not_installed(self, traced: Traced) -> None:
         trace = traced("try: import no_such_module\nexcept ImportError: pass")
