@@ -282,7 +282,7 @@ def described(dependency: Dependency) -> str:
             folder, modules = sought(dependency.name)
             shown = ", ".join(modules[:_SHOWN])
             more = f" and {len(modules) - _SHOWN} more" if len(modules) > _SHOWN else ""
-            return f"no file of {folder} having the name of a module ({shown}{more})"
+            return f"no file of {folder or 'the course'} has the name of a module ({shown}{more})"
         case Kind.MODULE:
             if not dependency.state:
                 return f"the module {dependency.name} (not installed)"
