@@ -1,9 +1,9 @@
 """Build hook of the Python package: the browser's half and the templates go into the wheel.
 
 Entry point: `BrowserHook`, which hatchling finds here. In a wheel, the files of site/dist become
-coursebuild/assets/, templates/ becomes coursebuild/templates/, and docs/rules.md goes with them. An
-editable install only gets an up-to-date site/dist, and compiled modules: there the tool reads all
-this where it is. The work is done by site/bundle.py.
+coursebuild/assets/, templates/ becomes coursebuild/templates/, and docs/reference/rules.md goes
+with them. An editable install only gets an up-to-date site/dist, and compiled modules: there the
+tool reads all this where it is. The work is done by site/bundle.py.
 """
 
 import compileall
@@ -42,7 +42,7 @@ class BrowserHook(BuildHookInterface[Any]):
         except bundle.BundleError as error:
             self.app.abort(str(error))
         if version == "standard":
-            rules = {str(Path(self.root, "docs", "rules.md")): "coursebuild/docs/rules.md"}
+            rules = {str(Path(self.root, "docs/reference/rules.md")): "coursebuild/docs/rules.md"}
             build_data["force_include"].update(files | rules)
         else:
             _compile(Path(self.root))

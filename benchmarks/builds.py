@@ -29,7 +29,7 @@ from benchmarks.measure.running import jcache_version, measure_scripts  # noqa: 
 from benchmarks.measure.serving import measure_serving  # noqa: E402
 from benchmarks.measure.tools import Places, all_tools  # noqa: E402
 
-DOCS = HERE / "docs" / "benchmarks.md"
+DOCS = HERE / "docs/explanation/benchmarks.md"
 PARTS = ("builds", "serve", "scripts")
 
 

@@ -6,7 +6,7 @@ Entry point: `Feature`, with `FenceKind`, `PageKind`, `ModelPart`, `PagePart`, `
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
 (`features = ["features/NAME.py"]`; see `registry.use_course_features`). All three are alike.
-docs/features.md says how to write one.
+docs/how-to/features.md says how to write one.
 
 What the core asks of a block after it was parsed are the methods of `FeatureBlock`
 (`core.model`), so that a checked course can be looked at without its features being loaded.

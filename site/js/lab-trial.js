@@ -1,5 +1,6 @@
 /**
- * The labs' trial, one classic script for a bare V8 in the process that builds the site. docs/labs.md says how it is called:
+ * The labs' trial, one classic script for a bare V8 in the process that builds the site.
+ * docs/explanation/how-labs-run.md says how it is called:
  *
  *   reserve(name, size) → ArrayBuffer    to be filled from outside: 'wasm', and 'mjb' before each trial
  *   boot('')            → ''             compiles and starts the engine; ends before the next call

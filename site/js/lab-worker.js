@@ -1,5 +1,5 @@
 /**
- * The labs' worker: physics, lab code and plots, away from the page's thread. docs/labs.md has the protocol.
+ * The labs' worker: physics, lab code and plots, away from the page's thread. docs/explanation/how-labs-run.md has the protocol.
  */
 
 import loadMujoco from '@mujoco/mujoco'

@@ -1,5 +1,5 @@
 /**
- * Labs in a page: loaded by site.js when a lab comes near. docs/labs.md says how a page holds a lab.
+ * Labs in a page: loaded by site.js when a lab comes near. docs/explanation/how-labs-run.md says how a page holds a lab.
  *
  *   mountLab(element, words, progress) → Promise<Instrument | null>
  */

@@ -1,4 +1,4 @@
-"""What docs/authoring.md says is tried: its examples are built, its tables are held to the code.
+"""What the pages in docs/ say is tried: examples are built, tables are held to the code.
 
 An example is a fence whose info string says what it is:
 
@@ -27,18 +27,18 @@ from coursebuild.cli.commands import known_commands
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.core.text.rules import RULES
-from support.markdown_files import DOCS, Fence, code_spans, fences, write_files
+from support.markdown_files import DOCS, PAGES, Fence, code_spans, fences, write_files
 from support.scratch_course import Folder
 
 pytestmark = pytest.mark.engine
 
-GUIDE = DOCS / "authoring.md"
-FENCES = fences(GUIDE)
-CODE = [*code_spans(GUIDE), *(fence.text for fence in FENCES)]
+FENCES = [fence for path in PAGES for fence in fences(path)]
+SPANS = [span for path in PAGES for span in code_spans(path)]
+CODE = [*SPANS, *(fence.text for fence in FENCES)]
 LESSONS = [fence for fence in FENCES if fence.is_("lesson")]
 MAPS = [fence for fence in FENCES if fence.is_("map")]
 MESSAGES = [(a, b) for a, b in pairwise(FENCES) if b.is_("prints")]
-"""Each message on the page, after the example that it stands below."""
+"""Each message on a page, after the example that it stands below."""
 SECOND = "content/lessons/1.2-large-swings.md"
 
 SWING = '''
@@ -53,7 +53,7 @@ def period(length: float) -> float:
 
 @pytest.fixture(scope="session")
 def checked_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
-    """The course that the guide begins with, and the files that examples show.
+    """The course that the reference begins with, and the files that examples show.
 
     It has been checked, so that in copies of it only what a test changes is run.
     """
@@ -141,7 +141,7 @@ def test_every_right_example_builds(course: Path, capsys: pytest.CaptureFixture[
     right = [fence for fence in LESSONS if not fence.value("error")]
     entries = []
     for number, fence in enumerate(right, start=2):
-        slug = "large-swings" if number == 2 else f"example-of-line-{fence.line}"
+        slug = "large-swings" if number == 2 else f"example-{fence}"
         entries.append(
             f'[[level.lesson]]\nid = "1.{number}"\nslug = "{slug}"\n'
             'title = "An example"\nstatus = "draft"\n'
@@ -217,7 +217,7 @@ def test_reports_for_machines(course: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 def quoted(name: str) -> bool:
-    """Whether the page names something in code: in a fence, or in a span."""
+    """Whether a page names something in code: in a fence, or in a span."""
     word = re.compile(rf"(?<![\w-]){re.escape(name)}(?![\w-])")
     return any(word.search(code) for code in CODE)
 
@@ -262,7 +262,7 @@ def test_every_key_of_a_fence_is_named(course: Path, capsys: pytest.CaptureFixtu
 
 def test_every_rule_on_the_page_exists() -> None:
     first_words = {name.split("-")[0] for name in RULES}
-    names = {code for code in code_spans(GUIDE) if re.fullmatch(r"[a-z]+(-[a-z]+)+", code)}
+    names = {code for code in SPANS if re.fullmatch(r"[a-z]+(-[a-z]+)+", code)}
     rules = {name for name in names if name.split("-")[0] in first_words}
     assert len(rules) > 10
     assert sorted(rules - RULES.keys()) == []

@@ -12,7 +12,7 @@ import pytest
 
 from coursebuild.pipeline.load import load
 from support.built_sites import BuiltCourses
-from support.markdown_files import DOCS, ROOT, code_spans, fences, links, write_files
+from support.markdown_files import DOCS, PAGES, ROOT, code_spans, fences, links, write_files
 from support.scratch_course import Folder
 
 README = ROOT / "README.md"
@@ -90,10 +90,9 @@ def test_every_make_target_exists() -> None:
     assert [t for t in said if not re.search(rf"^{re.escape(t)}:", makefile, re.MULTILINE)] == []
 
 
-@pytest.mark.parametrize("path", [README, DOCS / "authoring.md"], ids=lambda path: path.name)
-def test_every_command_exists(path: Path) -> None:
+def test_every_command_exists() -> None:
     said = set()
-    for line in shell_lines(path):
+    for line in (line for path in [README, *PAGES] for line in shell_lines(path)):
         called = re.match(r"coursebuild (?:-C \S+ )?([a-z]+)", line)
         if called is not None:
             said.add((called[1], *re.findall(r"--[a-z-]+", line)))
@@ -121,7 +120,7 @@ def test_every_document_is_a_page_without_mistakes() -> None:
     loaded = load(ROOT)
     assert loaded.course is not None
     pages = {page.path for page in loaded.course.pages}
-    documents = {path.relative_to(ROOT).as_posix() for path in DOCS.glob("*.md")}
+    documents = {path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.md")}
     assert documents - pages == set()
     assert [d for d in loaded.diagnostics if d.span.path in documents] == []
 
@@ -172,7 +171,7 @@ def test_the_folders_are_those_of_the_architecture() -> None:
         or (path / "__init__.py").is_file()
     }
     listed: set[str] = set()
-    for where, _, entry_points in rows(DOCS / "architecture.md"):
+    for where, _, entry_points in rows(DOCS / "explanation/architecture.md"):
         names = [name.removeprefix("coursebuild/") for name in re.findall(r"`([^`]+)`", where)]
         for name in names:
             place = package / name if (package / name).exists() else ROOT / name

@@ -150,7 +150,7 @@ def test_a_feature_stands_in_its_folder(course: Folder, path: str) -> None:
 
 
 def test_the_example_of_the_docs_works(course: Folder) -> None:
-    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
     code = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     course.write("features/shout.py", code[0])
     task = '\n```task name="A & B"\nDo **this**.\n```\n'
@@ -174,7 +174,7 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
 @pytest.fixture
 def inventory(course: Folder) -> Folder:
     """A course with the page of the docs."""
-    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
     code = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     course.write("features/inventory.py", code[1])
     course.replace(MAP, '"features/shout.py"', '"features/shout.py", "features/inventory.py"')

@@ -17,7 +17,7 @@ MAP = "content/course.toml"
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
     """A course with the exporter that the docs show."""
-    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     [code] = (block for block in blocks if "Exporter(" in block)
     folder = Folder(tmp_path / "a course")

@@ -113,7 +113,7 @@ def test_an_edit_of_an_installed_feature_is_seen(
 
 
 def test_example_of_the_docs_adds_a_command(tmp_path: Path, stores: Path) -> None:
-    page = (ROOT / "docs/features.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
     folder, package = Folder(tmp_path / "a course"), tmp_path / "coursebuild_slowest"
     folder.fill([GOOD], stores)
     package.mkdir()

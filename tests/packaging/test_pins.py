@@ -76,6 +76,6 @@ def test_lock_stays_without_addresses_when_npm_writes_it(root: Path) -> None:
 def test_the_table_of_dependencies_is_complete(root: Path, pyproject: dict) -> None:
     declared = manifest(root)
     wanted = requirements(pyproject) | declared["dependencies"] | declared["devDependencies"]
-    table = (root / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    table = (root / "docs/explanation/dependencies.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([^`]+)` \| ([^ |]+) \|", table, flags=re.MULTILINE)
     assert sorted(rows) == sorted(wanted.items())

@@ -246,7 +246,7 @@ def test_explain_tells_what_a_rule_means_anywhere(tmp_path: Path) -> None:
         "footnote-unused\n\nWarning. A footnote is written and never referred to.\n\n"
     )
     assert "\nwarning[footnote-unused]: " in done.out
-    page = (ROOT / "docs/rules.md").read_text()
+    page = (ROOT / "docs/reference/rules.md").read_text()
     shown = "".join(folder.main("explain", name).out for name in RULES)
     assert shown.count("\nError. ") + shown.count("\nWarning. ") == len(RULES)
     assert all(line in page for line in shown.splitlines())

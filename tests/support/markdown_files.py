@@ -1,7 +1,7 @@
 """Reading the documents of the repository: fences with their info strings, and links.
 
-Entry points: `fences(path)`, `code_spans(path)`, `links(path)`, `write_files(root, fences)`.
-markdown-it reads them, with none of coursebuild's rules, so that the tests do not lean on what they
+Entry points: `PAGES`; `fences`, `code_spans` and `links` of a path; `write_files(root, fences)`.
+markdown-it reads them, with none of coursebuild's rules, so that the tests do not rely on what they
 test.
 """
 
@@ -16,12 +16,16 @@ from markdown_it.token import Token
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
+PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "rules.md")
+"""The written pages; that of the rules is generated."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fence:
     """A code fence."""
 
+    page: str
+    """The name of the document's file, without its suffix."""
     line: int
     """Of its first line, from 1."""
     kind: str
@@ -30,7 +34,7 @@ class Fence:
     text: str
 
     def __str__(self) -> str:
-        return f"line {self.line}"
+        return f"{self.page}-{self.line}"
 
     def is_(self, flag: str) -> bool:
         """Whether the info string has a word."""
@@ -52,7 +56,7 @@ def fences(path: Path) -> list[Fence]:
     for token in _tokens(path):
         if token.type == "fence" and token.map is not None:
             kind, *words = token.info.split() or [""]
-            found.append(Fence(token.map[0] + 1, kind, tuple(words), token.content))
+            found.append(Fence(path.stem, token.map[0] + 1, kind, tuple(words), token.content))
     return found
 
 

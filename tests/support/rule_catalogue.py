@@ -7,6 +7,7 @@ page shows what the tool says and not what somebody thought it would say.
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Mapping
 
 from msgspec import Struct
@@ -38,9 +39,11 @@ class Example(Struct, frozen=True):
 
 
 def catalogue_page(examples: Mapping[str, Example]) -> str:
-    """`docs/rules.md`."""
+    """`docs/reference/rules.md`."""
     errors = sum(rule.severity == "error" for rule in RULES.values())
     head = f"""\
+# Rules
+
 Every diagnostic of `coursebuild` names its rule, as in `error[output-drift]`. There are {errors}
 errors and {len(RULES) - errors} warnings. An error keeps the site from being published, and
 nothing silences it. A warning can be silenced in `content/course.toml`, by its rule and with a
@@ -52,8 +55,18 @@ rule = "heading-skip"
 reason = "the levels are those of the book"
 path = "content/lessons/4.*"   # optional
 ```
+
+{_contents("error")}
+
+{_contents("warning")}
 """
     return head + "".join(_entry(rule, examples.get(name)) for name, rule in RULES.items())
+
+
+def _contents(severity: str) -> str:
+    names = [rule.name for rule in RULES.values() if rule.severity == severity]
+    links = f"{severity.capitalize()}s: " + " · ".join(f"[`{name}`](#{name})" for name in names)
+    return textwrap.fill(links, 120, break_on_hyphens=False)
 
 
 def _entry(rule: Rule, example: Example | None) -> str:

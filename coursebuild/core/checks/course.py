@@ -19,6 +19,7 @@ from coursebuild.core.model import (
     is_blank,
     walk_inlines,
 )
+from coursebuild.core.model.blocks import title_line
 from coursebuild.core.registry import features
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
@@ -44,6 +45,7 @@ def _document_findings(
 ) -> Iterator[Diagnostic]:
     blocks = tuple(document_blocks(document))
     yield from _lesson_findings(course, document, blocks)
+    yield from _title_findings(course, document)
     yield from document_links(course, document, targets)
     yield from _term_findings(blocks, targets.terms)
 
@@ -76,6 +78,15 @@ def _lesson_findings(
         for lesson in course.lessons
         if lesson.document is document and lesson.status is Status.COMPLETE
     )
+
+
+def _title_findings(course: Course, document: Document) -> Iterator[Diagnostic]:
+    """A page that opens with a title other than the one that the map gives it."""
+    span = title_line(document.source)
+    for page in course.pages:
+        if page.document is document and span is not None and span.text != page.title:
+            message = f"the course map calls this page `{page.title}`"
+            yield diagnose("heading-top", span, message, help="give it one title in both")
 
 
 def _term_findings(blocks: Iterable[Block], known: Mapping[str, Span]) -> tuple[Diagnostic, ...]:

@@ -44,7 +44,7 @@ def rules_page() -> str:
     Raises:
         EffectError: the installation is broken.
     """
-    folder = _first(_PACKAGE / "docs", _TREE / "docs", "the page of rules is missing")
+    folder = _first(_PACKAGE / "docs", _TREE / "docs/reference", "the page of rules is missing")
     return (folder / "rules.md").read_text(encoding="utf-8")
 
 

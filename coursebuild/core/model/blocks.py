@@ -6,6 +6,7 @@ Entry points: the union `Block`, and `Document`.
 from __future__ import annotations
 
 import enum
+import re
 from collections.abc import Mapping
 from decimal import Decimal
 from typing import Literal, TypeAlias
@@ -14,6 +15,8 @@ from msgspec import Struct
 
 from coursebuild.core.model.inlines import Inline, Label, MediaAddress
 from coursebuild.core.text.source import Excerpt, Source, Span
+
+_TITLE = re.compile(r"\ufeff?# +(.*\S)")
 
 
 class Heading(Struct, frozen=True):
@@ -358,6 +361,12 @@ class Equation(Struct, frozen=True):
     """Its anchor."""
     number: str = ""
     """Of one with a label: `3`."""
+
+
+def title_line(source: Source) -> Span | None:
+    """The title of a page whose text opens with it, as a heading of level 1."""
+    found = _TITLE.match(source.text)
+    return source.span(*found.span(1)) if found is not None else None
 
 
 class Document(Struct, frozen=True, dict=True):

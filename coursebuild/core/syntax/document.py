@@ -27,6 +27,7 @@ from coursebuild.core.model import (
     document_inlines,
     walk_inlines,
 )
+from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import blocks_elsewhere
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import whole
@@ -45,11 +46,14 @@ _TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
     """Parse a lesson or a page.
 
-    `callouts` are the known kinds; a lesson, unlike a page, has no heading of level 1. All mistakes
-    are diagnostics, in the order of their places; the document holds all that could be read.
+    `callouts` are the known kinds; a lesson, unlike a page, has no heading of level 1. A page's
+    title, if it opens with it, is not in the document. All mistakes are diagnostics, in the order
+    of their places; the document holds all that could be read.
     """
     session = ParsingState(source, callouts, lesson)
     base = _without_front_matter(whole(source), session)
+    if not lesson and title_line(source) is not None:
+        base = base.slice(len(base.text.partition("\n")[0]))
     reader = TextReader(base, session, session.definitions, nested=False)
     blocks = reader.read()
     document = Document(source, blocks, session.notes.finish())

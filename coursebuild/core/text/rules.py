@@ -1,7 +1,7 @@
 """The closed catalogue of rules: every mistake that the tool can name.
 
-Entry point: `RULES`, from name to `Rule`. `docs/rules.md` is written from it, and a fixture in
-`tests/fixtures/rules/` shows for each what an author sees.
+Entry point: `RULES`, from name to `Rule`. `docs/reference/rules.md` is written from it, and
+a fixture in `tests/fixtures/rules/` shows for each what an author sees.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "heading-top",
         "error",
-        "A heading of level 1 in a lesson; the title comes from the course map.",
+        "A heading of level 1 in a lesson, or one over a page that is not its title in the map.",
     ),
     ("heading-skip", "warning", "A heading skips a level."),
     ("heading-empty", "error", "A heading has no text."),

@@ -1,7 +1,8 @@
 """Labs of the kinds that a course brings: what their own code needs, published as it is.
 
-Entry point: `custom_lab`. The code is `content/labs/KIND.js`; docs/labs.md is its manual. What such
-a lab does only its code knows, so it is not tried; that its model exists and compiles is checked.
+Entry point: `custom_lab`. The code is `content/labs/KIND.js`; docs/explanation/how-labs-run.md
+is its manual. What such a lab does only its code knows, so it is not tried; that its model exists
+and compiles is checked.
 """
 
 from __future__ import annotations

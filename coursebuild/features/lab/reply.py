@@ -1,6 +1,6 @@
 """The reply of a trial, read: plain values with arrays.
 
-Entry point: `read_trial(reply)`. docs/labs.md says what a reply holds.
+Entry point: `read_trial(reply)`. docs/explanation/how-labs-run.md says what a reply holds.
 """
 
 from __future__ import annotations

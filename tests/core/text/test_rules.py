@@ -4,7 +4,8 @@ A case names a smallest course that breaks the rule (see `support.rule_cases`) a
 that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
 command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 3 s]` say which
 engine tries the labs, for what no course can bring about, or not in time.
-`pytest tests/core/text --rewrite-fixtures` writes the expected parts and `docs/rules.md` anew.
+`pytest tests/core/text --rewrite-fixtures` writes the expected parts and
+`docs/reference/rules.md` anew.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ installed_features()  # which bring rules of their own
 
 ROOT = Path(__file__).parents[3]
 FIXTURES = ROOT / "tests/fixtures/rules"
-PAGE = ROOT / "docs/rules.md"
+PAGE = ROOT / "docs/reference/rules.md"
 FILES = {path.stem: path for path in sorted(FIXTURES.glob("*.md"))}
 CASES = {name: read_cases(path) for name, path in FILES.items()}
 SENTENCE = re.compile(r"(?!MuJoCo|JavaScript|Markdown|Python)[A-Z][a-z]")

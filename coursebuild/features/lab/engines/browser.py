@@ -1,7 +1,7 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry points: `LabEngine.trial`, `LabEngine.mistakes`. See docs/labs.md for what is asked and
-answered.
+Entry points: `LabEngine.trial`, `LabEngine.mistakes`. See docs/explanation/how-labs-run.md for
+what is asked and answered.
 
 The engine is started when it is first needed, and again after a trial that ran too long or took too
 much memory: such a trial is told as what it is, and takes no other along.

@@ -4,8 +4,8 @@ Entry points: `export_script(lab, metadata)`; `filled`, the script with values f
 
 1. Every piece of the lab's code is translated (`statements`). Where one cannot be, there is
    no script, and the reason is said.
-2. The pieces are put together in the order in which the lab's core runs them (see docs/labs.md),
-   with the helpers that they use.
+2. The pieces are put together in the order in which the lab's core runs them (see
+   docs/explanation/how-labs-run.md), with the helpers that they use.
 3. `{{control:N}}` stands in the text for the value of control N; the page puts it in.
 """
 

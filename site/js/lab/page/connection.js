@@ -1,5 +1,5 @@
 /**
- * The page's one worker, and the line of each lab to it. docs/labs.md has the protocol.
+ * The page's one worker, and the line of each lab to it. docs/explanation/how-labs-run.md has the protocol.
  *
  *   const line = connection(workerUrl).open(id, receive)
  *   line.send({ type: 'play' }); line.close()

@@ -1,5 +1,5 @@
 /**
- * Labs of kinds that a course brings: `content/labs/NAME.js` with `mount(element, config, api)`. docs/labs.md is its manual.
+ * Labs of kinds that a course brings: `content/labs/NAME.js` with `mount(element, config, api)`. docs/explanation/how-labs-run.md is its manual.
  */
 
 import { buildControls, buildReadouts } from './controls.js'

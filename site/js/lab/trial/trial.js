@@ -1,7 +1,7 @@
 /**
  * A lab's trial: it is taken through everything that a reader can do with it, and what fails is told with its entry.
  *
- *   runTrial(engine, request, bytes, now) → reply          (both plain values, see docs/labs.md)
+ *   runTrial(engine, request, bytes, now) → reply          (both plain values, see docs/explanation/how-labs-run.md)
  *
  * 1. The main run: from the start, stepping as Play does. It gives the lab's static form and the material for parity.
  * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and with some steps after.

@@ -1,5 +1,5 @@
 /**
- * One lab of a page, as the worker runs it: messages in, frames out. docs/labs.md has the protocol.
+ * One lab of a page, as the worker runs it: messages in, frames out. docs/explanation/how-labs-run.md has the protocol.
  *
  * Frames are sent only while the page gives their buffers back, so that a page which cannot follow slows nothing but itself. What
  * lab code throws pauses the lab and is told with its entry.
