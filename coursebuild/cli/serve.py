@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import re
+import sys
+from typing import NoReturn
 
 from coursebuild.cli.arguments import add_running, options_of
-from coursebuild.cli.output import CLEAN
+from coursebuild.cli.output import style_of
 from coursebuild.preview.serve import serve
 
 EXAMPLES = """\
 examples:
-  coursebuild serve --port 0         at any free port
+  coursebuild serve --open           and open it in a browser
+  coursebuild serve --host 0.0.0.0   for other machines too, by a link with a token
 """
 
 
@@ -21,17 +25,39 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--port",
         type=_port,
         default=8000,
-        help="port on 127.0.0.1 (default: %(default)s; 0: any free one)",
+        help="default: %(default)s; 0: any free one",
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address to listen on (default: %(default)s, this machine only); on another one only "
+        "browsers are answered that open the link with the token which is printed",
+    )
+    parser.add_argument("--open", action="store_true", help="open it in a browser")
+    parser.add_argument(
+        "--embed",
+        action="append",
+        type=_origin,
+        default=[],
+        metavar="ORIGIN",
+        help="let pages of this origin show it in a frame, such as vscode-webview:",
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> NoReturn:
     """Build, serve, rebuild and reload on change, until it is interrupted."""
-    serve(options_of(arguments), arguments.port)
-    return CLEAN
+    options, said = options_of(arguments), arguments
+    style = style_of(sys.stderr)
+    serve(options, said.host, said.port, tuple(said.embed), style, browse=said.open)
 
 
 def _port(text: str) -> int:
     if not text.isdecimal() or int(text) > 65535:
         raise argparse.ArgumentTypeError(f"{text!r} is no port: a whole number from 0 to 65535")
     return int(text)
+
+
+def _origin(text: str) -> str:
+    if not re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
+        raise argparse.ArgumentTypeError(f"{text!r} is no origin, such as https://example.org")
+    return text

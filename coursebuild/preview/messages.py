@@ -2,8 +2,8 @@
 
 Entry points: `page_news(session, path)`, as JSON; `accept(session, path, id)`.
 
-1. Every mistake of the course, those of the page's own document first; each says whether the page
-   shows it in its place.
+1. Every mistake of the course: first those that keep the page as it was, then others of its
+   document. Each says whether the page shows it in its place.
 2. For each script of the page how it did, for each recorded output or figure that differs the two
    side by side, and for each bound number what would be right.
 3. What is offered has an id made from what the file holds and would hold. It is written only as
@@ -38,10 +38,12 @@ from coursebuild.core.scripts.diff import DiffRow, diff_rows
 from coursebuild.core.scripts.edit import apply_edits, updated_body
 from coursebuild.core.scripts.figures import difference, drawn_file
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity
+from coursebuild.core.text.source import Span
 from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.judge import judge
 from coursebuild.preview.session import Session
 from coursebuild.report import Report
+from coursebuild.report.text import location
 
 _MOST = 60
 """Mistakes that a page is told of."""
@@ -83,8 +85,14 @@ def page_news(session: Session, path: str) -> str:
     with session.changed:
         document = session.files.document(path)
         report = report_now(session)
+        blocking, own = session.blocking(path), "" if document is None else document.source.path
+
+        def rank(d: Diagnostic) -> tuple[bool, ...]:
+            return d not in blocking, d.severity is not Severity.ERROR, d.span.path != own
+
+        found = sorted(report.diagnostics, key=rank)[:_MOST]
         news: dict[str, Any] = {
-            "problems": [_problem(d, document) for d in _sorted(report.diagnostics, document)],
+            "problems": [{**_problem(d, own), "blocks": d in blocking} for d in found],
             "more": max(0, len(report.diagnostics) - _MOST),
             "kept": session.files.is_kept(path),
             "busy": session.busy,
@@ -105,24 +113,15 @@ def page_news(session: Session, path: str) -> str:
 # --- mistakes
 
 
-def _sorted(found: Iterable[Diagnostic], document: Document | None) -> list[Diagnostic]:
-    own = "" if document is None else document.source.path
-
-    def rank(diagnostic: Diagnostic) -> tuple[bool, bool]:
-        return diagnostic.severity is not Severity.ERROR, diagnostic.span.path != own
-
-    return sorted(found, key=rank)[:_MOST]
-
-
-def _problem(diagnostic: Diagnostic, document: Document | None) -> dict[str, Any]:
+def _problem(diagnostic: Diagnostic, own: str) -> dict[str, Any]:
+    """A mistake on the page of a document with this path."""
     span = diagnostic.span
-    here = document is not None and span.path == document.source.path
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
     return {
         "severity": diagnostic.severity.value,
         "rule": diagnostic.rule,
-        "place": f"{span.path}:{span.line}:{span.column}",
+        "place": location(span),
         "message": diagnostic.message,
         "label": diagnostic.label,
         "help": diagnostic.help,
@@ -130,12 +129,12 @@ def _problem(diagnostic: Diagnostic, document: Document | None) -> dict[str, Any
         "line": line,
         "start": span.column - 1,
         "end": max(end, span.column - 1),
-        "inPlace": here and diagnostic.rule in _IN_PLACE,
+        "inPlace": span.path == own and diagnostic.rule in _IN_PLACE,
     }
 
 
-def _note(message: str, span: Any) -> str:
-    return message if span is None else f"{span.path}:{span.line}:{span.column}: {message}"
+def _note(message: str, span: Span | None) -> str:
+    return message if span is None else f"{location(span)}: {message}"
 
 
 # --- scripts and outputs

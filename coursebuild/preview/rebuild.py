@@ -8,7 +8,7 @@ is running as it ends any other command.
    that print something else than is recorded run once more, so that it is known whether their new
    output can be offered.
 3. The files of the site are put together: pages that show something else now, fonts, the search.
-4. What is wrong is printed, where it is something else than before.
+4. What is wrong now and was not before is printed, and what is wrong no longer.
 
 A save in between begins this anew. A script that runs is ended only where it is another by now.
 """
@@ -18,7 +18,9 @@ from __future__ import annotations
 import functools
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from msgspec.structs import replace
 
@@ -30,13 +32,15 @@ from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import Extraction, extract
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import run
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.session import Session, is_same_script
-from coursebuild.report import Style, render_report
+from coursebuild.report import Report, Style, diagnostic_text, summary_line
+from coursebuild.report.text import location
 
 QUIET = 0.15
 """Seconds without a save after which the work begins."""
@@ -53,7 +57,9 @@ class SupersededError(Exception):
 class BackgroundRebuild:
     """See the module."""
 
-    def __init__(self, session: Session, options: Options, progress: Progress) -> None:
+    def __init__(
+        self, session: Session, options: Options, progress: Progress, style: Style
+    ) -> None:
         self._session = session
         self._options = options
         self._said = progress
@@ -64,7 +70,9 @@ class BackgroundRebuild:
         self._held: HeldLines = {}
         """The lines by which bound numbers held, also before an output was accepted."""
         self._server = ScriptServer()
-        self._printed: str | None = None
+        self._style = style
+        self._told: tuple[Diagnostic, ...] | None = None
+        """What was wrong when that was printed last."""
         self._failure: BaseException | None = None
 
     def close(self) -> None:
@@ -77,7 +85,7 @@ class BackgroundRebuild:
             self._failure = error
             self._session.changed.notify_all()
 
-    def follow(self) -> None:
+    def follow(self) -> NoReturn:
         """Work as long as the process lives."""
         while True:
             self._wait()
@@ -143,15 +151,25 @@ class BackgroundRebuild:
             session.busy = ""
             session.trouble = trouble
             session.tell()
-        report = report_now(session)
-        text = render_report(report, "text", Style())
-        if text == self._printed or trouble:
-            return
-        self._printed = text
-        if report.diagnostics:
-            print(text, file=sys.stderr, flush=True)
-        else:
-            self._said.say(f"checked: {text.strip().rpartition(': ')[2]}")
+        if not trouble:
+            self._tell_changes(report_now(session))
+
+    def _tell_changes(self, report: Report) -> None:
+        """Say what is wrong and was not before, and what is wrong no longer."""
+        now, before = report.diagnostics, self._told
+        self._told = now
+        new, gone = without(now, before or ()), without(before or (), now)
+        for diagnostic in new:
+            print(diagnostic_text(diagnostic, self._style) + "\n", file=sys.stderr, flush=True)
+        for diagnostic in gone:
+            self._said.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
+        counts = [f"{len(new)} new"] if new else []
+        counts += [f"{len(gone)} gone"] if gone else []
+        verdict = summary_line(report).rpartition(": ")[2]
+        if now and before is not None:
+            verdict = f"{verdict} ({', '.join(counts)})" if counts else f"still {verdict}"
+        if now or now != before:
+            self._said.say(f"checked: {verdict}")
 
     # --- scripts
 
@@ -209,3 +227,18 @@ class BackgroundRebuild:
             except RunStoppedError:
                 raise SupersededError from None
             session.take_second_runs(again)
+
+
+def without(these: Sequence[Diagnostic], others: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """Those that are not among the others; that lines have moved makes no difference."""
+
+    def identity(d: Diagnostic) -> tuple[str, ...]:
+        return d.rule, d.span.path, d.message, d.label
+
+    left = Counter(map(identity, others))
+    found = []
+    for diagnostic in these:
+        left[identity(diagnostic)] -= 1
+        if left[identity(diagnostic)] < 0:
+            found.append(diagnostic)
+    return found

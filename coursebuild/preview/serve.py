@@ -1,6 +1,6 @@
 """`coursebuild serve`: the course as a site in memory that follows every save.
 
-Entry point: `serve(options, port)`.
+Entry point: `serve`.
 
 1. The course is read; its pages are drawn when they are asked for.
 2. A thread takes saves (`saves`): the page that was saved is new within milliseconds.
@@ -14,10 +14,13 @@ from __future__ import annotations
 import gc
 import sys
 import threading
+import webbrowser
+from typing import NoReturn
+
+import segno
 
 from coursebuild.core.files.resources import Bundle
 from coursebuild.core.pages.assets import page_script
-from coursebuild.core.run.exit_immediately import exit_immediately
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.rebuild import BackgroundRebuild
@@ -25,6 +28,7 @@ from coursebuild.preview.saves import follow
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from coursebuild.preview.watcher import FolderWatcher
+from coursebuild.report import Style
 
 _GARBAGE = 200_000
 """Objects after which those in cycles are looked for: a preview lives long."""
@@ -32,8 +36,20 @@ _SWITCH = 0.001
 """Seconds after which a thread that computes lets another one: a save should not wait for long."""
 
 
-def serve(options: Options, port: int) -> None:
-    """Serve until interrupted, which is how a preview ends, and this process with it."""
+def serve(
+    options: Options,
+    host: str,
+    port: int,
+    embed: tuple[str, ...],
+    style: Style,
+    *,
+    browse: bool,
+) -> NoReturn:
+    """Serve until interrupted.
+
+    `embed`: origins whose pages may show the preview in a frame. `style`: of what is printed.
+    `browse`: open a browser.
+    """
     progress = Progress(quiet=options.quiet)
     session = Session(options)
     bundled = Bundle()
@@ -43,27 +59,38 @@ def serve(options: Options, port: int) -> None:
         "worker.js": page_script(bundled["js/preview-worker.js"]),
     }
     try:
-        server = PreviewServer(port, session, files)
+        server = PreviewServer(host, port, session, files, embed)
     except OSError as error:
-        raise UsageError(f"port {port} cannot be used: {error.strerror or error}") from None
+        why = error.strerror or error
+        raise UsageError(f"port {port} of {host} cannot be used: {why}") from None
     watcher = FolderWatcher(options.root)
     sys.setswitchinterval(_SWITCH)
     try:
-        print(f"serving {server.url} (stop with Ctrl-C)", file=sys.stderr, flush=True)
         session.start(options, progress)
         gc.freeze()  # what is read lives as long as the preview: nobody need look through it again
         gc.set_threshold(_GARBAGE, 50, 50)
         server.start()
         watcher.start()
-        _work(session, watcher, BackgroundRebuild(session, options, progress), progress, server.url)
-    except KeyboardInterrupt:
-        progress.say("stopped")
+        watcher.wait()
+        _announce(server.links, browse=browse, draw=progress.live)
+        _work(session, watcher, BackgroundRebuild(session, options, progress, style), progress)
     finally:
         watcher.stop()
         server.stop()
         session.close()
         options.store.close()
-    exit_immediately(0)
+
+
+def _announce(links: list[str], *, browse: bool, draw: bool) -> None:
+    """Say where the preview is, which answers there by now; for a phone's camera it is drawn."""
+    first, *others = links
+    print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
+    for link in others:
+        print(f"     or {link}", file=sys.stderr, flush=True)
+    if draw and "?" in links[-1]:
+        segno.make(links[-1]).terminal(sys.stderr, compact=True)
+    if browse:  # some wait until their window is there
+        threading.Thread(target=webbrowser.open, args=(first,), name="open", daemon=True).start()
 
 
 def _work(
@@ -71,11 +98,8 @@ def _work(
     watcher: FolderWatcher,
     rebuild: BackgroundRebuild,
     progress: Progress,
-    url: str,
-) -> None:
+) -> NoReturn:
     """Follow a course that was read; ends by an exception only."""
-    progress.say(f"ready: {url}")
-    watcher.wait()
 
     def saved(paths: frozenset[str], seconds: float) -> None:
         names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")

@@ -2,97 +2,90 @@
 
 Entry point: `PreviewServer`.
 
-1. It listens on the loopback interface only and answers only requests that name it as their host,
-   so that a page elsewhere cannot read the preview through a name that it points here.
+1. Whom it answers `access` says. Without `--host` it listens on the loopback interface only.
 2. Files come from a `Session`, which decides what there is; nothing is read from disk here.
 3. Pages get one script and one style sheet more. The script listens to `/.coursebuild/events`:
    `page` says which state of the page there is now, `news` what is to be said beside its text.
    A listener is told how things stand when it begins, so that nothing is lost by one that was away.
 4. In the place of a published site's service worker there is one that goes: a browser may have met
    such a site at this address before.
-5. What an author accepts in a page comes by `POST /.coursebuild/accept`, with a token that only a
-   page of this server can know.
+5. What an author accepts in a page comes by `POST /.coursebuild/accept`, a place that is to be
+   opened in an editor by `POST /.coursebuild/open`.
 """
 
 from __future__ import annotations
 
-import hashlib
+import ipaddress
 import json
-import posixpath
 import re
 import secrets
+import socket
+import socketserver
 import threading
 from collections.abc import Mapping
-from html import escape
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
-from urllib.parse import parse_qs, unquote, urlsplit
+from typing import Any, TypeAlias
+from urllib.parse import parse_qs, urlsplit
 
+import msgspec
+
+from coursebuild.preview.access import Access
+from coursebuild.preview.answers import JSON, PREFIX, TEXT, Answers, digest
+from coursebuild.preview.editor import open_in_editor
 from coursebuild.preview.messages import accept, page_news
 from coursebuild.preview.session import Session
 
-PREFIX = "/.coursebuild/"
-_TYPES = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".mjs": "text/javascript; charset=utf-8",
-    ".json": "application/json; charset=utf-8",
-    ".xml": "application/xml; charset=utf-8",
-    ".txt": "text/plain; charset=utf-8",
-    ".md": "text/plain; charset=utf-8",
-    ".py": "text/plain; charset=utf-8",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-    ".jpg": "image/jpeg",
-    ".jpeg": "image/jpeg",
-    ".webp": "image/webp",
-    ".gif": "image/gif",
-    ".ico": "image/x-icon",
-    ".ttf": "font/ttf",
-    ".woff2": "font/woff2",
-    ".wasm": "application/wasm",
-    ".zip": "application/zip",
-    ".pdf": "application/pdf",
-    ".webmanifest": "application/manifest+json",
-}
 _HEARTBEAT = 15.0
 """Seconds between signs of life on an event stream, by which a browser that went away is noticed.
 """
 _LASTING = re.compile(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
-_WORKER = "/service-worker.js"
+_Address: TypeAlias = ipaddress.IPv4Address | ipaddress.IPv6Address
 _LARGEST = 1 << 16
 """Bytes of a request's body."""
-_NOTHING = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
 
 
 class PreviewServer:
-    """Serves a site on `127.0.0.1:port`; port 0 takes any free one."""
+    """Serves a site."""
 
-    def __init__(self, port: int, session: Session, own: Mapping[str, bytes]) -> None:
-        """`own` are the preview's files, by name: `preview.js`, `preview.css`, `worker.js`."""
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        session: Session,
+        own: Mapping[str, bytes],
+        embed: tuple[str, ...] = (),
+    ) -> None:
+        """Take a port of a host; port 0 is any free one.
+
+        `own` are the preview's files, by name: `preview.js`, `preview.css`, `worker.js`. Pages of
+        the origins `embed` may show the preview in a frame.
+
+        Raises:
+            OSError: the port cannot be had.
+        """
         self.session = session
-        self.own = own
-        self.tool = digest(b"".join(own.values()))
-        self.token = secrets.token_urlsafe(18)
+        self.answers = Answers(session, own)
         self.ended = False
-        self._server = _Server(("127.0.0.1", port), _Handler)
-        self._server.preview = self
+        self._server = _Server(host, port, self)
+        address, number = self._server.server_address[:2]
+        self._address, self._port = ipaddress.ip_address(str(address)), int(number)
+        token = "" if self._address.is_loopback else secrets.token_urlsafe(12)
+        self.access = Access(self._port, token, embed)
         self._thread = threading.Thread(
             target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, name="preview"
         )
         self._thread.daemon = True
 
     @property
-    def port(self) -> int:
-        """The port that it listens on."""
-        return int(self._server.server_address[1])
-
-    @property
-    def url(self) -> str:
-        """Where the preview is."""
-        return f"http://127.0.0.1:{self.port}/"
+    def links(self) -> list[str]:
+        """Addresses of the preview: one for this machine, then one for others."""
+        hosts = [self._address]
+        if self._address.is_unspecified:
+            hosts = [ipaddress.ip_address("127.0.0.1"), *_outer_address()]
+        shown = [f"[{host}]" if host.version == 6 else str(host) for host in hosts]
+        query = f"?token={self.access.token}" if self.access.token else ""
+        return [f"http://{host}:{self._port}/{query}" for host in shown]
 
     def start(self) -> None:
         """Begin to answer, in a thread of its own."""
@@ -109,72 +102,29 @@ class PreviewServer:
             self._server.shutdown()
         self._server.server_close()
 
-    # --- what the handler asks
 
-    def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
-        """Status, content type and bytes of an address path."""
-        if path.endswith(_WORKER):
-            path = f"{PREFIX}worker.js"
-        own = self.own.get(path.removeprefix(PREFIX)) if path.startswith(PREFIX) else None
-        if own is not None:
-            return HTTPStatus.OK, _type_of(path), own
-        name, data = self._file(path)
-        if data is not None and not name.endswith(".html"):
-            return HTTPStatus.OK, _type_of(name), data
-        if data is not None:
-            return HTTPStatus.OK, _type_of(name), _tagged(data, name, digest(data))
-        if self.session.files.has_page(name):
-            text = b"This page cannot be shown before its mistakes are mended."
-            return HTTPStatus.OK, _TYPES[".html"], _tagged(_NOTHING % text, name, "")
-        missing = self.session.find("404.html")
-        if missing is None:
-            missing = _NOTHING % b"Nothing is built yet."
-        return HTTPStatus.NOT_FOUND, _TYPES[".html"], _tagged(missing, name, "")
-
-    def _file(self, path: str) -> tuple[str, bytes | None]:
-        """The path in the site that an address means, and what is there.
-
-        The page for missing addresses names everything from the root of the host, where the
-        published site may lie in a folder.
-        """
-        base = self.session.base()
-        names = [path.lstrip("/")]
-        if path.startswith(base):
-            names.append(path.removeprefix(base))
-        found = [
-            unquote(name) + ("index.html" if not name or name.endswith("/") else "")
-            for name in names
-        ]
-        for name in found:
-            data = self.session.find(name)
-            if data is not None:
-                return name, data
-        return found[0], None
-
-
-def digest(data: bytes | None) -> str:
-    """By which two states of a page are told apart; empty where there is no page."""
-    return "" if data is None else hashlib.sha256(data).hexdigest()[:16]
-
-
-def _type_of(name: str) -> str:
-    return _TYPES.get(posixpath.splitext(name)[1].lower(), "application/octet-stream")
-
-
-def _tagged(page: bytes, name: str, state: str) -> bytes:
-    """The page with what the preview adds to it."""
-    about = f'data-page="{escape(name)}" data-state="{state}"'
-    tags = (
-        f'<link rel="stylesheet" href="{PREFIX}preview.css">'
-        f'<script src="{PREFIX}preview.js" {about}></script>'
-    ).encode("utf-8", "replace")
-    head, end, tail = page.rpartition(b"</body>")
-    return head + tags + end + tail if end else page + tags
+def _outer_address() -> list[_Address]:
+    """By what other machines reach this one, if they do; nothing is sent to find it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))
+        except OSError:
+            return []
+        return [ipaddress.ip_address(probe.getsockname()[0])]
 
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
-    preview: PreviewServer
+
+    def __init__(self, host: str, port: int, preview: PreviewServer) -> None:
+        self.preview = preview
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        self.address_family, _, _, _, (address, *_) = found[0]
+        super().__init__((str(address), port), _Handler)
+
+    def server_bind(self) -> None:
+        """Without the name of this host, which may take long to find."""
+        socketserver.TCPServer.server_bind(self)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that hangs up is no news."""
@@ -197,46 +147,54 @@ class _Handler(BaseHTTPRequestHandler):
             path, query = parts.path, parse_qs(parts.query)
         except ValueError:
             path, query = "", {}  # no address of a page
-        if not self._trusted():
-            self._refuse()
-        elif path == f"{PREFIX}events":
+        if not self._may_ask():
+            return
+        if path == f"{PREFIX}events":
             self._events(query.get("page", ["index.html"])[0])
         else:
-            self._send(*self.server.preview.find(path))
+            self._send(*self.server.preview.answers.find(path))
 
     do_HEAD = do_GET
 
     def do_POST(self) -> None:
-        """Accept what a page offers."""
-        preview = self.server.preview
+        """Accept what a page offers, or open a place in an editor."""
         body = self._body()
-        given = self.headers.get("X-Coursebuild-Token", "")
-        if self.path != f"{PREFIX}accept":
-            self._say(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is accepted here")
-        elif not (self._trusted() and self.headers.get("Origin")):
-            self._refuse()
-        elif not secrets.compare_digest(given.encode(), preview.token.encode()):
-            self._say(HTTPStatus.FORBIDDEN, "this page is older than the preview; load it again")
-        else:
-            wanted = _wanted(body)
-            if wanted is None:
+        if not self._may_ask():
+            return
+        session = self.server.preview.session
+        match self.path.removeprefix(PREFIX), _texts(body):
+            case "accept", {"page": page, "id": id}:
+                why = accept(session, page, id)
+            case "open", {"place": place}:
+                why = open_in_editor(session, place)
+            case "accept" | "open", _:
                 self._say(HTTPStatus.BAD_REQUEST, "the request cannot be read")
-            else:
-                why = accept(preview.session, *wanted)
-                self._say(HTTPStatus.CONFLICT if why else HTTPStatus.OK, why)
+                return
+            case _:
+                self._say(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is accepted here")
+                return
+        self._say(HTTPStatus.CONFLICT if why else HTTPStatus.OK, why)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Requests are not news."""
 
-    def _trusted(self) -> bool:
-        port = self.server.preview.port
-        hosts = {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]")}
-        if port == 80:
-            hosts |= {"127.0.0.1", "localhost", "[::1]"}
-        origin = self.headers.get("Origin")
-        return self.headers.get("Host", "").lower() in hosts and (
-            origin is None or origin.lower().removeprefix("http://") in hosts
-        )
+    def end_headers(self) -> None:
+        """Whatever is answered, errors of the base class too, is for pages of the preview only."""
+        for name, value in self.server.preview.access.headers.items():
+            self.send_header(name, value)
+        super().end_headers()
+
+    def _may_ask(self) -> bool:
+        """Whether a request is answered; one that is not is told why."""
+        access = self.server.preview.access
+        why = access.refusal(self.command, self.headers)
+        if not why and access.is_known(self.headers):
+            return True
+        entrance = None if why else access.exchange(self.path)
+        why = why or "open the address that the terminal shows, which lets this browser in"
+        status = HTTPStatus.FORBIDDEN if entrance is None else HTTPStatus.SEE_OTHER
+        self._send(status, TEXT, f"{why}\n".encode(), entrance or {})
+        return False
 
     def _body(self) -> bytes:
         """The body of a request; of one that is too long, or does not say how long, nothing."""
@@ -246,22 +204,21 @@ class _Handler(BaseHTTPRequestHandler):
             return b""
         return self.rfile.read(int(length))
 
-    def _refuse(self) -> None:
-        text = b"this preview answers only on this machine\n"
-        self._send(HTTPStatus.FORBIDDEN, "text/plain; charset=utf-8", text)
-
     def _say(self, status: HTTPStatus, message: str) -> None:
-        self._send(status, _TYPES[".json"], json.dumps({"message": message}).encode())
+        self._send(status, JSON, json.dumps({"message": message}).encode())
 
-    def _send(self, status: HTTPStatus, kind: str, data: bytes) -> None:
+    def _send(
+        self, status: HTTPStatus, kind: str, data: bytes, more: Mapping[str, str] | None = None
+    ) -> None:
         self.send_response(status)
+        for name, value in (more or {}).items():
+            self.send_header(name, value)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(data)))
         # What has a hash of its content in its name may be kept: fonts are there without a flash.
         lasting = status is HTTPStatus.OK and _LASTING.fullmatch(self.path)
         kept = "max-age=31536000, immutable" if lasting else "no-store"
         self.send_header("Cache-Control", kept)
-        self.send_header("X-Content-Type-Options", "nosniff")
         self.end_headers()
         if self.command != "HEAD":
             self.wfile.write(data)
@@ -284,7 +241,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _follow(self, page: str) -> None:
         preview, session = self.server.preview, self.server.preview.session
-        self._tell("hello", json.dumps({"tool": preview.tool, "token": preview.token}))
+        self._tell("hello", json.dumps({"tool": preview.answers.tool}))
         seen, state, news = -1, None, None
 
         def stir() -> bool:
@@ -313,11 +270,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.flush()
 
 
-def _wanted(body: bytes) -> tuple[str, str] | None:
-    """The page and the id of what is accepted."""
+def _texts(body: bytes) -> dict[str, str]:
+    """A JSON object of texts; empty where the body is something else."""
     try:
-        asked = json.loads(body)
-        page, id = asked["page"], asked["id"]
-    except (ValueError, TypeError, KeyError, RecursionError):
-        return None
-    return (page, id) if isinstance(page, str) and isinstance(id, str) else None
+        return msgspec.json.decode(body, type=dict[str, str])
+    except msgspec.DecodeError:
+        return {}

@@ -37,7 +37,7 @@ from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.load import Loaded, load
+from coursebuild.pipeline.load import MAP, Loaded, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
@@ -83,6 +83,7 @@ class Session:
         """What is still done in the background, in words; empty where everything is known."""
         self.trouble = ""
         """Why background work could not be done, if it could not."""
+        self._is_map_broken = False
         self.course: Course | None = None
         self.library: Library | None = None
         """What is known of the course, for drawing; `None` before a map could be read."""
@@ -125,6 +126,13 @@ class Session:
         with self.changed:
             static = (d for found in self._static.values() for d in found)
             return (*static, *self.found_by_running)
+
+    def blocking(self, path: str) -> list[Diagnostic]:
+        """What keeps the page at a site path as it was: mistakes in its text or in the map."""
+        document = self.files.document(path)
+        own = [] if document is None else self._static.get(document.source.path, ())
+        map_ = self._static.get(MAP, ()) if self._is_map_broken else ()
+        return [d for d in (*own, *map_) if d.severity is Severity.ERROR]
 
     def files_elsewhere(self) -> frozenset[str]:
         """The files of lessons and pages, and what they show of others."""
@@ -226,6 +234,7 @@ class Session:
             path = diagnostic.span.path
             found[path] = (*found.get(path, ()), diagnostic)
         same = found == {path: told for path, told in self._static.items() if told}
+        self._is_map_broken = loaded.course is None
         self._static = found
         if loaded.course is not None:
             same = same and reports == self._reports and _is_same(self.course, loaded.course)

@@ -22,12 +22,11 @@ let state = own.dataset.state // of the page that is shown
 let wanted = state
 let taking = false
 let tool = null
-let token = ''
 let latest = null // news
 let head = document.cloneNode(true)
 const twin = new Twin(document.body)
-const panel = new Panel()
-const marks = new Marks(accept)
+const panel = new Panel((place) => ask('open', { place }))
+const marks = new Marks((id) => ask('accept', { page, id }))
 
 /** Bring the page to the state that the server has, as often as that is another one by then. */
 async function take() {
@@ -61,13 +60,10 @@ function change(next) {
   keep()
 }
 
-async function accept(id) {
+/** Ask the preview to do something; gives why it did not, or nothing. */
+async function ask(what, values) {
   try {
-    const response = await fetch('/.coursebuild/accept', {
-      method: 'POST',
-      headers: { 'Content-Type': 'application/json', 'X-Coursebuild-Token': token },
-      body: JSON.stringify({ page, id }),
-    })
+    const response = await fetch(`/.coursebuild/${what}`, { method: 'POST', body: JSON.stringify(values) })
     return (await response.json()).message
   } catch {
     return 'the preview does not answer'
@@ -80,7 +76,6 @@ connect(page, {
   hello(told) {
     if (tool !== null && tool !== told.tool) location.reload() // another version of the preview itself
     tool = told.tool
-    token = told.token
     panel.state({ lost: false })
   },
   page(now) {

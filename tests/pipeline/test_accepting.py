@@ -38,21 +38,18 @@ def test_output_is_accepted(make: Make) -> None:
         ]
         asked = {"page": "lessons/1.1-one.html", "id": output["offer"]}
         body = json.dumps(asked).encode()
-        right = {
-            "Origin": f"http://127.0.0.1:{preview.port}",
-            "X_Coursebuild_Token": events.hello["token"],
-        }
+        right = {"Origin": f"http://127.0.0.1:{preview.port}"}
         before = folder.read(folder.lesson())
-        alone = (403, "this preview answers only on this machine\n")
-        older = (403, {"message": "this page is older than the preview; load it again"})
+        unsaid = (403, "a request that changes something says where it comes from\n")
+        other = (403, "pages of other origins cannot use the preview\n")
+        alone = (403, "this preview answers only as localhost\n")
         unread = (400, {"message": "the request cannot be read"})
         gone = (409, {"message": "this is no longer what the page offers; look at it again"})
         for wrong, data, answer in (
-            ({"Origin": ""}, body, alone),
-            ({"Origin": "http://evil.example"}, body, alone),
+            ({"Origin": ""}, body, unsaid),
+            ({"Origin": "http://evil.example"}, body, other),
+            ({"Origin": "http://127.0.0.1:9"}, body, other),
             ({"Host": "evil.example"}, body, alone),
-            ({"X_Coursebuild_Token": "x"}, body, older),
-            ({"X_Coursebuild_Token": ""}, body, older),
             ({}, b"{", unread),
             ({}, b"[1]", unread),
             ({}, b'{"page": 1, "id": 2}', unread),
@@ -86,7 +83,7 @@ with open("a.svg", "w") as file:
         for offered in (drawing, data):
             body = json.dumps({"page": "lessons/1.1-one.html", "id": offered["offer"]}).encode()
             origin = f"http://127.0.0.1:{preview.port}"
-            told = preview.accept(body, Origin=origin, X_Coursebuild_Token=events.hello["token"])
+            told = preview.accept(body, Origin=origin)
             assert told == (200, {"message": ""})
         events.settled()
         assert events.news["figures"] == []
@@ -105,11 +102,7 @@ def test_what_changed_since_is_not_written(make: Make) -> None:
         mine = folder.read(folder.lesson())
         preview.process.send_signal(signal.SIGCONT)
         body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
-        status, told = preview.accept(
-            body,
-            Origin=f"http://127.0.0.1:{preview.port}",
-            X_Coursebuild_Token=events.hello["token"],
-        )
+        status, told = preview.accept(body, Origin=f"http://127.0.0.1:{preview.port}")
         assert status == 409
         assert told["message"] in (
             "content/lessons/1.1-one.md was changed in the meantime",
@@ -147,15 +140,11 @@ def test_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None
         "## Again\n\n`2.01 s`{out=examples/x.py} and `1.003`{out=examples/x.py}\n",
     )
     with serving(folder) as preview, preview.events() as events:
-        right = {
-            "Origin": f"http://127.0.0.1:{preview.port}",
-            "X_Coursebuild_Token": "",
-        }
+        origin = f"http://127.0.0.1:{preview.port}"
 
         def accept(id: str) -> None:
-            right["X_Coursebuild_Token"] = events.hello["token"]
             body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
-            assert preview.accept(body, **right) == (200, {"message": ""})
+            assert preview.accept(body, Origin=origin) == (200, {"message": ""})
 
         events.until(lambda told: any(o.get("offer") for o in told.news["outputs"]))
         assert events.news["numbers"] == []  # what is recorded bears them out

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.lab_page import comes
-from support.preview_process import Preview, serving
+from support.preview_process import Preview, serving, wait_for
 from support.scratch_course import GOOD, ROOT, Folder, block
+from support.static_host import Host
 
 Make = Callable[..., Folder]
 pytestmark = pytest.mark.browser
@@ -166,9 +169,14 @@ def test_the_reader_stays_where_they_were(make: Make, browser: Browser) -> None:
             opened.unbroken()
 
 
-def test_mistakes_are_shown_and_clear_by_themselves(make: Make, browser: Browser) -> None:
+def test_mistakes_are_shown_and_clear_by_themselves(
+    make: Make, browser: Browser, tmp_path: Path
+) -> None:
     folder = make(GOOD, "## Two\n")
-    with serving(folder) as preview:
+    editor, told = tmp_path / "code", tmp_path / "told"
+    editor.write_text(f'#!/bin/sh\necho "$@" > "{told}"\n')
+    editor.chmod(0o755)
+    with serving(folder, env={"VISUAL": str(editor)}) as preview:
         preview.heard("checked: ")
         other = Open(browser, preview, "lessons/1.2-two.html")
         with other, Open(browser, preview, LESSON) as opened:
@@ -178,7 +186,9 @@ def test_mistakes_are_shown_and_clear_by_themselves(make: Make, browser: Browser
             folder.replace(folder.lesson(), "## Hello\n", "## Never\n\n[x](lesson:9.9)\n")
             see(panel)
             expect(panel).to_contain_text("The last good page is shown")
-            expect(panel).to_contain_text("content/lessons/1.1-one.md:3:5")
+            panel.get_by_role("button", name="content/lessons/1.1-one.md:3:5").click()
+            wait_for(told, 1)
+            assert told.read_text() == f"--goto {folder.root / folder.lesson()}:3:5\n"
             expect(panel).to_contain_text("lesson 9.9 is linked to, and the course map does not")
             expect(panel.locator(".preview-source mark")).to_have_text("lesson:9.9")
             expect(page.locator(".prose h2").first).to_contain_text("Hello")
@@ -196,8 +206,18 @@ def test_mistakes_are_shown_and_clear_by_themselves(make: Make, browser: Browser
             see(panel)
             page.keyboard.press("Escape")
             expect(panel).to_have_count(0)
+            folder.replace(folder.lesson(2), "## Two\n", "[x](lesson:9.9)\n")
+            expect(page.get_by_role("button", name="2 mistakes")).to_be_visible()
             folder.replace(folder.lesson(), "[x](lesson:9.9)", "[x](lesson:9.9) $\\frac{1$")
             see(panel)
+            # What keeps this page comes first, elsewhere what keeps that one.
+            kinds = ["Blocks this page", "Blocks this page", "Mistake"]
+            expect(panel.locator("strong")).to_have_text(kinds)
+            kinds = ["Blocks this page", "Mistake", "Mistake"]
+            elsewhere = other.page.get_by_role("region", name="Problems")
+            expect(elsewhere.locator("strong")).to_have_text(kinds)
+            expect(elsewhere.get_by_role("listitem").first).to_contain_text("1.2-two.md:1:5")
+            folder.write(folder.lesson(2), "## Two\n")
             expect(panel).to_contain_text("the formula does not parse")
             folder.write(folder.lesson(), GOOD.replace("## Hello", "## Mended"))
             expect(panel).to_have_count(0)
@@ -360,6 +380,78 @@ def test_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> No
             expect(opened.page.locator(".prose h2")).to_contain_text("Back")
             expect(opened.page.locator(".preview-button")).to_be_hidden()
             assert opened.page.evaluate("window.same")
+
+
+ATTACK = """
+<!DOCTYPE html><html lang=en><title>Elsewhere</title><body>
+<form method=post enctype=text/plain action=ADDRESS.coursebuild/accept><button>Go</button></form>
+<a href="ADDRESS">Link</a>
+<script>
+  window.draft = 'nothing'
+  window.coursebuildSearch = { take: (...all) => { window.draft = all } }
+</script>
+<iframe src="ADDRESS"></iframe>
+"""
+STEAL = """async (address) => {
+  const said = {}
+  const add = (name, element, attribute) => new Promise((done) => {
+    element.addEventListener('load', () => done(said[name] = 'loaded'))
+    element.addEventListener('error', () => done(said[name] = 'refused'))
+    element[attribute] = address + name
+    document.body.append(element)
+  })
+  await add('search/index.js', document.createElement('script'), 'src')
+  await add('files/pic.svg', document.createElement('img'), 'src')
+  for (const mode of ['cors', 'no-cors']) {
+    const answer = fetch(address, { mode, credentials: 'include' })
+    said[mode] = await answer.then(() => 'loaded', () => 'refused')
+  }
+  const source = new EventSource(address + '.coursebuild/events?page=index.html')
+  said.events = await new Promise((done) => {
+    source.addEventListener('hello', () => done('loaded'))
+    source.addEventListener('error', () => done('refused'))
+  })
+  return said
+}"""
+
+
+def test_page_of_another_origin_can_only_link_to_the_preview(
+    make: Make, browser: Browser, tmp_path: Path
+) -> None:
+    """From another site, and from another port of this one."""
+    folder = make(GOOD + "![A](../pic.svg)\n")
+    folder.write("content/pic.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
+    (tmp_path / "evil").mkdir()
+    with Host(tmp_path / "evil") as host:
+        evil = (host.url, host.url.replace("localhost", "127.0.0.1"))
+        friend = host.url.rstrip("/")
+        for arguments, framing in (([], ()), ([f"--embed={friend}"], evil[:1])):
+            with serving(folder, *arguments) as preview:
+                preview.heard("checked: ")
+                address = f"http://127.0.0.1:{preview.port}/"
+                attack = ATTACK.replace("ADDRESS", address)
+                (tmp_path / "evil/index.html").write_text(attack)
+                for url in evil:
+                    with contextlib.closing(browser.new_page()) as page:
+                        page.goto(url)
+                        can_only_link(page, address, framed=url in framing)
+
+
+def can_only_link(page: Page, address: str, *, framed: bool) -> None:
+    """And show the preview in a frame, if it may."""
+    (frame,) = page.main_frame.child_frames
+    if framed:
+        expect(frame.locator("h1").first).to_have_text("Scratch")
+    else:
+        comes(page, lambda: frame.url.startswith("chrome-error:"))
+    said = page.evaluate(STEAL, address)
+    assert set(said.values()) == {"refused"}, said
+    assert page.evaluate("window.draft") == "nothing"
+    page.get_by_role("button", name="Go").click()
+    expect(page.locator("body")).to_have_text(re.compile("of other origins"))
+    page.go_back()
+    page.get_by_role("link", name="Link").click()
+    expect(page.locator("h1").first).to_have_text("Scratch")
 
 
 def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> None:

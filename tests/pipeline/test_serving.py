@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import re
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from support.preview_process import Preview, serving
+from support.preview_process import Preview, serving, wait_for
 from support.scratch_course import GOOD, Folder
 
 Make = Callable[..., Folder]
@@ -77,7 +78,6 @@ def test_address_of_nothing_has_the_page_that_says_so(preview: Preview, make: Ma
     folder = make(GOOD)  # it names everything from where the published site will be
     folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
     with serving(folder) as other:
-        other.heard("ready: ")
         status, _, body = other.get("/no/such/page.html")
         found = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
         assert (status, len(found)) == (404, 1)
@@ -125,47 +125,122 @@ def test_head_has_no_body_and_other_methods_are_refused(preview: Preview) -> Non
     assert found == dict.fromkeys(methods, 501)
 
 
+# --- who is answered
+
+SITE, MODE, DEST = "Sec_Fetch_Site", "Sec_Fetch_Mode", "Sec_Fetch_Dest"
+LINK = {SITE: "cross-site", MODE: "navigate", DEST: "document"}
 CALLERS: tuple[tuple[dict[str, str], int], ...] = (
     ({"Host": "127.0.0.1:PORT"}, 200),
-    ({"Host": "localhost:PORT"}, 200),
     ({"Host": "LOCALHOST:PORT"}, 200),
+    ({"Host": "localhost:9"}, 200),  # a port that is forwarded
     ({"Host": "[::1]:PORT"}, 200),
-    ({"Host": "127.0.0.1"}, 403),
-    ({"Host": "127.0.0.1:1"}, 403),
+    ({"Host": "192.0.2.7"}, 200),  # an address cannot be made to point elsewhere
     ({"Host": "evil.example:PORT"}, 403),
     ({"Host": "127.0.0.1.evil.example:PORT"}, 403),
+    ({"Host": "localhost.evil.example"}, 403),
+    ({"Host": "["}, 403),
     ({"Host": ""}, 403),
+    ({"Origin": "http://127.0.0.1:PORT"}, 200),
+    ({"Origin": "http://127.0.0.1:9"}, 403),
     ({"Origin": "http://evil.example"}, 403),
     ({"Origin": "null"}, 403),
-    ({"Origin": "http://127.0.0.1:PORT"}, 200),
+    ({SITE: "same-origin"}, 200),
+    ({SITE: "none", MODE: "navigate", DEST: "document"}, 200),
+    ({SITE: "same-site", MODE: "cors", DEST: "empty"}, 403),  # another port of this host
+    ({SITE: "cross-site", MODE: "no-cors", DEST: "script"}, 403),
+    (LINK, 200),
+    ({**LINK, DEST: "iframe"}, 403),
+    ({**LINK, DEST: "object"}, 403),
 )
+PRIVATE = {
+    "Content-Security-Policy": "frame-ancestors 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "X-Content-Type-Options": "nosniff",
+}
 
 
-def test_only_this_machine_is_answered(preview: Preview) -> None:
+def test_other_origins_can_only_link_to_the_preview(preview: Preview) -> None:
     wrong = []
-    for path, method in (("/", "GET"), ("/.coursebuild/events", "HEAD")):
+    for path, method in (("/", "GET"), ("/search/index.js", "GET"), ("/", "POST"), ("/", "PUT")):
         for given, status in CALLERS:
-            port = str(preview.port)
-            headers = {name: value.replace("PORT", port) for name, value in given.items()}
-            got, _, body = preview.get(path, method, **headers)
-            refused = body == b"this preview answers only on this machine\n"
-            if got != status or (status == 403 and method == "GET" and not refused):
-                wrong.append((path, given, got, body[:50]))
+            headers = {n: v.replace("PORT", str(preview.port)) for n, v in given.items()}
+            got, told, body = preview.get(path, method, **headers)
+            expected = {"GET": status, "PUT": 501}.get(method, 403)
+            if method == "POST" and given == {"Origin": "http://127.0.0.1:PORT"}:
+                expected = 405
+            told_more = got == 403 and b"Scratch" in body
+            if got != expected or told_more or told | PRIVATE != told:
+                wrong.append((path, method, given, got, told))
     assert wrong == []
 
 
-def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
-    ports = []
+def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> None:
+    origins = ("vscode-webview:", "https://*.example.org:8080")
+    with serving(make(GOOD), *(f"--embed={origin}" for origin in origins)) as preview:
+        status, headers, _ = preview.get("/", **{**LINK, DEST: "iframe"})
+        policy = "frame-ancestors vscode-webview: https://*.example.org:8080"
+        assert (status, headers["Content-Security-Policy"]) == (200, policy)
+        assert preview.get("/", **{SITE: "cross-site", DEST: "script"})[0] == 403
+        for wrong in ("example.org", "https://a;script-src *", "*"):
+            done = preview.folder.main("serve", "--embed", wrong)
+            assert (done.status, "is no origin" in done.err) == (2, True)
+
+
+def test_other_machines_need_the_token_of_the_link(make: Make) -> None:
+    with serving(make(GOOD), "--host", "0.0.0.0") as preview:
+        (token,) = re.findall(r"/\?token=([\w-]{16,})", preview.heard("serving http://"))
+        status, headers, body = preview.get("/")
+        assert (status, headers | PRIVATE == headers) == (403, True)
+        assert body == b"open the address that the terminal shows, which lets this browser in\n"
+        assert preview.get("/?token=x")[0] == 403
+        away = {"Host": "laptop.local:8000"}
+        assert preview.get("http://[?token=x", **away)[0] == 403
+        address = f"//evil.example/?a=1&token={token}"
+        status, headers, _ = preview.get(address, **away, **LINK)
+        assert (status, headers["Location"]) == (303, "/evil.example/?a=1")
+        cookie, *rules = headers["Set-Cookie"].split("; ")
+        assert rules == ["Path=/", "HttpOnly", "SameSite=Lax"]
+        for known, status in ((f"a=b; {cookie}", 200), (f"{cookie}x", 403), (cookie[:-1], 403)):
+            assert preview.get("/", Cookie=known, **away)[0] == status, known
+        assert preview.get("/", Cookie=cookie, **{SITE: "cross-site"})[0] == 403
+        assert listening(preview) == ["00000000"]
+
+
+def listening(preview: Preview) -> list[str]:
+    """The addresses at which something listens on the preview's port."""
+    found = []
     for table in ("/proc/net/tcp", "/proc/net/tcp6"):
         with contextlib.suppress(FileNotFoundError):
             for row in Path(table).read_text().splitlines()[1:]:
                 address, state = row.split()[1], row.split()[3]
                 if state == "0A" and address.endswith(f":{preview.port:04X}"):
-                    ports.append(address.partition(":")[0])
-    assert ports == ["0100007F"]
+                    found.append(address.partition(":")[0])
+    return found
 
 
-def test_port_that_is_taken_is_told(preview: Preview) -> None:
-    done = preview.folder.main("serve", "--port", str(preview.port))
-    assert (done.status, done.out) == (2, "")
-    assert f"port {preview.port} cannot be used: Address already in use" in done.err
+def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
+    assert listening(preview) == ["0100007F"]
+
+
+def test_port_or_host_that_cannot_be_had_is_told(preview: Preview) -> None:
+    for host, why in (("127.0.0.1", "Address already in use"), ("no.invalid", "Name or service")):
+        done = preview.folder.main("serve", "--host", host, "--port", str(preview.port))
+        assert (done.status, done.out) == (2, "")
+        assert f"port {preview.port} of {host} cannot be used: {why}" in done.err
+
+
+def test_browser_is_opened_when_the_address_answers(make: Make, tmp_path: Path) -> None:
+    told = tmp_path / "told"
+    browser = tmp_path / "browser"
+    browser.write_text(
+        f"#!{sys.executable}\n"
+        "import pathlib, sys, urllib.request\n"
+        "status = urllib.request.urlopen(sys.argv[1]).status\n"
+        f"told = pathlib.Path({str(told)!r})\n"
+        "told.with_suffix('.new').write_text(f'{sys.argv[1]} {status}')\n"
+        "told.with_suffix('.new').rename(told)\n"
+    )
+    browser.chmod(0o755)
+    with serving(make(GOOD), "--open", env={"BROWSER": f"{browser} %s"}) as preview:
+        wait_for(told)
+        assert told.read_text() == f"http://127.0.0.1:{preview.port}/ 200"

@@ -67,6 +67,28 @@ def test_page_is_told_of_every_save(make: Make) -> None:
         events.settled()
 
 
+def test_terminal_tells_what_is_new_and_what_is_gone(make: Make) -> None:
+    """Wherever lines have moved to."""
+    folder = make(GOOD)
+    with serving(folder) as preview:
+        preview.heard("checked: everything holds")
+        for text, mistakes, said in (
+            ("[a](lesson:8.1)\n\n[b](lesson:8.2)\n", ["8.1", "8.2"], "2 errors (2 new)"),
+            ("Text.\n\n[b](lesson:8.2)\n\n[c](#c)\n", ["link-anchor"], "2 errors (1 new, 1 gone)"),
+            ("More.\n\nText.\n\n[b](lesson:8.2)\n\n[c](#c)\n", [], "still 2 errors"),
+            ("", [], "everything holds"),
+        ):
+            before = len(preview.said)
+            folder.write(folder.lesson(), GOOD + text)
+            preview.heard(f"checked: {said}", before)
+            lines = preview.said[before:]
+            new = [line for line in lines if line.startswith("error[")]
+            assert len(new) == len(mistakes)
+            assert all(mistake in line for mistake, line in zip(mistakes, new, strict=True))
+            gone = [line for line in lines if line.startswith(f"gone: {folder.lesson()}:")]
+            assert len(gone) == {"2 errors (1 new, 1 gone)": 1, "everything holds": 2}.get(said, 0)
+
+
 SAVES: dict[str, Callable[[Path, str], None]] = {}
 
 
@@ -274,7 +296,7 @@ def test_preview_that_is_interrupted_ends_cleanly(make: Make) -> None:
         preview.heard("checked: ")
         assert not pruned.exists()
         preview.process.send_signal(signal.SIGINT)
-        preview.stopped()
+        preview.interrupted()
         for _ in events.stream:  # it ends
             pass
         assert preview.process.stdout is not None and preview.process.stdout.read() == b""
@@ -285,7 +307,8 @@ def test_preview_that_is_interrupted_ends_cleanly(make: Make) -> None:
     process = folder.start("serve", "--port", str(port), stderr=subprocess.PIPE)
     with ended(process):
         assert process.stderr is not None
-        assert process.stderr.readline().startswith(b"serving http://127.0.0.1:%d/" % port)
+        serving_ = b"serving http://127.0.0.1:%d/" % port
+        assert any(line.startswith(serving_) for line in process.stderr)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
@@ -296,12 +319,17 @@ def test_scripts_end_with_the_preview(make: Make, number: int) -> None:
         wait_for(folder.root / "begun")
         preview.process.send_signal(number)
         status = preview.process.wait(600)
-        assert status == (-number if number == signal.SIGKILL else 0)
+        assert status == (-number if number == signal.SIGKILL else 143)
     wait_until_alone(folder)
 
 
 def test_preview_that_is_ended_while_the_course_is_read_ends_cleanly(make: Make) -> None:
     folder = make(*(GOOD.replace("hello.py", f"hello{n}.py") + "$x$\n" * 500 for n in range(6)))
-    with serving(folder, env=SILENT) as preview:  # it has said where it will serve
-        preview.process.send_signal(signal.SIGTERM)
-        preview.stopped()
+    process = folder.start("serve", "--port", "0", env=SILENT, stderr=subprocess.PIPE)
+    with ended(process):
+        assert process.stderr is not None
+        assert process.stderr.readline() == b"reading lessons and pages\n"
+        process.terminate()
+        assert process.stderr.read().endswith(b"terminated\n")
+        assert process.wait(600) == 143
+    wait_until_alone(folder)

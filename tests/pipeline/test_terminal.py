@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import contextlib
 import fcntl
+import json
 import os
 import pty
 import re
@@ -182,6 +183,31 @@ def test_ctrl_c_in_a_terminal_interrupts(make: Make) -> None:
         text = shown.read()
         assert shown.process.wait(120) == 130
     assert screen(text).replace("^C", "").strip() == "interrupted"
+    wait_until_alone(folder)
+
+
+def test_ctrl_c_ends_a_preview_whatever_it_does(make: Make) -> None:
+    """Nothing, a script, a lab; once and in haste."""
+    lab = {"title": "A lab", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}
+    folder = make("## One\n\n" + slow("slow.py") + f"```lab\n{json.dumps(lab)}\n```\n")
+    ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+    folder.write("models/ball.xml", ball)
+    for keys in (b"\x03", b"\x03\x03", b"\x03\x03\x03\x03"):
+        with terminal(folder, "serve", "--port", "0") as shown:
+            shown.read("running scripts 0/1")
+            shown.type(keys)
+            text = shown.read()
+            assert shown.process.wait(120) == 130
+        assert screen(text).rstrip().endswith("interrupted")
+        assert "Traceback" not in text
+        wait_until_alone(folder)
+    folder.write(folder.lesson(), "## One\n")
+    with terminal(folder, "serve", "--port", "0", "--host", "0.0.0.0") as shown:
+        shown.read("everything holds")
+        shown.type(b"\x03")
+        text = shown.read()
+        assert shown.process.wait(120) == 130
+    assert "▄" in text, "the link as a picture, for the camera of a phone"
     wait_until_alone(folder)
 
 

@@ -12,6 +12,7 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.rebuild import BackgroundRebuild
 from coursebuild.preview.session import Session
+from coursebuild.report import Style
 from support.scratch_course import Folder
 
 COPIES = (".br", ".gz")
@@ -28,7 +29,7 @@ class Live:
         self.folder = folder
         options, quiet = Options(folder.root.resolve(), 2, True), Progress(quiet=True)
         self.session = Session(options)
-        self.rebuild = BackgroundRebuild(self.session, options, quiet)
+        self.rebuild = BackgroundRebuild(self.session, options, quiet, Style())
         self.session.start(options, quiet)
 
     def save(self, *paths: str) -> bool:

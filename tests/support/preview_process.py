@@ -39,7 +39,7 @@ class Preview:
         self.said: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        first = self.heard("serving http://")
+        first = self.heard("serving http://127.0.0.1:")
         self.port = int(first.partition("127.0.0.1:")[2].partition("/")[0])
 
     def _read(self) -> None:
@@ -59,11 +59,11 @@ class Preview:
             assert self.process.poll() is None, self.said
             time.sleep(0.02)
 
-    def stopped(self, status: int = 0) -> None:
-        """It comes to its end, by itself and in good order."""
-        assert self.process.wait(600) == status
+    def interrupted(self) -> None:
+        """It comes to its end, in good order."""
+        assert self.process.wait(600) == 130
         self._reader.join(600)
-        assert self.said[-1] == "stopped"
+        assert self.said[-1] == "interrupted"
         assert "Traceback" not in "\n".join(self.said)
 
     def get(

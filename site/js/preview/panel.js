@@ -26,7 +26,9 @@ export function summary({ problems, busy, trouble }, lost, gone) {
 }
 
 export class Panel {
-  constructor() {
+  /** `openPlace` asks for a place to be opened in the editor; it promises why it was not, or nothing. */
+  constructor(openPlace) {
+    this.openPlace = openPlace
     this.news = { problems: [], more: 0, busy: '', trouble: '' }
     this.lost = false
     this.gone = false
@@ -96,27 +98,38 @@ export class Panel {
     const close = h('button', { type: 'button', class: 'preview-close', click: () => this.toggle() }, 'Close')
     const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, kept ? 'The last good page is shown' : 'What is wrong with the course'), close)]
     if (trouble) parts.push(h('pre', { class: 'preview-trouble' }, trouble))
-    parts.push(h('ol', { class: 'preview-problems' }, ...problems.map(problem)))
+    parts.push(h('ol', { class: 'preview-problems' }, ...problems.map((problem) => this.problem(problem))))
     if (more) parts.push(h('p', {}, `and ${more} more, in the terminal`))
     return parts
+  }
+
+  problem({ severity, rule, place, message, label, help, notes, line, start, end, blocks }) {
+    const item = h('li', { class: `preview-problem preview-${severity}` })
+    const kind = blocks ? 'Blocks this page' : severity === 'error' ? 'Mistake' : 'Warning'
+    item.append(
+      h('p', { class: 'preview-message' }, h('strong', {}, kind), ' ', ...coded(message)),
+      h('p', { class: 'preview-place' }, this.place(place), ` ${rule}`),
+    )
+    if (line.trim()) {
+      const marked = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
+      item.append(h('pre', { class: 'preview-source', tabindex: '0' }, line.slice(0, start), marked, line.slice(Math.max(end, start + 1))))
+    }
+    if (label) item.append(h('p', { class: 'preview-label' }, ...coded(label)))
+    for (const note of notes) item.append(h('pre', { class: 'preview-note' }, note))
+    if (help) item.append(h('p', { class: 'preview-help' }, ...coded(help)))
+    return item
+  }
+
+  place(text) {
+    const answer = h('span', { class: 'preview-why', role: 'status' })
+    const button = h('button', { type: 'button', title: 'Open in the editor' }, h('code', {}, text))
+    button.addEventListener('click', async () => {
+      const why = await this.openPlace(text)
+      answer.textContent = why && `It cannot be opened: ${why}.`
+    })
+    return h('span', {}, button, ' ', answer)
   }
 }
 
 /** What stands between backticks is code. */
 const coded = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))
-
-function problem({ severity, rule, place, message, label, help, notes, line, start, end }) {
-  const item = h('li', { class: `preview-problem preview-${severity}` })
-  item.append(
-    h('p', { class: 'preview-message' }, h('strong', {}, severity === 'error' ? 'Mistake' : 'Warning'), ' ', ...coded(message)),
-    h('p', { class: 'preview-place' }, h('code', {}, place), ` ${rule}`),
-  )
-  if (line.trim()) {
-    const marked = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
-    item.append(h('pre', { class: 'preview-source', tabindex: '0' }, line.slice(0, start), marked, line.slice(Math.max(end, start + 1))))
-  }
-  if (label) item.append(h('p', { class: 'preview-label' }, ...coded(label)))
-  for (const note of notes) item.append(h('pre', { class: 'preview-note' }, note))
-  if (help) item.append(h('p', { class: 'preview-help' }, ...coded(help)))
-  return item
-}
