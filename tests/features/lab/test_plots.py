@@ -176,7 +176,7 @@ def test_a_line_is_cut_at_the_frame() -> None:
     root = drawn([[0.5, 5.0, 5.0, 0.5, -4.0, 0.5]], what=what)
     found = points(root)
     top, bottom = min(y for _, y in found), max(y for _, y in found)
-    assert (top, bottom) == (12.0, 172.0)
+    assert (top, bottom) == (24.0, 172.0)
     assert [m[1] for m in MOVE.finditer(lines(root)[0])] == ["M", "L", "M", "L", "L", "M", "L"]
     # From 0.5 to 5 in a step: the frame ends a ninth of the way on.
     step = (found[-1][0] - found[0][0]) / 5
@@ -214,7 +214,7 @@ class TestRoom:
     def test_wide_ticks_get_room(self) -> None:
         left = [points(drawn([[0.0, top]]))[0][0] for top in (1.0, 123456.0, 1e-13)]
         assert left[0] < left[1]
-        assert all(x >= 26 + 6.2 * 3 for x in left)
+        assert all(x >= 8 + 6.2 * 3 for x in left)
 
     def test_times_do_not_touch(self) -> None:
         times = [1e5 + i / 1000 for i in range(100)]

@@ -20,7 +20,7 @@ from coursebuild.core.drawing.scales import Scale
 from coursebuild.features.lab.schema import Plot, TraceFields
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
-_TOP, _BOTTOM = 12.0, 38.0
+_TOP, _BOTTOM = 24.0, 38.0
 _LETTER = 6.2
 """Width of a letter or a digit."""
 _DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
@@ -87,7 +87,7 @@ def _frame(
     width = _NARROW if narrow else _WIDE
     y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
     longest = max(len(text) for _, text in y.ticks(_TICKS))
-    left = min(26.0 + _LETTER * longest, 0.35 * width)
+    left = min(8.0 + _LETTER * longest, 0.35 * width)
     room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
     return _Frame(Scale(left, width - room, low_t, high_t, logarithmic=False), y, width)
 
@@ -123,11 +123,8 @@ def _axes(frame: _Frame, plot: Plot) -> list[str]:
         parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
         parts.append(f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{text}</text>')
     parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
-    middle = (_TOP + bottom) / 2
-    parts.append(
-        f'<text transform="translate(13 {middle:g}) rotate(-90)" text-anchor="middle">'
-        f"{_text(plot.ylabel)}</text>"
-    )
+    # Along the axis a long name would be cut.
+    parts.append(f'<text x="0" y="11">{_text(plot.ylabel)}</text>')
     centre = (left + right) / 2
     parts.append(
         f'<text x="{centre:.1f}" y="{_HEIGHT - 5:g}" text-anchor="middle">'

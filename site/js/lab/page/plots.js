@@ -15,6 +15,7 @@ const HEIGHT = 170 // CSS pixels
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 4], [12, 3]]
 const FONT = 12 // CSS pixels; whole, since uPlot scales only the digits next to `px`
 const GAP = 6
+const LINE = FONT + GAP
 const LINEAR = 1 // uPlot's kinds of scales
 const LOGARITHMIC = 3
 const MOST_POWERS = 6 // labels of a logarithmic axis
@@ -78,7 +79,7 @@ export class Plot {
       font,
       labelFont: font,
       labelGap: 0,
-      labelSize: label ? FONT + GAP : 0,
+      labelSize: label ? LINE : 0,
       gap: 4,
       stroke: () => this.colours.text,
       grid: { stroke: () => this.colours.grid, width: 1 },
@@ -88,7 +89,7 @@ export class Plot {
     })
     return {
       ...size,
-      padding: [FONT, this.room(font), 0, 0],
+      padding: [config.ylabel ? LINE + GAP : FONT, this.room(font), 0, 0],
       legend: { show: false },
       cursor: { show: false },
       scales: {
@@ -100,7 +101,7 @@ export class Plot {
       },
       axes: [
         { ...axis(config.xlabel || ''), size: FONT + 10, space: 45 },
-        { ...axis(config.ylabel || ''), size: (_, values) => sizeOf(values, font), space: 28, ...(config.log ? POWERS : {}) },
+        { ...axis(''), size: (_, values) => sizeOf(values, font), space: 28, ...(config.log ? POWERS : {}) },
       ],
       series: [
         {},
@@ -111,7 +112,10 @@ export class Plot {
           points: { show: false },
         })),
       ],
-      hooks: { drawAxes: [(chart) => this.references(chart)], draw: [(chart) => this.labels(chart, font)] },
+      hooks: {
+        drawAxes: [(chart) => this.title(chart, font), (chart) => this.references(chart, font)],
+        draw: [(chart) => this.labels(chart, font)],
+      },
     }
   }
 
@@ -130,7 +134,19 @@ export class Plot {
       : Math.min(140, Math.ceil(Math.max(...traces.map(({ label }) => widthOf(label, font))) + 2 * GAP))
   }
 
-  references({ ctx, bbox, valToPos }) {
+  /** What the y axis stands for, above it: along the axis a long name would be cut. */
+  title({ ctx }, font) {
+    const ratio = uPlot.pxRatio
+    ctx.save()
+    ctx.font = scaled(font, ratio)
+    ctx.fillStyle = this.colours.text
+    ctx.textAlign = 'left'
+    ctx.textBaseline = 'top'
+    ctx.fillText(this.config.ylabel || '', 0, 0)
+    ctx.restore()
+  }
+
+  references({ ctx, bbox, valToPos }, font) {
     const ratio = uPlot.pxRatio
     for (const { y, label } of this.config.refLines) {
       const at = Math.round(valToPos(y, 'y', true))
@@ -144,7 +160,7 @@ export class Plot {
       ctx.lineTo(bbox.left + bbox.width, at)
       ctx.stroke()
       if (label) {
-        ctx.font = `${FONT * ratio}px ${getComputedStyle(this.element).fontFamily}`
+        ctx.font = scaled(font, ratio)
         ctx.fillStyle = this.colours.text
         ctx.textAlign = 'left'
         ctx.textBaseline = 'bottom'
@@ -166,7 +182,7 @@ export class Plot {
     const places = spread(ends, (FONT + 2) * ratio, bbox.top, bbox.top + bbox.height)
     const x = Math.min(bbox.left + bbox.width, end < 0 ? bbox.left : valToPos(data[0][end], 'x', true))
     ctx.save()
-    ctx.font = font.replace(/^[\d.]+/, String(FONT * ratio))
+    ctx.font = scaled(font, ratio)
     ctx.textAlign = 'left'
     ctx.textBaseline = 'middle'
     traces.forEach(({ label }, i) => {
@@ -210,6 +226,8 @@ const POWERS = {
   filter: (_, splits) => splits,
   values: (_, ticks) => ticks.map((tick) => `10${superscript(Math.round(Math.log10(tick)))}`),
 }
+
+const scaled = (font, ratio) => font.replace(/^[\d.]+/, String(FONT * ratio))
 
 let measuring = null
 
