@@ -1,6 +1,7 @@
 # make site    the environment, the tool and the course in public/
 # make quick   the tests that need no browser, no lab engine and no whole site
 # make test    all set-up, then every test of a change
+# make lock    the versions of all packages, and their hashes
 # make help    the rest
 
 PYTHON ?= python3
@@ -9,6 +10,9 @@ PYTEST_ARGS ?=
 
 VENV := .venv
 BIN := $(VENV)/bin
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+LOCK = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
+  --no-emit-index-url --custom-compile-command 'make lock'
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -17,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # What an installation depends on. It is editable: a change of Python code or of a template needs
 # none. Folders are listed because they change when a file in them is removed.
-BUILD_INPUTS := pyproject.toml hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
+BUILD_INPUTS := pyproject.toml requirements.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
   $(shell find site/css site/js 2>/dev/null)
 
 # An environment does not outlive a move of its folder, whose path is in its scripts, nor the Python
@@ -26,7 +30,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site serve quick test test-slow lint format types npm system clean distclean
+.PHONY: help site serve quick test test-slow test-oldest lint format types dist lock npm system clean distclean
 
 help:
 	@echo 'make site       make the environment, install, build the course into public/'
@@ -34,8 +38,11 @@ help:
 	@echo 'make quick      run the tests that need no browser, no lab engine and no whole site'
 	@echo 'make test       do all set-up and run every test (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
 	@echo 'make test-slow  measure pages, look for leaks, try random cases that are new each time'
+	@echo 'make test-oldest  run the quick tests with the oldest packages that the tool may be used with'
 	@echo 'make lint       check style and formatting; make format mends what can be mended'
 	@echo 'make types      check types'
+	@echo 'make dist       the wheel and the source distribution, in dist/'
+	@echo 'make lock       lock what pyproject.toml newly asks for; UPGRADE=--upgrade: all, in newest versions'
 	@echo 'make clean      remove what was built; make distclean also what was installed'
 
 site: $(VENV)/.site
@@ -47,9 +54,11 @@ serve: $(VENV)/.site
 PYTEST = PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(BIN)/python -m pytest
 PARALLEL = -n $(WORKERS) --dist worksteal
 
+QUICK = $(PARALLEL) --ignore tests/browser --ignore tests/packaging \
+  -m 'not (browser or engine or site or slow)' $(PYTEST_ARGS)
+
 quick: $(VENV)/.dev npm
-	@$(PYTEST) $(PARALLEL) --ignore tests/browser --ignore tests/packaging \
-	  -m 'not (browser or engine or site or slow)' $(PYTEST_ARGS)
+	@$(PYTEST) $(QUICK)
 
 test: $(VENV)/.dev npm system
 	@$(PYTEST) $(PARALLEL) -m 'not slow' $(PYTEST_ARGS)
@@ -57,6 +66,14 @@ test: $(VENV)/.dev npm system
 # One after the other, since some of them measure; property tests get new examples in every run.
 test-slow: $(VENV)/.dev npm system
 	@$(PYTEST) -m 'slow or hypothesis' --hypothesis-profile free $(PYTEST_ARGS)
+
+OLDEST := build/oldest
+
+test-oldest: $(VENV)/.dev npm
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(OLDEST)
+	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml -o $(OLDEST)/packages.txt
+	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable .
+	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(OLDEST)/bin/python -m pytest $(QUICK)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check
@@ -68,6 +85,16 @@ format: $(VENV)/.dev
 
 types: $(VENV)/.dev
 	$(BIN)/mypy
+
+dist: $(VENV)/.dev
+	rm -rf dist
+	$(BIN)/python -m hatchling build
+
+lock: $(VENV)/.dev
+	$(LOCK) pyproject.toml -o requirements.txt
+	$(LOCK) --group build -c requirements.txt -o requirements-build.txt
+	$(LOCK) pyproject.toml --extra cache --group dev -c requirements.txt -c requirements-build.txt \
+	  -o requirements-dev.txt
 
 clean:
 	rm -rf public .coursebuild dist build site/dist site/.bundle* $(VENV)/.site $(VENV)/.dev
@@ -90,12 +117,14 @@ $(VENV)/.made:
 
 $(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
 	@echo 'installing coursebuild and what it needs (the first time takes minutes)'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(INSTALL) --require-hashes -r requirements.txt -r requirements-build.txt
+	@$(INSTALL) --no-deps --no-build-isolation --editable .
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.made $(BUILD_INPUTS)
+$(VENV)/.dev: $(VENV)/.made requirements-dev.txt $(BUILD_INPUTS)
 	@echo 'installing coursebuild, what it needs and what its tests need (the first time takes minutes)'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@$(INSTALL) --require-hashes -r requirements-dev.txt
+	@$(INSTALL) --no-deps --no-build-isolation --editable .
 	@touch $(VENV)/.site $@
 
 # The packages that only tests use, beside those that are bundled.

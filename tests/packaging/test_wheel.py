@@ -5,6 +5,8 @@ import importlib.metadata
 import io
 import json
 import re
+import subprocess
+import sys
 import tarfile
 import zipfile
 from collections.abc import Callable, Iterator
@@ -12,8 +14,12 @@ from pathlib import Path
 
 import py_mini_racer
 import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
 from fontTools.ttLib import TTFont
+from packaging.requirements import Requirement
 
+Run = Callable[..., subprocess.CompletedProcess[str]]
 Copy = Callable[..., Path]
 Build = Callable[[Path, str], Path]
 
@@ -135,7 +141,26 @@ def test_every_shipped_package_has_its_licence(
     assert b"Apache License" in archive.read(f"{full_name}.dist-info/licenses/LICENSE")
 
 
-def test_metadata_names_the_command_and_the_pins(
+def test_bill_of_materials_lists_every_package_of_which_something_is_shipped(
+    archive: zipfile.ZipFile, names: list[str], full_name: str, pyproject: dict
+) -> None:
+    text = archive.read(f"{full_name}.dist-info/sboms/coursebuild.cdx.json").decode()
+    assert JsonStrictValidator(SchemaVersion.V1_7).validate_str(text) is None
+    bill = json.loads(text)
+    shipped = [one for one in bill["components"] if not one.get("isExternal")]
+    licences = {f"{one['name'].removeprefix('@').replace('/', '-')}.txt" for one in shipped}
+    prefix = "coursebuild/assets/licences/"
+    assert licences == {name.removeprefix(prefix) for name in names if name.startswith(prefix)}
+    engine = next(one for one in shipped if one["name"] == "@mujoco/mujoco")
+    assert engine["purl"] == f"pkg:npm/%40mujoco/mujoco@{importlib.metadata.version('mujoco')}"
+    assert engine["licenses"] == [{"expression": "Apache-2.0"}]
+    assert re.fullmatch("[0-9a-f]{128}", engine["hashes"][0]["content"])
+    beside = {one["name"] for one in bill["components"] if one.get("isExternal")}
+    declared = map(Requirement, pyproject["project"]["dependencies"])
+    assert {one.name.lower() for one in declared} <= beside
+
+
+def test_metadata_names_the_command_and_the_ranges(
     archive: zipfile.ZipFile, pyproject: dict, full_name: str
 ) -> None:
     info = f"{full_name}.dist-info"
@@ -144,11 +169,15 @@ def test_metadata_names_the_command_and_the_pins(
     assert metadata["Requires-Python"] == ">=3.11"
     required = [line for line in metadata.get_all("Requires-Dist") if "extra ==" not in line]
     declared = pyproject["project"]["dependencies"]
-    assert sorted(map(str.lower, required)) == sorted(map(str.lower, declared))
+    assert sorted(map(str, map(Requirement, required))) == sorted(
+        map(str, map(Requirement, declared))
+    )
+    urls = dict(line.split(", ") for line in metadata.get_all("Project-URL"))
+    assert urls == pyproject["project"]["urls"]
     assert b"coursebuild = coursebuild.cli:main" in archive.read(f"{info}/entry_points.txt")
 
 
-def test_sdist_holds_the_sources_and_nothing_of_a_third_party(root: Path, sdist: Path) -> None:
+def test_sdist_holds_the_sources_and_what_was_bundled(root: Path, sdist: Path) -> None:
     with tarfile.open(sdist) as archive:
         files = {m.name.split("/", 1)[1] for m in archive.getmembers() if m.isfile()}
     site = {"bundle.py", "build.mjs", "package.json", "package-lock.json", ".npmrc"}
@@ -157,29 +186,32 @@ def test_sdist_holds_the_sources_and_nothing_of_a_third_party(root: Path, sdist:
     for folder in ("templates", "site/js", "site/css", "content", "models"):
         assert {f"{folder}/{path}" for path in below(root / folder)} <= files
     assert {"hatch_build.py", "LICENSE", "README.md", "Makefile", "PKG-INFO"} <= files
-    third = re.compile(r"node_modules|^site/dist/|\.woff2?$|temml\.min|\.venv|__pycache__|\.bundle")
-    assert [name for name in files if third.search(name)] == []
+    assert {f"site/dist/{path}" for path in below(root / "site" / "dist")} <= files
+    strays = re.compile(r"node_modules|\.venv|__pycache__|\.bundle")
+    assert [name for name in files if strays.search(name)] == []
+
+
+def test_sdist_needs_neither_node_nor_packages_to_become_the_wheel(
+    wheel: Path, sdist: Path, run: Run, tmp_path: Path, full_name: str
+) -> None:
+    """Only Python is on PATH, and the build asks for nothing besides hatchling."""
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path, filter="data")
+    code = (
+        "import hatchling.build as b; print(b.get_requires_for_build_wheel(), b.build_wheel('.'))"
+    )
+    done = run(sys.executable, "-c", code, cwd=tmp_path / full_name, path=tmp_path)
+    assert done.stdout.split() == ["[]", wheel.name], done.stderr
+    assert (tmp_path / full_name / wheel.name).read_bytes() == wheel.read_bytes()
 
 
 @pytest.mark.slow
-def test_wheel_is_the_same_from_another_folder_and_from_the_sdist(
-    wheel: Path,
-    sdist: Path,
-    packages: Path,
-    copy_project: Copy,
-    build: Build,
-    tmp_path: Path,
-    full_name: str,
+def test_archives_bundled_anew_in_another_folder_are_the_same(
+    wheel: Path, sdist: Path, copy_project: Copy, build: Build, tmp_path: Path
 ) -> None:
-    """Each bundles the browser's half anew."""
     elsewhere = copy_project(tmp_path / "a" / "b c", bundled=False)
     assert build(elsewhere, "wheel").read_bytes() == wheel.read_bytes()
-    with tarfile.open(sdist) as archive:
-        archive.extractall(tmp_path, filter="data")
-    unpacked = tmp_path / full_name
-    (unpacked / "site" / "node_modules").symlink_to(packages)
-    assert not (unpacked / "site" / "dist").exists()
-    assert build(unpacked, "wheel").read_bytes() == wheel.read_bytes()
+    assert build(elsewhere, "sdist").read_bytes() == sdist.read_bytes()
 
 
 def test_wheel_holds_the_scripts_of_the_engines(root: Path, archive: zipfile.ZipFile) -> None:
