@@ -168,10 +168,8 @@ def test_metadata_names_the_command_and_the_ranges(
     assert metadata["License-Expression"] == "Apache-2.0"
     assert metadata["Requires-Python"] == ">=3.11"
     required = [line for line in metadata.get_all("Requires-Dist") if "extra ==" not in line]
-    declared = pyproject["project"]["dependencies"]
-    assert sorted(map(str, map(Requirement, required))) == sorted(
-        map(str, map(Requirement, declared))
-    )
+    declared = {str(Requirement(line)) for line in pyproject["project"]["dependencies"]}
+    assert {str(Requirement(line)).lower() for line in required} == set(map(str.lower, declared))
     urls = dict(line.split(", ") for line in metadata.get_all("Project-URL"))
     assert urls == pyproject["project"]["urls"]
     assert b"coursebuild = coursebuild.cli:main" in archive.read(f"{info}/entry_points.txt")
