@@ -1,6 +1,6 @@
-"""Text on a terminal: colours, the cells that it takes, paragraphs and tables.
+"""Text on a terminal: colours, paragraphs and tables.
 
-Entry points: `Style`, `visible`, `cells`, `clipped`; `Column`, `table`.
+Entry points: `Style`, `visible`, `clipped`; `Column`, `table`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from coursebuild.core.text.cells import TAB, cells
+
 BOLD, FAINT, GREEN, RED, YELLOW, BLUE = "1", "2", "32", "1;31", "1;33", "1;34"
-_TAB = 4
 _GAP = "  "
 _NARROWEST = 40
 
@@ -53,7 +54,7 @@ def visible_lines(text: str) -> str:
 def _shown(char: str) -> str:
     code = ord(char)
     if char == "\t":
-        return " " * _TAB
+        return " " * TAB
     if code < 0x20:
         return chr(0x2400 + code)
     if code == 0x7F:
@@ -63,24 +64,11 @@ def _shown(char: str) -> str:
     return char
 
 
-def cells(text: str) -> int:
-    """Cells of a terminal that a text takes."""
-    return sum(map(_cells, text))
-
-
-def _cells(char: str) -> int:
-    if char == "\t":
-        return _TAB
-    if unicodedata.combining(char) or char == "\u200d":
-        return 0
-    return 2 if unicodedata.east_asian_width(char) in ("W", "F") else 1
-
-
 def clipped(text: str, room: int) -> str:
     """The beginning of a text that fits into so many cells."""
     used = 0
     for index, char in enumerate(text):
-        used += _cells(char)
+        used += cells(char)
         if used > room:
             return text[:index]
     return text

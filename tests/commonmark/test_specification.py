@@ -12,6 +12,7 @@ import pytest
 from coursebuild.core.pages.plain import plain_html
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
+from support.formatting import check_formatting
 
 ROOT = Path(__file__).parents[2]
 SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
@@ -47,6 +48,11 @@ def rendered(markdown: str) -> str:
 
 def test_all_examples_are_read(examples: list[Example]) -> None:
     assert len(examples) == 652
+
+
+def test_examples_stay_the_same_when_formatted(examples: list[Example]) -> None:
+    for example in examples:
+        check_formatting(example.markdown, 20, lesson=False)
 
 
 def test_examples(examples: list[Example], differences: dict[int, str]) -> None:

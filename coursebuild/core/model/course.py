@@ -155,6 +155,8 @@ class Course(Struct, frozen=True):
     truth: float | None = None
     """Which share of the numbers in the text must be proven."""
     truth_span: Span | None = None
+    width: int = 0
+    """Columns of a line of text as `fmt` wraps it; 0: it leaves the author's lines."""
 
     @property
     def key(self) -> str:

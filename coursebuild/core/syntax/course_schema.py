@@ -130,6 +130,15 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
 
 
+class FormatTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """How `coursebuild fmt` lays lessons out."""
+
+    width: Annotated[
+        Annotated[int, Meta(ge=0, le=1000)],
+        Meta(description="columns of a line of text; 0 leaves line breaks where they are"),
+    ] = 0
+
+
 class CalloutTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A kind of callout."""
 
@@ -199,6 +208,7 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
 
     course: CourseTable
     verify: VerifyTable | None = None
+    format: FormatTable | None = None
     callouts: Annotated[
         dict[str, Text | CalloutTable],
         Meta(description="more kinds of callouts by name, with a label or a table"),

@@ -118,6 +118,7 @@ def _course(
         features=_paths(table, "features", about.features),
         packages=_paths(table, "packages", about.packages),
         environment=tuple(sorted(verify.env.items())),
+        width=fields.format.width if fields.format is not None else 0,
     )
 
 

@@ -105,10 +105,14 @@ def _lines(span: Span, head: Span, closed: bool) -> tuple[Span, str]:
     first, last = head.line, span.end_line
     start = _line_start(source, first + 1)
     end = _line_start(source, last if closed else last + 1)
-    prefix = source.text[_line_start(source, first) : head.start]
-    if prefix:
-        prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
-    return Span(source, start, max(start, end)), prefix + " " if prefix.endswith(">") else prefix
+    return Span(source, start, max(start, end)), line_prefix(head)
+
+
+def line_prefix(place: Span) -> str:
+    """What further lines of a block must begin with, by what stands before its first."""
+    prefix = place.source.text[_line_start(place.source, place.line) : place.start]
+    prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
+    return prefix + " " if prefix.endswith(">") else prefix
 
 
 def _line_start(source: Source, line: int) -> int:

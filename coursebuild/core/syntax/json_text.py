@@ -1,6 +1,6 @@
 r"""JSON in a fence, read strictly, every value with its place.
 
-Entry point: `parse_json(body, place)`.
+Entry points: `parse_json(body, place)`; `one_line`, a value without its layout.
 
 1. One pass over the text gives the nodes. The grammar is RFC 8259 and nothing more; nesting is
    limited to `MAX_DEPTH`.
@@ -38,6 +38,7 @@ MAX_DEPTH = 64
 interpreter's stack."""
 
 _SPACE = re.compile(r"[ \t\n\r]*")
+_TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*"|[][{},:]|[^][{},:\s]+')
 _COMMENT = re.compile(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _WORD = re.compile(r"[^\W\d][\w$]*")
 _SCALAR = re.compile(r"[^\W\d][\w$]*|[-+.0-9][-+.\w]*")
@@ -70,6 +71,15 @@ def parse_json(body: Excerpt, place: Span) -> Parsed[Node | None]:
     except _LostError:
         value = None
     return Parsed(value, tuple(reader.diagnostics))
+
+
+def one_line(node: Node) -> Excerpt:
+    """A value on one line, each of its parts as it is written and with its place."""
+    text, pieces = "", []
+    for token in _TOKEN.finditer(node.body.text, node.start, node.end):
+        pieces.append((len(text), node.body.offset(token.start())))
+        text += f"{token[0]} " if token[0] in ",:" else token[0]
+    return Excerpt(node.body.source, text, tuple(pieces))
 
 
 class _LostError(Exception):

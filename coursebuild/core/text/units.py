@@ -127,8 +127,9 @@ def _registry() -> Any:
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
     """What is wrong with a unit, which may be empty."""
-    if len(unit.text) > 100 or not _UNIT.fullmatch(unit.text.strip() or "1"):
-        message = f"`{unit.text.strip()}` cannot be read as a unit"
+    text = " ".join(unit.text.split())
+    if len(text) > 100 or not _UNIT.fullmatch(text or "1"):
+        message = f"`{text}` cannot be read as a unit"
         help = "write it as in `kg m^2`, `m/s²` or `N m/rad`"
         yield diagnose("unit-unknown", unit.span(), message, help=help)
         return

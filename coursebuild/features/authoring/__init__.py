@@ -3,6 +3,7 @@
 - `init`: a small complete course, from the files in `course/`
 - `new`: a lesson, with its entry in the map (`course_map`), or a model
 - `rename`: a lesson gets another id, wherever the course names it (`references`)
+- `fmt`: lessons formatted (`format`, with `json_layout` and `text_layout`)
 - `doctor`: what of all that courses need works here
 """
 
@@ -12,6 +13,7 @@ _SUMMARIES = {
     "init": "make a small complete course to begin with",
     "new": "add a lesson or a model",
     "rename": "give a lesson another id, wherever the course names it",
+    "fmt": "format lessons and pages",
     "doctor": "say what works on this machine, and what to do where it does not",
 }
 FEATURE = Feature(

@@ -35,7 +35,7 @@ class Lab(FeatureBlock, frozen=True):
     """`simlab`, `mjcf`, or the name of a kind that the course adds."""
     kind_span: Span
     config: str
-    """The text as written: JSON, which of some kinds only their own code understands, or MJCF."""
+    """JSON on one line, which of some kinds only their own code understands; or MJCF as written."""
     fields: SimLab
     """What the author says; of a kind of the course's own, what labs of every kind have."""
     note: tuple[Block, ...] = ()

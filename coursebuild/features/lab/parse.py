@@ -20,7 +20,7 @@ from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.fields import Positive
 from coursebuild.core.syntax.info import Word, kind_of
-from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.syntax.json_text import one_line, parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
@@ -102,7 +102,7 @@ def parse_lab(
             common = decoding.value
             fields = SimLab(title=common.title, height=common.height, dock=common.dock)
             note = prose.blocks(node.get("note"))
-            lab = Lab(span, kind, kind_span, node.raw, fields, note)
+            lab = Lab(span, kind, kind_span, one_line(node).text, fields, note)
     return Parsed(None if found else lab, sort_diagnostics(found))
 
 
@@ -121,7 +121,7 @@ def sim_lab(
         span=span,
         kind=SIMLAB,
         kind_span=kind_span,
-        config=node.raw,
+        config=one_line(node).text,
         fields=fields,
         note=prose.blocks(node.get("note")),
         goal=prose.inlines(goal.get("text") if isinstance(goal, ObjectNode) else None),

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.fields import has_value, repeated
-from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.syntax.json_text import one_line, parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
@@ -218,7 +218,7 @@ def _question(
                 predict=predict,
                 gate=gate,
                 gate_span=node.place("gate"),
-                run=None if run is None else run.body.slice(run.start, run.end),
+                run=None if run is None else one_line(run),
             )
         case Numeric():
             answer: Node | None = node.get("answer")

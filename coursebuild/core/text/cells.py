@@ -1,0 +1,23 @@
+"""How wide text is where characters stand in columns: on a terminal, in an editor.
+
+Entry point: `cells`.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+
+TAB = 4
+
+
+def cells(text: str) -> int:
+    """Columns that a text takes."""
+    return sum(map(_cells, text))
+
+
+def _cells(char: str) -> int:
+    if char == "\t":
+        return TAB
+    if unicodedata.combining(char) or char == "\u200d":
+        return 0
+    return 2 if unicodedata.east_asian_width(char) in ("W", "F") else 1

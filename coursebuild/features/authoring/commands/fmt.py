@@ -1,0 +1,66 @@
+"""`coursebuild fmt`: format lessons and pages."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from coursebuild.cli.arguments import add_lessons, options_of
+from coursebuild.cli.output import CLEAN, WRONG, fail, write
+from coursebuild.core.files.changes import FileChange
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.model import Course, Lesson
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.source import Source
+from coursebuild.features.authoring.commands import apply_changes
+from coursebuild.features.authoring.format import format_document
+from coursebuild.pipeline.load import load_course
+from coursebuild.pipeline.options import Selection, select
+from coursebuild.pipeline.update import changed_text
+from coursebuild.report.text import location
+
+EXAMPLES = """\
+examples:
+  coursebuild fmt
+  coursebuild fmt 1.2 --diff              what would change
+  coursebuild fmt --check                 in a workflow, or before a commit
+"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_lessons(parser)
+    parser.add_argument("--check", action="store_true", help="only say which files would change")
+    parser.add_argument("--diff", action="store_true", help="only show what would change")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Format the files, all or none of them; those with mistakes stay as they are."""
+    root = options_of(arguments).root
+    course, status = load_course(root), CLEAN
+    changed: dict[Source, str] = {}
+    for source, new in _formatted(course, select(course, tuple(arguments.lessons), root)):
+        mistakes = [f"{location(d.span)}: {d.message}" for d in new.diagnostics]
+        if read_bytes(root, source.path) != source.text.encode():
+            mistakes = [f"{source.path} is not UTF-8"]
+        if mistakes:
+            what = f"{source.path} has mistakes, and is left as it is"
+            status = fail(WRONG, what, f"mend this first: {mistakes[0]}")
+        elif new.value != source.text:
+            changed[source] = new.value
+    if arguments.diff:
+        said = [changed_text("would format", source, new) for source, new in changed.items()]
+    elif arguments.check:
+        said = [f"would format {source.path}" for source in changed]
+    else:
+        changes = [FileChange(s.path, s.text.encode(), new.encode()) for s, new in changed.items()]
+        return max(status, apply_changes(root, changes))
+    return write("".join(f"{line}\n" for line in said), WRONG if said else status)
+
+
+def _formatted(course: Course, chosen: Selection) -> Iterator[tuple[Source, Parsed[str]]]:
+    callouts = frozenset(kind.name for kind in course.callouts)
+    for part in (*chosen.lessons, *chosen.pages):
+        if part.document is not None:
+            source, lesson = part.document.source, isinstance(part, Lesson)
+            yield source, format_document(source, callouts, lesson=lesson, width=course.width)

@@ -1,0 +1,56 @@
+"""JSON laid out: only what stands between its values changes.
+
+Entry point: `lay_out`.
+
+An object or list that its author broke into lines stays broken where it was, and one in a line
+stays in it where it has room. Members go two columns further in than what they are in; those that
+begin beside the bracket stand below each other behind it.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from coursebuild.core.syntax.json_text import one_line
+from coursebuild.core.syntax.nodes import ArrayNode, Member, Node, ObjectNode
+
+
+def lay_out(node: Node, width: int, column: int = 0, indent: int = 0) -> str:
+    """A value that begins at a column, in an object or list whose members are indented so far."""
+    line = one_line(node).text
+    parts = _parts(node)
+    if not parts or ("\n" not in node.raw and column + len(line) <= width):
+        return line
+    breaks = _breaks(node, parts)
+    inner = indent + 2 if breaks[0] else column + 1 if any(breaks) else indent
+    text, at = line[0], column + 1
+    for part, lines in zip(parts, breaks, strict=False):
+        if lines:
+            text, at = text + "\n" * min(lines, 2) + " " * inner, inner
+        elif part is not parts[0]:
+            text, at = text + " ", at + 1
+        key = f"{part.key.raw}: " if isinstance(part, Member) else ""
+        value = part.value if isinstance(part, Member) else part
+        text += key + lay_out(value, width, at + len(key), inner)
+        text += "" if part is parts[-1] else ","
+        at = len(text) - text.rfind("\n") - 1 if "\n" in text else column + len(text)
+    if breaks[-1]:
+        text += "\n" + " " * (indent if breaks[0] else column)
+    return text + line[-1]
+
+
+def _parts(node: Node) -> tuple[Member | Node, ...]:
+    if isinstance(node, ObjectNode):
+        return node.members
+    return node.items if isinstance(node, ArrayNode) else ()
+
+
+def _breaks(node: Node, parts: tuple[Member | Node, ...]) -> list[int]:
+    """Line ends before each part and before the closing bracket; one where all stood in a line."""
+    if "\n" not in node.raw:
+        return [1] * (len(parts) + 1)
+    places = [
+        (p.key.start, p.value.end) if isinstance(p, Member) else (p.start, p.end) for p in parts
+    ]
+    places = [(0, node.start + 1), *places, (node.end - 1, 0)]
+    return [node.body.text.count("\n", a[1], b[0]) for a, b in pairwise(places)]

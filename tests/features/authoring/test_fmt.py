@@ -1,0 +1,148 @@
+"""Lessons are formatted: tidy, the same to a reader, and no other when formatted again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from support.formatting import check_formatting, formatted
+from support.random_lessons import markdown
+from support.scratch_course import Done, Folder
+
+ROOT = Path(__file__).parents[3]
+MAP = "content/course.toml"
+DOCUMENTS = [*ROOT.glob("content/*/*.md"), ROOT / "docs" / "authoring.md"]
+
+TIDY = {
+    "empty lines": (
+        "\n\n## A\nb\n\n\n\nc \n```text\na  \n\n\nb\n```\n> d\n>\n> \n> e\n>  - f\n\n\n",
+        "## A\n\nb\n\nc\n\n```text\na  \n\n\nb\n```\n\n> d\n>\n> e\n>\n>  - f\n",
+    ),
+    "what belongs together": (
+        "<!-- b -->\nc\\\nd  \ne[^f][^g]\n\n- h\n- i\n\n[^f]: F\n[^g]: G\n\n> [!note] T\n> - j\n\n",
+        "<!-- b -->\nc\\\nd  \ne[^f][^g]\n\n- h\n- i\n\n[^f]: F\n[^g]: G\n\n> [!note] T\n> - j\n",
+    ),
+    "line ends": ("## A\r\ntext \r\n\r\n\r\nmore", "## A\r\n\r\ntext\r\n\r\nmore\r\n"),
+    "table": (
+        "a|`b\\|`|c\n-|:-:|--:\n| 質量 |x\n|**m**||1.25|\n",
+        "| a     | `b\\|` |    c |\n| ----- | :---: | ---: |\n"
+        "| 質量  |   x   |      |\n| **m** |       | 1.25 |\n",
+    ),
+    "table in a list": (
+        "- a\n\n  | b | c |\n  |---|---|\n  | long | d |\n",
+        "- a\n\n  | b    | c   |\n  | ---- | --- |\n  | long | d   |\n",
+    ),
+    "wide table": (
+        f"|a| b |\n|:--|--|\n| {'word ' * 24}| |\n",
+        f"| a | b |\n| :--- | --- |\n| {'word ' * 24}| |\n",
+    ),
+    "JSON in lines": (
+        '> ```quiz\n> { "id":"q",\n>   "questions" : [ {"kind" :"open",\n>    "q":"{,} b" ,\n>\n>\n'
+        '>   "hints":[\n> "h"\n> ], "reference" : "c"\n> }]}\n> ```\n',
+        '> ```quiz\n> {"id": "q",\n>  "questions": [{"kind": "open",\n'
+        '>                 "q": "{,} b",\n>\n>                 "hints": [\n>                   "h"\n>                 ],'
+        ' "reference": "c"\n>                }]}\n> ```\n',
+    ),
+    "JSON in one line": (
+        '```quiz\n{"id":"q","title":"A quiz of which the JSON is too long for one line of text",'
+        '"questions":[{"kind":"open","q":"a","reference":"b"}]}\n```\n',
+        '```quiz\n{\n  "id": "q",\n'
+        '  "title": "A quiz of which the JSON is too long for one line of text",\n'
+        '  "questions": [{"kind": "open", "q": "a", "reference": "b"}]\n}\n```\n',
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "wanted"), TIDY.values(), ids=TIDY)
+def test_text_is_tidied_and_its_lines_kept(text: str, wanted: str) -> None:
+    assert tidied(text) == wanted
+
+
+WRAPPED = {
+    "words": ("One two three\nfour five six.", "One two three four\nfive six."),
+    "no other block": ("About fifteen and - 7 or 1. or # x", "About fifteen and -\n7 or 1. or # x"),
+    "solid parts": (
+        "A formula $a +\nb$ and `some code` too",
+        "A formula $a + b$\nand `some code`\ntoo",
+    ),
+    "attributes": (
+        'Mass $m${symbol="mass" unit="kg"} of it',
+        'Mass\n$m${symbol="mass"\nunit="kg"} of it',
+    ),
+    "list in a quote": (
+        "> - one two three four five\n>   six seven\n> - eight",
+        "> - one two three\n>   four five six\n>   seven\n> - eight",
+    ),
+    "footnote": ("x[^n]\n\n[^n]: one two three four", "x[^n]\n\n[^n]: one two\n      three four"),
+    "callout": (
+        "> [!note] A title of its own\n> one two three four",
+        "> [!note] A title of its own\n> one two three\n> four",
+    ),
+    "forced lines": ("one two three four five  \nsix", "one two three four five  \nsix"),
+}
+
+
+@pytest.mark.parametrize(("text", "wanted"), WRAPPED.values(), ids=WRAPPED)
+def test_paragraphs_are_wrapped_at_a_width(text: str, wanted: str) -> None:
+    assert tidied(text) == f"{text}\n"
+    assert tidied(text, width=18) == f"{wanted}\n"
+
+
+def tidied(text: str, width: int = 0) -> str:
+    done = formatted(text, width)
+    assert not done.diagnostics
+    return done.value
+
+
+@settings(max_examples=150)
+@given(markdown(), st.booleans(), st.sampled_from((0, 1, 12, 40)))
+def test_any_text_says_the_same(text: str, lesson: bool, width: int) -> None:
+    check_formatting(text, width, lesson)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.stem)
+def test_documents_of_the_course_say_the_same(path: Path) -> None:
+    check_formatting(path.read_text(), 60, path.parent.name == "lessons")
+
+
+def test_lines_of_the_course_stay() -> None:
+    """Where the map names no width, only tables and white space change."""
+    for path in DOCUMENTS:
+        text, lesson = path.read_text(), path.parent.name == "lessons"
+        lines = formatted(text, 0, lesson).value.splitlines()
+        changed = {*lines} - {*text.splitlines()}
+        assert all(line.lstrip("> ").startswith("|") for line in changed), path
+
+
+def test_command_formats_the_course_by_the_width_of_its_map(
+    make: Callable[..., Folder],
+) -> None:
+    course = make("## A\none two three four\n", "## B\n\ntext\n")
+    course.write(MAP, course.text(MAP) + "\n[format]\nwidth = 10\n")
+    path, before = course.lesson(1), course.tree()
+    assert course.main("fmt", "--check") == Done(1, f"would format {path}\n", "")
+    shown = course.main("fmt", "1.1", "--diff")
+    assert (shown.status, "\n+one two\n+three four" in shown.out) == (1, True)
+    assert course.tree() == before
+    assert course.main("fmt") == Done(0, f"changed {path}\n", "")
+    assert course.text(path) == "## A\n\none two\nthree four\n"
+    assert course.main("fmt", "--check") == Done(0, "", "")
+
+
+def test_command_leaves_what_it_cannot_read(make: Callable[..., Folder]) -> None:
+    course = make('## A\n\n```quiz\n{ "id": "x"\n```\n', b"## B\ncaf\xe9\n", "## C\ntext\n")
+    before = course.tree()
+    done = course.main("fmt")
+    assert (done.status, done.out) == (1, f"changed {course.lesson(3)}\n")
+    assert done.err.splitlines() == [
+        f"coursebuild: {course.lesson(1)} has mistakes, and is left as it is",
+        f"  help: mend this first: {course.lesson(1)}:4:1: `{{` is never closed",
+        f"coursebuild: {course.lesson(2)} has mistakes, and is left as it is",
+        f"  help: mend this first: {course.lesson(2)} is not UTF-8",
+    ]
+    changed = {path for path, data in course.tree().items() if before[path] != data}
+    assert changed == {course.lesson(3)}

@@ -1,0 +1,39 @@
+"""Formatting: `formatted`, a text; `check_formatting`, that it is the same to a reader."""
+
+from __future__ import annotations
+
+import json
+import re
+
+from coursebuild.core.pages.plain import plain_html
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.source import Source
+from coursebuild.features.authoring.format import format_document
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.quiz.model import Quiz
+from support.random_lessons import KINDS
+
+
+def formatted(text: str, width: int, lesson: bool = True) -> Parsed[str]:
+    source = Source("content/lessons/1.1-a.md", text)
+    return format_document(source, KINDS, lesson=lesson, width=width)
+
+
+def check_formatting(text: str, width: int, lesson: bool) -> None:
+    """What a reader sees stays, and formatting once more changes nothing."""
+    done = formatted(text, width, lesson)
+    if done.diagnostics:
+        assert done.value == text
+    else:
+        assert shown(done.value, lesson) == shown(text, lesson)
+        assert formatted(done.value, width, lesson) == Parsed(done.value)
+
+
+def shown(text: str, lesson: bool) -> list[object]:
+    """The page as HTML, in which white space counts in code only, and the JSON in fences."""
+    document = parse_document(Source("content/lessons/1.1-a.md", text), KINDS, lesson=lesson).value
+    parts = re.split(r"(<pre.*?</pre>)", str(plain_html(document)), flags=re.DOTALL)
+    html = [part if part.startswith("<pre") else " ".join(part.split()) for part in parts]
+    fences = [b.span.text.split("\n", 1)[1] for b in document.blocks if isinstance(b, Lab | Quiz)]
+    return [html, *(json.loads(text[:-3]) for text in fences if text.startswith("{"))]
