@@ -16,6 +16,7 @@ from typing import assert_never
 
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
+from coursebuild.core.text.cells import cells
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.core.text.source import Span
 from coursebuild.report.terminal import (
@@ -26,7 +27,6 @@ from coursebuild.report.terminal import (
     RED,
     YELLOW,
     Style,
-    cells,
     visible,
     visible_lines,
 )

@@ -44,7 +44,8 @@ TIDY = {
         '> ```quiz\n> { "id":"q",\n>   "questions" : [ {"kind" :"open",\n>    "q":"{,} b" ,\n>\n>\n'
         '>   "hints":[\n> "h"\n> ], "reference" : "c"\n> }]}\n> ```\n',
         '> ```quiz\n> {"id": "q",\n>  "questions": [{"kind": "open",\n'
-        '>                 "q": "{,} b",\n>\n>                 "hints": [\n>                   "h"\n>                 ],'
+        '>                 "q": "{,} b",\n>\n'
+        '>                 "hints": [\n>                   "h"\n>                 ],'
         ' "reference": "c"\n>                }]}\n> ```\n',
     ),
     "JSON in one line": (

@@ -9,7 +9,7 @@ from coursebuild.cli.arguments import add_lessons, options_of
 from coursebuild.cli.output import CLEAN, WRONG, fail, write
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model import Course, Lesson
+from coursebuild.core.model import Course, Lesson, Page
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.commands import apply_changes
@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _formatted(course: Course, chosen: Selection) -> Iterator[tuple[Source, Parsed[str]]]:
     callouts = frozenset(kind.name for kind in course.callouts)
-    for part in (*chosen.lessons, *chosen.pages):
+    parts: tuple[Lesson | Page, ...] = (*chosen.lessons, *chosen.pages)
+    for part in parts:
         if part.document is not None:
             source, lesson = part.document.source, isinstance(part, Lesson)
             yield source, format_document(source, callouts, lesson=lesson, width=course.width)
