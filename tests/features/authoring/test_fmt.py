@@ -15,7 +15,7 @@ from support.scratch_course import Done, Folder
 
 ROOT = Path(__file__).parents[3]
 MAP = "content/course.toml"
-DOCUMENTS = [*ROOT.glob("content/*/*.md"), ROOT / "docs" / "authoring.md"]
+DOCUMENTS = [*ROOT.glob("content/*/*.md"), *ROOT.glob("docs/reference/*.md")]
 
 TIDY = {
     "empty lines": (
