@@ -8,6 +8,7 @@ usage. Heavy imports happen in the command that needs them.
 - `interrupts`: Ctrl-C and SIGTERM, wherever they come
 - `commands`: which there are; those of every course have a module each (`build`, `check`, …), and
   features bring further ones
+- `pytest_plugin`: the same as tests of pytest
 - `arguments`: what several commands take
 - `output`: what is written where, and the status that says it too
 """

@@ -58,7 +58,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against",
         metavar="VERSION",
-        help="run the scripts with this version of MuJoCo, and say what it changes",
+        help="run the scripts with this version of MuJoCo, or `latest`, and say what it changes",
     )
 
 

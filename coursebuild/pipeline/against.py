@@ -22,7 +22,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
-from coursebuild.core.run.environments import environment, other_version
+from coursebuild.core.run.environments import environment, latest_version, other_version
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
@@ -41,10 +41,16 @@ from coursebuild.report.against import AgainstReport, ModelLine, ScriptAgainst
 def against(options: Options, names: tuple[str, ...], version: str) -> AgainstReport:
     """What the scripts of the lessons that the names mean do with this version of MuJoCo.
 
+    `latest` is the newest; where that is installed here, nothing is run.
+
     Raises:
         UsageError: it is no other version, or a name means nothing.
         EffectError: the version cannot be had, or the course cannot be read.
     """
+    if version == "latest":
+        version = latest_version()
+        if version == engine_version():
+            return AgainstReport(version, version, python_version(), (), ())
     other = other_version(version)
     progress = Progress(quiet=options.quiet)
     options.store.listen(progress.say)

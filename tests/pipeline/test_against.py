@@ -223,6 +223,19 @@ def test_wrong_combinations_of_arguments_give_2(make: Callable[..., Folder]) -> 
     assert done.err.startswith("coursebuild: the course cannot be read: content/course.toml:1: ")
 
 
+def test_latest_is_the_newest_that_pip_finds(make: Callable[..., Folder], wheels: Path) -> None:
+    course = make(f"## A\n\n{NUMBER}")
+    assert f"changed by MuJoCo {OTHER}" in against(course, "-q", version="latest").out
+    (wheels / f"mujoco-{OTHER}-py3-none-any.whl").unlink()
+    done = against(course, "-q", version="latest")
+    said = f"MuJoCo {HERE} against {HERE}, Python {python()}: 0 scripts: nothing to compare\n"
+    assert (done.status, done.out) == (0, said)
+    (wheels / f"mujoco-{HERE}-py3-none-any.whl").unlink()
+    done = against(course, "-q", version="latest")
+    assert done.status == 1
+    assert done.err.startswith("coursebuild: pip finds no MuJoCo at all for Python ")
+
+
 def test_version_that_cannot_be_installed_leaves_nothing(
     make: Callable[..., Folder], wheels: Path
 ) -> None:

@@ -1,6 +1,7 @@
 """Environments with another version of MuJoCo and otherwise the packages of here.
 
-Entry points: `other_version`, what the user may name; `environment`, which makes one.
+Entry points: `other_version`, what the user may name; `latest_version`, the one that pip finds;
+`environment`, which makes one.
 
 1. An environment lies in `.coursebuild/environments`: one that is there is used again. The ones
    used last are kept.
@@ -15,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import importlib.util
+import json
 import os
 import platform
 import re
@@ -62,6 +64,22 @@ def other_version(text: str) -> str:
     return text
 
 
+def latest_version() -> str:
+    """The newest version of MuJoCo that pip, as the user has configured it, would install here.
+
+    Raises:
+        EffectError: it finds none.
+    """
+    _require_pip()
+    pip = [sys.executable, "-m", "pip", *_INSTALL, "--dry-run", "--ignore-installed", "--quiet"]
+    status, said = _run([*pip, "--report", "-", _ENGINE])
+    if status:
+        raise _pip_error("at all", said)
+    report, _ = json.JSONDecoder().raw_decode(said, said.index("{"))  # warnings stand around it
+    version: str = report["install"][0]["metadata"]["version"]
+    return version
+
+
 def _shortened(version: str) -> str:
     """3.13 for 3.13.0, which is the same version."""
     return re.sub(r"(\.0)+(?=$|[a-z+]|\.(?:post|dev))", "", version)
@@ -99,12 +117,16 @@ def _packages(prefix: Path) -> Path:
     return prefix / "lib" / f"python{version}" / "site-packages"
 
 
-def _make(prefix: Path, engine: str) -> None:
+def _require_pip() -> None:
     if importlib.util.find_spec("pip") is None:
         raise EffectError(
             "pip is not installed for this Python, and nothing can be installed without it",
             help="run `python -m ensurepip`",
         )
+
+
+def _make(prefix: Path, engine: str) -> None:
+    _require_pip()
     new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=prefix.parent))
     try:
         status, said = _run([sys.executable, "-m", "venv", "--without-pip", str(new)])
@@ -131,7 +153,7 @@ def _make(prefix: Path, engine: str) -> None:
 
 def _pip_error(engine: str, said: str) -> EffectError:
     """Why pip did not install this version of MuJoCo, mostly in its own words."""
-    if f"No matching distribution found for {_ENGINE}=={engine}" in said:
+    if f"No matching distribution found for {_ENGINE}" in said:
         where = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
         return EffectError(f"pip finds no MuJoCo {engine} for {where}", help=_OFFLINE)
     lines = [line.strip() for line in said.splitlines() if line.strip()]

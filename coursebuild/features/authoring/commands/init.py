@@ -27,6 +27,7 @@ _HIDDEN = {
     "settings.json": ".vscode/settings.json",
     "extensions.json": ".vscode/extensions.json",
     "course.yml": ".github/workflows/course.yml",
+    "weekly.yml": ".github/workflows/weekly.yml",
 }
 """Files that would mean something where they lie here, by their places in a course."""
 

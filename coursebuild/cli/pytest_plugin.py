@@ -1,0 +1,200 @@
+"""`pytest --coursebuild`: each script, lab, quiz, model and page of a course is a test.
+
+pytest finds this plug-in by itself. Without the option, or `coursebuild = true` in pytest's
+configuration, it does nothing.
+
+1. To collect tests, a course is read; nothing of it runs.
+2. When the first test of a course runs, `coursebuild check` checks the lessons of all chosen tests.
+3. A diagnostic belongs to the test in whose text it stands, else to its page or model, else to the
+   map.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import warnings
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+import pytest
+
+from coursebuild.core.files.course_root import MAP, find_course_root
+
+if TYPE_CHECKING:
+    from coursebuild.core.model import Course, Document
+
+_PAGE, _MAP, _MODEL = "page", "map", "model"
+_PLACE = re.compile(r"^ *--> (.*):(\d+):\d+$", re.MULTILINE)
+_HELP = "collect the scripts, labs, quizzes, models and pages of courses as tests"
+
+_Lines = tuple[tuple[int, int], ...]
+"""Stretches of a file, by their first and last line."""
+
+
+class CourseWarning(UserWarning):
+    """A warning of `coursebuild check`."""
+
+
+class CourseError(Exception):
+    """What is wrong in a course, as `coursebuild check` prints it."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The option and its place in pytest's configuration."""
+    parser.getgroup("coursebuild").addoption("--coursebuild", action="store_true", help=_HELP)
+    parser.addini("coursebuild", _HELP, type="bool", default=False)
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> CourseFile | None:
+    """The tests of a file that belongs to a course."""
+    config = parent.config
+    if not (config.getoption("coursebuild") or config.getini("coursebuild")):
+        return None
+    root = find_course_root(str(file_path.parent))
+    if root is None or file_path.suffix not in (".md", ".toml", ".xml"):
+        return None
+    courses = config.stash.setdefault(_COURSES, {})
+    if root not in courses:
+        courses[root] = CourseTests(Path(root))
+    path = file_path.resolve().relative_to(root).as_posix()
+    if path not in courses[root].tests:
+        return None
+    file: CourseFile = CourseFile.from_parent(parent, path=file_path)
+    file.course, file.source = courses[root], path
+    return file
+
+
+class CourseTests:
+    """The tests of a course, and what `check` finds once one of them runs."""
+
+    def __init__(self, root: Path) -> None:
+        from coursebuild.pipeline.load import load
+
+        course = load(root).course
+        self.root = root
+        self.tests: Mapping[str, Mapping[str, _Lines]] = _tests(course)
+        """By path and name: where in the file the test's mistakes stand. The first test of a file
+        has those that stand in none of the others."""
+        self._found: dict[str, list[tuple[str, str]]] | None = None
+
+    def found(self, session: pytest.Session, test: str) -> list[tuple[str, str]]:
+        """What is found in a test: tags of JUnit, and texts."""
+        if self._found is None:
+            own = {
+                i.source for i in session.items if isinstance(i, CourseItem) and i.course is self
+            }
+            whole = any(_PAGE not in self.tests[source] for source in own)
+            self._found = self._check(() if whole else sorted(own))
+        return self._found[test]
+
+    def _check(self, names: Iterable[str]) -> dict[str, list[tuple[str, str]]]:
+        check = ("-m", "coursebuild", "-C", str(self.root), "check", "--format", "junit")
+        done = subprocess.run(
+            [sys.executable, *check, *names], capture_output=True, encoding="utf-8"
+        )
+        if done.returncode not in (0, 1):
+            raise CourseError(done.stderr)
+        owners = {name: path for path, tests in self.tests.items() for name in tests}
+        found: dict[str, list[tuple[str, str]]] = defaultdict(list)
+        for case in ElementTree.fromstring(done.stdout).iter("testcase"):
+            name = case.get("name", "")
+            for told in case:
+                text = told.text or f"{name}: {told.get('message')}"
+                test = self._test_of(text) if told.text else f"{owners.get(name)}::{name}"
+                found[test].append((told.tag, text))
+        return found
+
+    def _test_of(self, diagnostic: str) -> str:
+        """The test that a diagnostic belongs to."""
+        place = _PLACE.search(diagnostic)
+        if place is None or place[1] not in self.tests:
+            return f"{MAP}::{_MAP}"
+        tests, line = self.tests[place[1]], int(place[2])
+        inside = (n for n, at in tests.items() if any(a <= line <= b for a, b in at))
+        return f"{place[1]}::{next(inside, next(iter(tests)))}"
+
+
+_COURSES = pytest.StashKey[dict[str, CourseTests]]()
+
+
+def _tests(course: Course | None) -> dict[str, Mapping[str, _Lines]]:
+    """The tests of each file; of a course whose map cannot be read, the map alone."""
+    from coursebuild.core.registry import feature_trials
+
+    found: dict[str, Mapping[str, _Lines]] = {MAP: {_MAP: ()}}
+    if course is None:
+        return found
+    found |= {model.source.path: {_MODEL: ()} for model in course.models}
+    trials = {id(trial.block): name for name, (_, trial) in feature_trials(course).items()}
+    for document in course.documents:
+        tests: dict[str, _Lines] = {_PAGE: ()}
+        for name, lines in _parts(document, trials):
+            tests[name] = (*tests.get(name, ()), lines)
+        found[document.source.path] = tests
+    return found
+
+
+def _parts(document: Document, trials: Mapping[int, str]) -> Iterator[tuple[str, tuple[int, int]]]:
+    """The names and lines of scripts with their outputs, of labs (`trials` has theirs), quizzes."""
+    from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
+
+    for block in document_blocks(document):
+        name: str | None = None
+        if isinstance(block, Script):
+            name = block.path
+        elif isinstance(block, Recording):
+            name = block.script
+        elif isinstance(block, FeatureBlock):
+            name = trials.get(id(block)) or (block.progress_keys() or (None,))[0]
+        if name is not None:
+            yield name, (block.span.line, block.span.end_line)
+
+
+class CourseFile(pytest.File):
+    """A lesson, a page, a model or the map."""
+
+    course: CourseTests
+    source: str
+    """Its path in the course."""
+
+    def collect(self) -> Iterator[CourseItem]:
+        """Its tests."""
+        for name in self.course.tests[self.source]:
+            item: CourseItem = CourseItem.from_parent(self, name=name)
+            item.course, item.source = self.course, self.source
+            yield item
+
+
+class CourseItem(pytest.Item):
+    """One of its tests."""
+
+    course: CourseTests
+    source: str
+
+    def runtest(self) -> None:
+        """Tell what is wrong."""
+        found = self.course.found(self.session, f"{self.source}::{self.name}")
+        texts = {tag: [text for kind, text in found if kind == tag] for tag, _ in found}
+        for text in texts.get("system-out", ()):
+            warnings.warn(CourseWarning(text), stacklevel=1)
+        if "failure" in texts:
+            raise CourseError("\n\n".join(texts["failure"]))
+        if "skipped" in texts:
+            pytest.skip(texts["skipped"][0])
+
+    def repr_failure(
+        self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None
+    ) -> str:
+        """The mistakes as `coursebuild check` prints them."""
+        if isinstance(excinfo.value, CourseError):
+            return str(excinfo.value)
+        return str(super().repr_failure(excinfo))
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Where it stands, from line 0, and what its report is headed by."""
+        return self.path, 0, f"{self.source}: {self.name}"

@@ -1,0 +1,56 @@
+"""How much the pages of a site weigh, before a change and after it.
+
+Entry point: `weight_section(old, new)`.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from pathlib import Path
+
+from coursebuild.core.pages.html_tree import elements_with
+from coursebuild.features.diff.report import section
+
+_SHARE = 0.01
+"""Pages that change by less are not listed."""
+_WHOLE = "the whole site"
+
+
+def weight_section(old: Path, new: Path) -> str:
+    """What became of the weight of pages; `old` and `new` are folders of sites."""
+    for folder in (old, new):
+        if not (folder / "index.html").is_file():
+            return f"### Page weight\n\nNot compared: there is no site in `{folder.name}`.\n"
+    before, now = _weights(old), _weights(new)
+    rows = []
+    for name in sorted({*before, *now}):
+        a, b = before.get(name, 0), now.get(name, 0)
+        if abs(b - a) >= _SHARE * max(a, b) or (name == _WHOLE and a != b):
+            change = f"{b / a - 1:+.1%}" if a and b else "new" if b else "removed"
+            rows.append((name, f"{a / 1000:.1f} kB", f"{b / 1000:.1f} kB", change))
+    return section(
+        "Page weight",
+        "A page with the styles, scripts and pictures that it names, as they lie on the disk; a"
+        f" server sends less. Pages that change by less than {_SHARE:.0%} are not listed.",
+        ("page", "before", "now", "change"),
+        rows,
+    )
+
+
+def _weights(site: Path) -> dict[str, int]:
+    """Bytes of each page with what a browser loads for its HTML, and of all files."""
+    files = [path for path in site.rglob("*") if path.is_file()]
+    sizes = {path.relative_to(site).as_posix(): path.stat().st_size for path in files}
+    pages = {path: {path, *_loaded(site, path)} for path in sizes if path.endswith(".html")}
+    found = {path: sum(sizes.get(name, 0) for name in names) for path, names in pages.items()}
+    return {**found, _WHOLE: sum(sizes.values())}
+
+
+def _loaded(site: Path, page: str) -> set[str]:
+    html = (site / page).read_text(encoding="utf-8", errors="replace")
+    urls = {
+        attributes.get("src") or attributes.get("href") or ""
+        for name, attributes in elements_with(html, ("src", "href"))
+        if name in ("script", "img") or attributes.get("rel") == "stylesheet"
+    }
+    return {posixpath.normpath(posixpath.join(posixpath.dirname(page), url)) for url in urls}

@@ -1,0 +1,257 @@
+"""The workflows of docs/how-to: GitHub takes them, and each step does what is said."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import zipfile
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from jsonschema import Draft7Validator
+
+from coursebuild import __version__
+from coursebuild.cli.commands import known_commands, parser_of
+from coursebuild.core.run.versions import engine_version
+from support.markdown_files import DOCS, ROOT, fences
+from support.scratch_course import FIRST, SECOND, Folder
+from support.workflows import Runner, Step, git
+
+PAGES = ("continuous-integration", "publish")
+FENCES = [fence for page in PAGES for fence in fences(DOCS / f"how-to/{page}.md")]
+WRITTEN = {fence.value("file"): fence.text for fence in FENCES if fence.value("file")}
+COURSE = ".github/workflows/course.yml"
+WEEKLY = ".github/workflows/weekly.yml"
+PINNED = re.compile(r"actions/[a-z/-]+@(v\d+|[0-9a-f]{40})|\./|OWNER/coursebuild@v" + re.escape(__version__))
+HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
+
+
+def workflow(path: str = COURSE) -> dict[str, Any]:
+    found: dict[str, Any] = yaml.safe_load(WRITTEN[path])
+    return found
+
+
+def publishing_elsewhere() -> list[dict[str, Any]]:
+    """The documented workflow with each of the jobs that may take the place of its last."""
+    jobs = [yaml.safe_load(fence.text) for fence in FENCES if fence.is_("publish")]
+    return [{**workflow(), "jobs": workflow()["jobs"] | job} for job in jobs]
+
+
+def everything() -> list[dict[str, Any]]:
+    own = yaml.safe_load((ROOT / COURSE).read_text())
+    return [own, workflow(), workflow(WEEKLY), *publishing_elsewhere()]
+
+
+def jobs() -> list[dict[str, Any]]:
+    return [job for one in everything() for job in one["jobs"].values()]
+
+
+def commands(steps: list[dict[str, Any]]) -> list[str]:
+    return [step["run"] for step in steps if "run" in step]
+
+
+# ------------------------------------------------------------------------------------- as text
+
+
+@pytest.mark.site
+def test_documented_workflows_are_those_of_a_new_course(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    assert folder.main("init").status == 0
+    assert {path: folder.text(path) for path in (COURSE, WEEKLY)} == WRITTEN
+
+
+def test_github_takes_the_workflows_and_the_action() -> None:
+    schemas = files("check_jsonschema") / "builtin_schemas" / "vendor"
+    texts = {
+        name: (schemas / f"github-{name}.json").read_text() for name in ("workflows", "actions")
+    }
+    check = {name: Draft7Validator(json.loads(text)) for name, text in texts.items()}
+    release = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())
+    for one in (*everything(), release):
+        shown = {("on" if key is True else key): value for key, value in one.items()}  # YAML 1.1
+        check["workflows"].validate(shown)
+    check["actions"].validate(ACTION)
+
+
+def test_course_code_runs_with_no_secret_and_no_right_to_write() -> None:
+    for one in everything():
+        assert one["permissions"] == {"contents": "read"}
+        assert "pull_request_target" not in str(one)
+    for job in jobs():
+        trusted = "secrets." in str(job) or "write" in job.get("permissions", {}).values()
+        runs_the_course = "coursebuild" in str(job["steps"]) or "checkout" in str(job["steps"])
+        assert not (trusted and runs_the_course)
+        if trusted:
+            assert job["needs"] == "build"
+    assert workflow()["jobs"]["build"]["if"] == "github.event_name == 'push'"
+    assert workflow()[True]["push"] == {"branches": ["main"]}
+
+
+def test_actions_are_pinned_and_no_expression_becomes_code() -> None:
+    (shown,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("action"))
+    steps = [step for job in jobs() for step in job["steps"]] + shown + ACTION["runs"]["steps"]
+    used = [step["uses"] for step in steps if "uses" in step]
+    assert [name for name in used if not PINNED.fullmatch(name)] == []
+    assert [line for line in commands(steps) if "${{" in line] == []
+    for step in steps:
+        if step.get("uses", "").startswith("actions/checkout@"):
+            assert step["with"]["persist-credentials"] is False
+    assert shown[0]["with"].keys() == ACTION["inputs"].keys()
+
+
+def test_every_command_line_is_accepted() -> None:
+    lines = [line for job in jobs() for line in commands(job["steps"])]
+    lines += [line for fence in FENCES if fence.kind == "sh" for line in fence.text.splitlines()]
+    lines += [HOOKS[0]["entry"], "coursebuild " + ACTION["inputs"]["command"]["default"]]
+    called = [re.split("[>|]", line)[0] for line in lines if line.startswith("coursebuild ")]
+    assert len(called) >= 10
+    for line in called:
+        name, *rest = shlex.split(line)[1:]
+        parser_of(known_commands()[name]).parse_args(rest)
+
+
+# --------------------------------------------------------------------------- run, step by step
+
+
+@pytest.fixture
+def course(tmp_path: Path, stores: Path) -> Folder:
+    """A repository with a course of two lessons."""
+    folder = Folder(tmp_path / "repository")
+    folder.fill([FIRST, SECOND], stores)
+    folder.write(".gitignore", ".coursebuild/\nexamples/\npublic/\n")
+    git(folder.root, "init", "-q", "-b", "main")
+    commit(folder)
+    return folder
+
+
+def commit(course: Folder) -> str:
+    git(course.root, "add", "-A")
+    git(course.root, "commit", "-q", "-m", "a change")
+    return git(course.root, "rev-parse", "HEAD")
+
+
+@pytest.fixture
+def runner(course: Folder, tmp_path: Path) -> Runner:
+    secrets = ("NETLIFY_AUTH_TOKEN", "NETLIFY_SITE_ID", "SSH_KEY", "SSH_KNOWN_HOSTS", "SSH_TARGET")
+    return Runner(tmp_path / "service", course.root, {name: f"<{name}>" for name in secrets})
+
+
+def push(runner: Runner, which: dict[str, Any] | None = None) -> dict[str, list[Step]]:
+    return runner.run(which or workflow(), "main", event_name="push")
+
+
+def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
+    """A pull request that changes the second lesson; gives the commands of its only job."""
+    base = git(course.root, "rev-parse", "main")
+    git(course.root, "checkout", "-q", "-B", "change", "main")
+    course.write(course.lesson(2), lesson)
+    commit(course)
+    git(course.root, "checkout", "-q", "-B", "merged", "main")
+    git(course.root, "merge", "-q", "--no-ff", "-m", "merged", "change")
+    event = {"event_name": "pull_request", "event.pull_request.base.sha": base}
+    done = runner.run(workflow(), "merged", **event)
+    assert [*done] == ["check"]
+    return done["check"]
+
+
+def statuses(steps: list[Step]) -> list[int]:
+    return [step.status for step in steps]
+
+
+@pytest.mark.site
+def test_only_main_is_published_and_a_pull_request_is_told_what_it_does(
+    course: Folder, runner: Runner
+) -> None:
+    done = push(runner)
+    assert {name: statuses(steps) for name, steps in done.items()} == {
+        "build": [0, 0],
+        "publish": [],
+    }
+    page = runner.folder / "pages/lessons/1.2-two.html"
+    assert ">2</" in page.read_text()
+    kept = [*runner.caches]
+    assert kept == [f"course-{git(course.root, 'rev-parse', 'main')}"]
+
+    wrong = propose(runner, course, SECOND.replace("```text\n2", "```text\n3"))
+    assert statuses(wrong) == [0, 1, 0], "without a build, and with a report"
+    assert wrong[1].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
+    assert "| `examples/two.py` | 1.2 | numeric: 1 (relative, up to 5.0e-01) |" in runner.summary
+    assert "-2\n+3\n" in runner.summary
+    assert runner.summary.endswith("Not compared: there is no site in `preview`.\n")
+
+    right = propose(
+        runner, course, SECOND.replace("print(2)", "print(12)").replace("\n2\n", "\n12\n")
+    )
+    assert statuses(right) == [0, 0, 0, 0], right
+    assert "running scripts (1)\n" in right[1].err, "the other one is kept"
+    assert "\n| the whole site | " in runner.summary
+    assert [*runner.caches] == kept
+    assert ">12</" not in page.read_text()
+    assert runner.notes == [f"pip install coursebuild=={__version__}"] * 3
+
+
+@pytest.mark.site
+@pytest.mark.parametrize("which", publishing_elsewhere(), ids=("netlify", "rsync"))
+def test_publishing_elsewhere_sends_what_main_built(runner: Runner, which: dict[str, Any]) -> None:
+    done = push(runner, which)
+    assert statuses(done["publish"]) == [0, 0], done["publish"]
+    assert ">2</" in (runner.folder / "sent/lessons/1.2-two.html").read_text()
+    sent = runner.notes[-1]
+    key = runner.folder / "home/.ssh/id_ed25519"
+    if sent.startswith("npx"):
+        assert sent.endswith(" deploy --prod --no-build --dir public")
+    else:
+        assert sent == "rsync -rt --delete-after --delay-updates public/ <SSH_TARGET>"
+        assert (key.read_text(), key.stat().st_mode & 0o777) == ("<SSH_KEY>\n", 0o600)
+
+
+@pytest.mark.site
+def test_weekly_everything_is_run_anew_and_with_the_newest_engine(
+    course: Folder, runner: Runner, tmp_path: Path
+) -> None:
+    engine = engine_version()
+    name = f"mujoco-{engine}"
+    with zipfile.ZipFile(tmp_path / f"{name}-py3-none-any.whl", "w") as wheel:
+        about = f"Metadata-Version: 2.1\nName: mujoco\nVersion: {engine}\n"
+        wheel.writestr(f"{name}.dist-info/METADATA", about)
+        wheel.writestr(f"{name}.dist-info/WHEEL", "Wheel-Version: 1.0\nTag: py3-none-any\n")
+    runner.environment |= {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path)}
+    done = runner.run(workflow(WEEKLY), "main")
+    assert {name: statuses(steps) for name, steps in done.items()} == {
+        "anew": [0, 0],
+        "newest-engine": [0, 0, 0],
+    }, done
+    assert runner.summary.startswith(f"```text\nMuJoCo {engine} against {engine}, ")
+    assert runner.summary.endswith("\n```\n")
+
+
+@pytest.mark.site
+def test_action_installs_what_is_asked_for_and_runs_a_command(
+    course: Folder, runner: Runner
+) -> None:
+    defaults = {name: value["default"] for name, value in ACTION["inputs"].items()}
+    above, steps = course.root.parent, ACTION["runs"]["steps"]
+    done = runner.action(above, steps, **{**defaults, "path": course.root.name})
+    assert statuses(done) == [0, 0], done
+    given = {"version": "0.9.0", "path": course.root.name, "command": "build --out ../site"}
+    assert statuses(runner.action(above, steps, **given)) == [0, 0]
+    assert (above / "site/index.html").is_file()
+    assert runner.notes == [f"pip install {ROOT}", "pip install coursebuild==0.9.0"]
+
+
+@pytest.mark.site
+def test_hook_stops_a_commit_with_a_mistake(course: Folder, runner: Runner) -> None:
+    (hook,) = HOOKS
+    (config,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("pre-commit"))
+    assert config["repos"][0]["hooks"] == [{"id": hook["id"]}]
+    assert all(re.search(hook["files"], path) for path in (course.lesson(), "models/a.xml"))
+    step = {"run": hook["entry"]}
+    assert statuses(runner.action(course.root, [step])) == [0]
+    course.replace(course.lesson(2), "```text\n2", "```text\n3")
+    (done,) = runner.action(course.root, [step])
+    assert (done.status, done.out.startswith("error[output-drift]")) == (1, True)

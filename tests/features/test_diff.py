@@ -1,0 +1,209 @@
+"""`coursebuild diff`: what a change does, told to those who review it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from support.scratch_course import Folder, block
+from support.workflows import git
+
+pytestmark = pytest.mark.site
+
+LAB = """
+```lab simlab
+{
+  "model": "ball",
+  "title": "%s",
+  "setup": "data.qvel[2] = %s",
+  "readouts": [{"label": "height", "expr": "data.qpos[2]"}]
+}
+```
+"""
+MODEL = """
+<mujoco><worldbody><body pos="0 0 1"><freejoint/><geom size="%s"/></body></worldbody></mujoco>
+"""
+DRAW = "import pathlib\npathlib.Path('flip.svg').write_text('<svg/>')\nprint('drawn')"
+TABLE = "Output:\n\n| n | error |\n| --- | --- |\n| 1 | 0.50 |\n| 2 | %s |\n\n"
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 50"><path d="M0 0H%s"/></svg>\n'
+OLD = (
+    "## One\n\nIt takes 3.5 s, and `1.25`{out} once more.\n\n"
+    + block("kept.py", "print(1.5)", "1.5")
+    + block("value.py", "print('value', 1.25, 'of', 7)", "value 1.25 of 7", "digits")
+    + block("table.py", "print('1 0.50')\nprint('2 0.25')")
+    + TABLE % "0.25"
+    + block("gone.py", "print('gone')", "gone")
+    + block("draw.py", DRAW, "drawn", info="figure=flip.svg")
+    + "Figure: ![A line](flip.svg) A line.\n"
+    + LAB % ("Drop", "0")
+    + LAB % ("Throw", "1")
+)
+NEW = (
+    OLD.replace("value 1.25 of 7\n", "value 1.35 of 7\nand more\n")
+    .replace("'of', 7", "'of', 7, '``'")
+    .replace("```text digits", "```text volatile")
+    .replace("| 2 | 0.25 |", "| 2 | 0.20 |")
+    .replace("takes 3.5 s", "takes 3.5 s, or 4.5 s")
+    .replace(block("gone.py", "print('gone')", "gone"), block("added.py", "print(1)", "1"))
+    .replace(LAB % ("Throw", "1"), LAB % ("Spin", "0") + LAB % ("Throw", "2"))
+)
+REPORT = """\
+## What this change does
+
+Compared with {base}. Lessons and pages: 1.1 edited, 1.2 new.
+
+### Outputs
+
+What scripts print, as it is recorded. Whether they print it is what `check` says.
+
+| script | in | change |
+| --- | --- | --- |
+| `examples/value.py` | 1.1 | code edited; numeric: 1, extra lines: 1 (relative, up to 8.0e-02); \
+**compared in another way** (digits → volatile) |
+| `examples/table.py` | 1.1 | numeric: 1 (relative, up to 2.0e-01) |
+| `examples/gone.py` | 1.1 | removed |
+| `examples/added.py` | 1.1 | new |
+
+<details><summary><code>examples/value.py</code></summary>
+
+```diff
+-value 1.25 of 7
++value 1.35 of 7
++and more
+```
+
+</details>
+
+<details><summary><code>examples/table.py</code></summary>
+
+```diff
+-| 2 | 0.25 |
++| 2 | 0.20 |
+```
+
+</details>
+
+### Figures
+
+What scripts draw, as it is recorded.
+
+| figure | change |
+| --- | --- |
+| `content/lessons/flip.svg` | 1 of its parts moved, by up to 10.0% of its size |
+
+### Labs
+
+What readers run. Whether each does what it promises is what `check` says.
+
+| in | lab | change |
+| --- | --- | --- |
+| 1.1 | Drop | model `ball` edited |
+| 1.1 | Throw | `setup` `"data.qvel[2] = 1"` → `"data.qvel[2] = 2"`, model `ball` edited |
+| 1.1 | Spin | new |
+
+### Truth
+
+Numbers in the text, and those that a script prints, a formula computes, or the author gives as \
+known. Whether they hold is what `check` says.
+
+| in | numbers | printed | computed | given | unproven | proven |
+| --- | --- | --- | --- | --- | --- | --- |
+| 1.1 | 2 → 3 | 1 | 0 | 0 | 1 → 2 | 50.0 % → 33.3 % |
+| all | 2 → 3 | 1 | 0 | 0 | 1 → 2 | 50.0 % → 33.3 % |
+"""
+
+
+@pytest.fixture
+def course(tmp_path: Path, stores: Path) -> Folder:
+    """A course below the root of a repository."""
+    folder = Folder(tmp_path / "repository" / "a cöurse")
+    folder.fill([OLD], stores)
+    folder.write("models/ball.xml", MODEL % "0.1")
+    folder.write("content/lessons/flip.svg", SVG % 50)
+    folder.write(".gitignore", ".coursebuild\n")
+    git(folder.root.parent, "init", "-q", "-b", "main")
+    commit(folder)
+    return folder
+
+
+def commit(course: Folder) -> str:
+    git(course.root, "add", "-A")
+    git(course.root, "commit", "-q", "-m", "a change")
+    return git(course.root, "rev-parse", "--short=7", "HEAD")
+
+
+def change(course: Folder) -> None:
+    more = '[[level.lesson]]\nid = "1.2"\nslug = "two"\ntitle = "Two"\nstatus = "draft"\n'
+    course.write("content/course.toml", course.text("content/course.toml") + more)
+    course.write(course.lesson(1), NEW)
+    course.write(course.lesson(2), "## Two\n\nText.\n")
+    course.write("models/ball.xml", MODEL % "0.2")
+    course.write("content/lessons/flip.svg", SVG % 60)
+
+
+def test_everything_that_a_change_does_is_told(course: Folder, tmp_path: Path) -> None:
+    shutil.copytree(course.root, tmp_path / "before")
+    base = git(course.root, "rev-parse", "--short=7", "HEAD")
+    git(course.root, "checkout", "-q", "-b", "change")
+    change(course)
+    wanted = REPORT.format(base=f"`main` ({base})")
+    done = course.main("diff", "main")
+    assert (done.status, done.err) == (0, "")
+    assert done.out == wanted
+    git(course.root, "checkout", "-q", "--detach", "main")  # main goes on, which is no change here
+    git(course.root, "stash", "-q", "-u")
+    course.write("models/other.xml", MODEL % "0.3")
+    commit(course)
+    git(course.root, "branch", "-q", "-f", "main", "HEAD")
+    git(course.root, "checkout", "-q", "change")
+    git(course.root, "stash", "pop", "-q")
+    assert course.main("diff", "main").out == wanted
+    assert course.main("diff", "../../before").out == REPORT.format(base="`../../before`")
+    assert not (course.root / "examples").exists(), "nothing was run"
+
+
+def test_nothing_is_told_of_what_stays(course: Folder) -> None:
+    told = course.main("diff", "HEAD").out
+    assert "Lessons and pages: no change.\n" in told
+    assert told.count("\n\nNo change.\n") == 4
+
+
+def site(course: Folder, name: str, **files: str) -> None:
+    for path, text in files.items():
+        course.write(f"{name}/{path.replace('__', '.')}", text)
+
+
+def test_a_page_weighs_what_it_loads(course: Folder) -> None:
+    page = '<!DOCTYPE html><link rel="stylesheet" href="s.css"><img src="p.png" alt=""><a href="x">'
+    same = {"other__html": "<p>" + 900 * "x", "s__css": 500 * "s"}
+    site(course, "public", index__html=page, old__html=1000 * "o", p__png=1000 * "p", **same)
+    site(course, "preview", index__html=page, new__html="<p>", p__png=3000 * "p", **same)
+    sites = ("--base-site", "public", "--site", "preview")
+    told = course.main("diff", "HEAD", *sites).out
+    assert told.endswith(
+        "| page | before | now | change |\n| --- | --- | --- | --- |\n"
+        "| index.html | 1.6 kB | 3.6 kB | +126.0% |\n"
+        "| new.html | 0.0 kB | 0.0 kB | new |\n"
+        "| old.html | 1.0 kB | 0.0 kB | removed |\n"
+        "| the whole site | 3.5 kB | 4.5 kB | +28.7% |\n"
+    ), told
+    (course.root / "public/index.html").unlink()
+    told = course.main("diff", "HEAD", *sites).out
+    assert told.endswith("\nNot compared: there is no site in `public`.\n")
+    done = course.main("diff", "HEAD", "--site", "preview")
+    assert (done.status, "belong together" in done.err) == (2, True)
+
+
+def test_a_base_that_cannot_be_had(course: Folder, tmp_path: Path) -> None:
+    done = course.main("diff", "nowhere")
+    said = "coursebuild: `nowhere` is neither a folder with a course nor a revision of git here\n"
+    assert (done.status, done.out, done.err) == (2, "", said)
+    first = git(course.root, "rev-parse", "HEAD")
+    (course.root / "content/course.toml").rename(tmp_path / "map")
+    commit(course)
+    (tmp_path / "map").rename(course.root / "content/course.toml")
+    done = course.main("diff", "main")
+    assert (done.status, "the course map" in done.err) == (2, True)
+    assert course.main("diff", first).status == 0

@@ -1,0 +1,192 @@
+"""Workflows of GitHub, run step by step on this machine.
+
+Entry point: `Runner`. What the actions of others do is done here in a few lines; `pip`, `npx` and
+`rsync` are programs that only note how they were called. An action or an expression that is not
+known fails the test.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from support.scratch_course import ROOT
+
+_EXPRESSION = re.compile(r"\$\{\{ (.*?) \}\}")
+_NOTED = '#!/bin/sh\necho "${0##*/} $*" >> "$NOTES"\n[ ! -d public ] || cp -R public/. "$SENT"\n'
+_COURSEBUILD = f'#!/bin/sh\nexec {sys.executable} -m coursebuild "$@"\n'
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A command of a workflow that was run."""
+
+    command: str
+    status: int
+    out: str
+    err: str
+
+
+@dataclass
+class Runner:
+    """A service that runs the workflows of one repository."""
+
+    folder: Path
+    repository: Path
+    secrets: dict[str, str] = field(default_factory=dict)
+    environment: dict[str, str] = field(default_factory=dict)
+    caches: dict[str, Path] = field(default_factory=dict)
+    summary: str = ""
+    """What the last run told reviewers."""
+
+    def __post_init__(self) -> None:
+        for name in ("bin", "home", "tmp", "sent", "artifacts", "pages"):
+            (self.folder / name).mkdir(parents=True)
+        programs = dict.fromkeys(("pip", "npx", "rsync"), _NOTED) | {"coursebuild": _COURSEBUILD}
+        for name, text in programs.items():
+            (self.folder / "bin" / name).write_text(text)
+            (self.folder / "bin" / name).chmod(0o755)
+
+    @property
+    def notes(self) -> list[str]:
+        """The calls of programs that reach other machines."""
+        return (self.folder / "notes").read_text().splitlines()
+
+    def run(self, workflow: dict[str, Any], ref: str, **github: str) -> dict[str, list[Step]]:
+        """Run the jobs that the event asks for; gives the commands of each, as far as they came."""
+        values = {f"github.{name}": value for name, value in github.items()}
+        values |= {f"secrets.{name}": value for name, value in self.secrets.items()}
+        values["github.sha"] = git(self.repository, "rev-parse", ref)
+        (self.folder / "summary").write_text("")
+        done: dict[str, list[Step]] = {}
+        for name, job in workflow["jobs"].items():
+            wanted = job.get("needs", name) in {name, *done} and _holds(job.get("if"), values)
+            if wanted:
+                done[name] = self._job(name, job["steps"], ref, values)
+        self.summary = (self.folder / "summary").read_text()
+        return done
+
+    def action(self, place: Path, steps: list[dict[str, Any]], **inputs: str) -> list[Step]:
+        """Run the steps of an action in a folder."""
+        values = {f"inputs.{name}": value for name, value in inputs.items()}
+        return [self._command(place, step, values) for step in steps if "run" in step]
+
+    def _job(
+        self, name: str, steps: list[dict[str, Any]], ref: str, values: dict[str, str]
+    ) -> list[Step]:
+        place = self.folder / "work" / name
+        shutil.rmtree(place, ignore_errors=True)
+        place.mkdir(parents=True)
+        done: list[Step] = []
+        saved: dict[str, Any] | None = None
+        for step in steps:
+            if any(one.status for one in done) and "cancelled" not in step.get("if", ""):
+                continue
+            if "run" in step:
+                done.append(self._command(place, step, values))
+                continue
+            uses, given = step["uses"].partition("@")[0], step.get("with", {})
+            given = {key: _filled(str(value), values) for key, value in given.items()}
+            match uses:
+                case "actions/checkout":
+                    depth = f"--depth={given.get('fetch-depth', 1)}"
+                    url = f"file://{self.repository}"
+                    git(place, "clone", "-q", depth, f"--branch={ref}", url, ".")
+                case "actions/setup-python":
+                    pass
+                case "actions/cache" | "actions/cache/restore":
+                    self._restore(place, given)
+                    saved = given if uses == "actions/cache" else saved
+                case "actions/upload-pages-artifact":
+                    self._upload(place / given["path"])
+                case "actions/download-artifact":
+                    shutil.copy(self.folder / "artifacts" / f"{given['name']}.tar", place)
+                    (place / f"{given['name']}.tar").rename(place / "artifact.tar")
+                case "actions/deploy-pages":
+                    with tarfile.open(self.folder / "artifacts" / "github-pages.tar") as archive:
+                        archive.extractall(self.folder / "pages", filter="data")
+                case _:
+                    raise AssertionError(f"nobody knows what {uses} does")
+        if saved is not None and not any(step.status for step in done):
+            self._save(place, saved)
+        return done
+
+    def _command(self, place: Path, step: dict[str, Any], values: dict[str, str]) -> Step:
+        own = {key: _filled(value, values) for key, value in step.get("env", {}).items()}
+        system = {name: os.environ[name] for name in ("LANG", "LC_ALL") if name in os.environ}
+        environment = {
+            "PATH": f"{self.folder / 'bin'}:/usr/bin:/bin",
+            "HOME": str(self.folder / "home"),
+            "TMPDIR": str(self.folder / "tmp"),
+            "PYTHONPATH": str(ROOT),
+            "NOTES": str(self.folder / "notes"),
+            "SENT": str(self.folder / "sent"),
+            "GITHUB_STEP_SUMMARY": str(self.folder / "summary"),
+            "GITHUB_ACTION_PATH": str(ROOT),
+        }
+        done = subprocess.run(
+            ["bash", "-e", "-c", step["run"]],
+            cwd=place / _filled(step.get("working-directory", "."), values),
+            env=system | environment | self.environment | own,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+        )
+        return Step(step["run"], done.returncode, done.stdout, done.stderr)
+
+    def _restore(self, place: Path, given: dict[str, str]) -> None:
+        """The cache of the key, else the newest whose key begins as one of the others does."""
+        newest = list(reversed(self.caches))
+        wanted = [key for key in newest if key == given["key"]]
+        for start in given.get("restore-keys", "").split():
+            wanted += [key for key in newest if key.startswith(start)]
+        if wanted:
+            shutil.copytree(self.caches[wanted[0]], place, symlinks=True, dirs_exist_ok=True)
+
+    def _save(self, place: Path, given: dict[str, str]) -> None:
+        kept = self.folder / "caches" / given["key"]
+        for path in given["path"].split():
+            shutil.copytree(place / path, kept / path, symlinks=True)
+        self.caches[given["key"]] = kept
+
+    def _upload(self, site: Path) -> None:
+        with tarfile.open(self.folder / "artifacts" / "github-pages.tar", "w") as archive:
+            for path in sorted(site.iterdir()):
+                if not path.name.startswith("."):
+                    archive.add(path, path.name)
+
+
+def git(place: Path, *arguments: str) -> str:
+    """What git prints, where nobody's settings count."""
+    names = {
+        f"GIT_{who}_{what}": "a@b" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")
+    }
+    quiet = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
+    done = subprocess.run(
+        ["git", *arguments],
+        cwd=place,
+        env=os.environ | names | quiet,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def _filled(text: str, values: dict[str, str]) -> str:
+    return _EXPRESSION.sub(lambda match: values[match[1]], text)
+
+
+def _holds(condition: str | None, values: dict[str, str]) -> bool:
+    """Whether a job runs, by the only kind of condition that jobs have here."""
+    if condition is None:
+        return True
+    name, _, value = condition.partition(" == ")
+    return values[name] == value.strip("'")
