@@ -172,7 +172,12 @@ def test_metadata_names_the_command_and_the_ranges(
     assert {str(Requirement(line)).lower() for line in required} == set(map(str.lower, declared))
     urls = dict(line.split(", ") for line in metadata.get_all("Project-URL"))
     assert urls == pyproject["project"]["urls"]
-    assert b"coursebuild = coursebuild.cli:main" in archive.read(f"{info}/entry_points.txt")
+    points = archive.read(f"{info}/entry_points.txt").decode()
+    for line in (
+        "coursebuild = coursebuild.cli:main",
+        "coursebuild = coursebuild.cli.pytest_plugin",
+    ):
+        assert line in points
 
 
 def test_sdist_holds_the_sources_and_what_was_bundled(root: Path, sdist: Path) -> None:

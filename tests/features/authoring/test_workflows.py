@@ -26,7 +26,9 @@ FENCES = [fence for page in PAGES for fence in fences(DOCS / f"how-to/{page}.md"
 WRITTEN = {fence.value("file"): fence.text for fence in FENCES if fence.value("file")}
 COURSE = ".github/workflows/course.yml"
 WEEKLY = ".github/workflows/weekly.yml"
-PINNED = re.compile(r"actions/[a-z/-]+@(v\d+|[0-9a-f]{40})|\./|OWNER/coursebuild@v" + re.escape(__version__))
+PINNED = re.compile(
+    r"actions/[a-z/-]+@(v\d+|[0-9a-f]{40})|\./|OWNER/coursebuild@v" + re.escape(__version__)
+)
 HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
 
