@@ -11,6 +11,8 @@ configuration, it does nothing.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import re
 import subprocess
 import sys
@@ -75,6 +77,7 @@ class CourseTests:
     def __init__(self, root: Path) -> None:
         from coursebuild.pipeline.load import load
 
+        atexit.register(gc.freeze)  # as Python ends, what was read can crash its collector
         course = load(root).course
         self.root = root
         self.tests: Mapping[str, Mapping[str, _Lines]] = _tests(course)
