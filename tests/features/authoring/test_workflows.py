@@ -109,7 +109,10 @@ def test_actions_are_pinned_and_no_expression_becomes_code() -> None:
 def test_every_command_line_is_accepted() -> None:
     lines = [line for job in jobs() for line in commands(job["steps"])]
     lines += [line for fence in FENCES if fence.kind == "sh" for line in fence.text.splitlines()]
-    lines += [HOOKS[0]["entry"], "coursebuild " + ACTION["inputs"]["command"]["default"]]
+    lines += [
+        *(hook["entry"] for hook in HOOKS),
+        "coursebuild " + ACTION["inputs"]["command"]["default"],
+    ]
     called = [re.split("[>|]", line)[0] for line in lines if line.startswith("coursebuild ")]
     assert len(called) >= 10
     for line in called:
@@ -247,13 +250,14 @@ def test_action_installs_what_is_asked_for_and_runs_a_command(
 
 
 @pytest.mark.site
-def test_hook_stops_a_commit_with_a_mistake(course: Folder, runner: Runner) -> None:
-    (hook,) = HOOKS
+def test_hooks_stop_a_commit_with_a_mistake(course: Folder, runner: Runner) -> None:
     (config,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("pre-commit"))
-    assert config["repos"][0]["hooks"] == [{"id": hook["id"]}]
-    assert all(re.search(hook["files"], path) for path in (course.lesson(), "models/a.xml"))
-    step = {"run": hook["entry"]}
-    assert statuses(runner.action(course.root, [step])) == [0]
-    course.replace(course.lesson(2), "```text\n2", "```text\n3")
-    (done,) = runner.action(course.root, [step])
-    assert (done.status, done.out.startswith("error[output-drift]")) == (1, True)
+    assert config["repos"][0]["hooks"] == [{"id": hook["id"]} for hook in HOOKS]
+    assert all(re.search(hook["files"], course.lesson()) for hook in HOOKS)
+    steps = [{"run": hook["entry"]} for hook in HOOKS]
+    assert statuses(runner.action(course.root, steps)) == [0, 0]
+    wrong = SECOND.replace("```text\n2", "```text\n3")
+    course.write(course.lesson(2), wrong + "\n\n\n")
+    done = runner.action(course.root, steps)
+    assert (statuses(done), course.text(course.lesson(2))) == ([0, 1], wrong.rstrip() + "\n")
+    assert done[1].out.startswith("error[output-drift]")
