@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 COMMANDS = ("build", "check")
 """Those that may have nothing to do."""
 _ALL_ANEW = "--no-cache"
-_VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_SIZE")
+_VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_KEY", "COURSEBUILD_CACHE_SIZE")
 """Of the environment: what says the same as arguments."""
 
 

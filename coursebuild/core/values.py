@@ -15,6 +15,7 @@ import enum
 import hashlib
 import importlib
 import sys
+import zlib
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from typing import Any, TypeVar
@@ -38,19 +39,19 @@ _WITH_VALUES = tuple(
     f"coursebuild.{part}." for part in ("core.model", "core.pages", "features", "numerics")
 )
 """Where modules are that may have to be imported."""
-_DAMAGE = (
-    *(
-        msgspec.MsgspecError,
-        ArithmeticError,
-        TypeError,
-        ValueError,
-        LookupError,
-        AttributeError,
-        ImportError,
-    ),
+DAMAGE = (
+    ArithmeticError,
+    AttributeError,
+    ImportError,
+    LookupError,
+    MemoryError,
     RecursionError,
+    TypeError,
+    ValueError,
+    msgspec.MsgspecError,
+    zlib.error,
 )
-"""What damaged bytes may lead to."""
+"""What reading damaged bytes may raise."""
 
 
 def encode(value: object) -> bytes:
@@ -70,7 +71,7 @@ def decode(data: bytes | None, kind: type[Value], source: Source | None = None) 
     try:
         names, packed = msgspec.msgpack.decode(data or b"", type=tuple[list[str], Any])
         found = _builder(names, source)(packed) if type(packed) is list else packed
-    except _DAMAGE:
+    except DAMAGE:
         return None
     return found if isinstance(found, kind) else None
 

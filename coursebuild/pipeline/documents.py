@@ -107,11 +107,11 @@ class Documents(Parser):
         """What `check_course` finds; nothing where it found nothing in one of this fingerprint."""
         key = step_key("checked course")
         state = (self.fingerprint(course) or "").encode()
-        if state and self._store.get(_CHECKED, key, local=True) == state:
+        if state and self._store.get(_CHECKED, key, bytes) == state:
             return ()
         found = super().check(course)
         if state and not found:
-            self._store.put(_CHECKED, key, state, local=True)
+            self._store.put(_CHECKED, key, state)
         return found
 
     def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
@@ -131,8 +131,9 @@ class Documents(Parser):
         known = self._texts.get(text.source.path)
         if known is not None and known.key == text.key:
             return True
-        data = self._store.get(SUMMARIES, text.key, local=True)
-        summary = decode(data, DocumentSummary, text.source)
+        summary = self._store.get(
+            SUMMARIES, text.key, lambda data: decode(data, DocumentSummary, text.source)
+        )
         if summary is not None:
             self._take(text, summary)
         return summary is not None
@@ -163,12 +164,11 @@ class Documents(Parser):
     ) -> Parsed[Value]:
         """What a text parses to: kept, or parsed now, by what is imported only then."""
         key = step_key(kind, source.path, source.text)
-        data = self._store.get(kind, key, local=True)
-        found = decode(data, Parsed, source)
+        found = self._store.get(kind, key, lambda data: decode(data, Parsed, source))
         if found is not None:
             return found
         parsed = parse(source)
-        self._store.put(kind, key, encode(parsed), local=True)
+        self._store.put(kind, key, encode(parsed))
         return parsed
 
     # --- drawing
@@ -182,7 +182,8 @@ class Documents(Parser):
 
     def page(self, key: str, request: Callable[[], PageRequest]) -> DrawnPage:
         """The page of a key, as it is in the store; drawn here and now, where it is not."""
-        return decode(self._store.peek(PAGES, key), DrawnPage) or self._reader.draw(request())
+        kept = self._store.peek(PAGES, key, lambda data: decode(data, DrawnPage))
+        return kept or self._reader.draw(request())
 
     def context(self, path: str, inputs: PageInputs, language: str) -> PageContext:
         """The document at a path with all its text, on the page with these inputs."""

@@ -90,7 +90,8 @@ def open_store(
     """The results made before: here, and at a shared place.
 
     What the command line does not say (`None`), the environment may: `COURSEBUILD_CACHE` a place,
-    `COURSEBUILD_CACHE_SIZE` what the store here may take.
+    `COURSEBUILD_CACHE_SIZE` what the store here may take. `COURSEBUILD_CACHE_KEY` is what entries
+    at the shared place are signed with: a secret, which no command line shows.
 
     Raises:
         UsageError: one of them cannot be.
@@ -108,7 +109,8 @@ def open_store(
         from coursebuild.core.engine.shared import shared_cache
 
         try:
-            shared = shared_cache(where)
+            key = environment.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")
+            shared = shared_cache(where, key)
         except EffectError as error:
             raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
     return Memo(root, shared=shared, size=limit, fresh=fresh)

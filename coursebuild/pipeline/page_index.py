@@ -30,7 +30,7 @@ class PageKeys:
         self._store = store
         self._around = around
         self._name = step_key("keys of pages")
-        found = store.get_value(_KIND, self._name, _Kept, local=True)
+        found = store.get_value(_KIND, self._name, _Kept)
         known = found is not None and found.around == around
         self._before = found.keys if found is not None and known else {}
         self._now: dict[str, tuple[str, str]] = {}
@@ -51,4 +51,4 @@ class PageKeys:
         """Keep them for the next build."""
         if self._around is not None and self._now != self._before:
             kept = _Kept(self._around, self._now)
-            self._store.put_value(_KIND, self._name, kept, local=True)
+            self._store.put_value(_KIND, self._name, kept)

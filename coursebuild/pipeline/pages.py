@@ -178,7 +178,7 @@ class Pages:
         def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
             for entry in entries:
                 key, request = self._request(entry, keys)
-                kept = decode(self._store.get(PAGES, key, local=True), DrawnPage)
+                kept = self._store.get(PAGES, key, lambda data: decode(data, DrawnPage))
                 if kept is not None:
                     found[entry.path] = self._noted(entry, key, kept.record)
                 elif entry.path not in self._last_good:  # else what it was is gone

@@ -188,7 +188,7 @@ class PageReader:
             fingerprint = document_fingerprint(bare)
             data = encode(DocumentSummary(bare, wrong, imported, lasting, fingerprint))
             if lasting:
-                self._store.put(SUMMARIES, text.key, data, local=True)
+                self._store.put(SUMMARIES, text.key, data)
             self._keep(text, whole)
             return data
 
@@ -217,14 +217,16 @@ class PageReader:
         if not formulas:
             return {}
         key = key_of(typesetter_digest(), path)
-        known: dict[Formula, str] = decode(self._store.get(_MATHML, key, local=True), dict) or {}
+        known: dict[Formula, str] = (
+            self._store.get(_MATHML, key, lambda data: decode(data, dict)) or {}
+        )
         new = [formula for formula in formulas if formula not in known]
         if not new:
             return {formula: known[formula] for formula in formulas}
         made = {**known, **dict(zip(new, self._started().typeset(new), strict=True))}
         found = {formula: made[formula] for formula in formulas}
         lasting = {formula: one for formula, one in found.items() if isinstance(one, str)}
-        self._store.put(_MATHML, key, encode(lasting), local=True)
+        self._store.put(_MATHML, key, encode(lasting))
         return found
 
     def _started(self) -> MathEngine:
@@ -253,7 +255,7 @@ class PageReader:
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             found = replace(found, notes=tuple(digests))
             page = DrawnPage(found, notes, body.encode())
-            self._store.put(PAGES, request.key, encode(page), local=True)
+            self._store.put(PAGES, request.key, encode(page))
             return page
 
     def context(self, text: SourceText, inputs: PageInputs, language: str) -> PageContext:
@@ -285,9 +287,9 @@ class _Marks:
 
     def __call__(self, language: str, code: str) -> tuple[Markup, ...]:
         key = step_key("code", self._version, language, code)
-        found = self._store.get_value(_CODE, key, list[str], local=True)
+        found = self._store.get_value(_CODE, key, list[str])
         if found is not None:
             return tuple(map(Markup, found))
         lines = mark_now(language, code)
-        self._store.put_value(_CODE, key, list(map(str, lines)), local=True)
+        self._store.put_value(_CODE, key, list(map(str, lines)))
         return lines

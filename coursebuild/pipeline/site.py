@@ -142,10 +142,10 @@ class SiteMaker:
         facts = facts or _ANYTHING
         facts = replace(facts, text=facts.text | common_characters(self.library))
         key = step_key("shared files", facts, from_whole)
-        found = decode(self.store.get("shared", key, local=True), SharedFiles)
+        found = self.store.get("shared", key, lambda data: decode(data, SharedFiles))
         if found is None:
             found = self._shared_made(facts, whole=from_whole)
-            self.store.put("shared", key, encode(found), local=True)
+            self.store.put("shared", key, encode(found))
         return found.names, [
             CachedFile(path, key_of(key, path), functools.partial(found.files.__getitem__, path))
             for path in found.files
@@ -163,9 +163,7 @@ class SiteMaker:
         """Compressed copies."""
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return prepared_copy(key) or self.store.get_or_create(
-                "compressed", key, make, local=True
-            )
+            return prepared_copy(key) or self.store.get_or_create("compressed", key, make)
 
         return compressed_files(files, keep)
 
@@ -183,7 +181,7 @@ class SiteMaker:
             names,
             pages.noted(feature),
             functools.partial(pages.note, feature),
-            functools.partial(self.store.get_or_create, "parts", local=True),
+            functools.partial(self.store.get_or_create, "parts"),
             downloads.archives,
             downloads.imports,
         )
@@ -197,7 +195,7 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
 
         return subset_font(job)
 
-    return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make, local=True)
+    return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make)
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:

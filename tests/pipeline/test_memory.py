@@ -12,13 +12,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import sealed
-from coursebuild.core.model.results import Outcome, Trace
+from coursebuild.core.engine.memo import sealed, unsealed
+from coursebuild.core.model.results import Divergence, Outcome, Sign, Trace
+from coursebuild.core.run.dependencies import described
 from coursebuild.core.run.memory import longest_first
+from coursebuild.core.scripts.sensitivity import amplification
+from coursebuild.report.explained import Explained, Explanation, explained_text
+from coursebuild.report.terminal import Style
 from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
+from support.poisoned_values import poisoned
 
 Act = Callable[[Desk], object]
 SOUGHT = Trace((), (), (), (), "", sought=("examples/{json}",))
+DIVERGED = Divergence(Sign.STATE, "0.5", "", PATH, 1)
+STATE = "1 1 0x1.0p+0 0x1.0p+0 0x1.8p-1 0x0.0p+0"
+DAMAGED = "the entry {}… in the shared cache is damaged: it is made again"
 ODD = os.fsdecode(b"models/\xff.bin")
 
 
@@ -96,6 +104,41 @@ def test_longest_runs_come_first_and_unknown_ones_before_them() -> None:
     jobs = [replace(JOB, path=name) for name in "abcd"]
     seconds = {"a": 1.0, "b": None, "c": 3.0}
     assert [job.path for job in longest_first(jobs, seconds)] == ["b", "d", "c", "a"]
+
+
+def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> None:
+    """What a run printed is believed, and no other thing that somebody may have put there."""
+    trace = Trace(("models/a.xml",), ("models",), (), ("json",), "", (DIVERGED,), True, (STATE,))
+    place = tmp_path / "shared"
+    Desk(tmp_path / "maker", shared=str(place)).run(trace, figures=(("a.svg", b"<svg/>"),))
+    (entry,) = [path for path in place.rglob("*") if path.is_file()]
+    name = entry.relative_to(place / "coursebuild-1").as_posix()
+    whole = unsealed(name, entry.read_bytes())
+    assert whole is not None
+    victim = Desk(tmp_path / "victim", shared=str(place))
+    believed = 0
+    for data in poisoned(whole, 500):
+        shutil.rmtree(victim.root / ".coursebuild", ignore_errors=True)
+        entry.write_bytes(sealed(name, data))
+        victim.told.clear()
+        run = victim.recall()
+        memory = victim.memory()
+        reasons = memory.reasons(memory.inputs(JOB, SCRIPT))
+        last = memory.last(PATH)
+        shown = Explained("script", PATH, "1.1", "remembered", tuple(reasons))
+        if last is not None:
+            depends = tuple(map(described, last.dependencies))
+            seconds = last.kept.seconds
+            shown = replace(shown, depends=depends, made=last.made, seconds=seconds)
+        text = explained_text(Explanation(PATH, "script", (shown,)), Style(colour=False))
+        assert "\x1b" not in text
+        if run is None:
+            assert victim.told in ([], [DAMAGED.format(name[:20])]), data
+        else:
+            believed += 1
+            assert run.path == PATH
+            amplification([run, run])
+    assert 20 < believed < 400
 
 
 # --- for how long it holds

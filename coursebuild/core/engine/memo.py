@@ -1,15 +1,16 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
 Entry point: `Memo`: `get` and `put`, or both in one, `get_or_create`; `get_value` and `put_value`
-of what is checked to be of a type.
+of JSON.
 
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
-   together. It begins with the hash of its name and of what follows: one that was cut, flipped or
-   put under another name is told of, removed, and made again instead of served.
+   together. It begins with the hash of its name and of what follows. Whoever reads one says what
+   its bytes must be; one that was cut, flipped, put under another name, or holds something else is
+   told of, removed, and made again instead of served.
 2. It is written beside its place and renamed there, so that processes at work at the same time see
    whole entries only.
-3. What is not there is looked for in the shared cache (`shared`), if there is one, and what is made
-   is sent there.
+3. What a script or a trial found may be shared: what is not there is looked for in the shared
+   cache, if there is one, and what is made is sent there. Everything else is made on this machine.
 4. When a command ends, now and then, what was not used for longest is removed until all takes less
    than the limit.
 
@@ -19,7 +20,9 @@ Nothing is lost when the folder is deleted.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
+import hmac
 import os
 import re
 import threading
@@ -32,6 +35,7 @@ import msgspec
 
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.locks import make_private_folder
+from coursebuild.core.values import DAMAGE
 
 if TYPE_CHECKING:
     from coursebuild.core.engine.shared import SharedCache
@@ -56,15 +60,19 @@ _ROOM = 0.9
 """Part of the limit that is left full, so that not every command has to remove something."""
 
 
-def sealed(name: str, data: bytes) -> bytes:
-    """An entry: data behind the hash of itself and its name, such as `KIND/KEY`."""
-    return hashlib.sha256(b"%s\0%s" % (name.encode(), data)).digest() + data
+def sealed(name: str, data: bytes, key: bytes = b"") -> bytes:
+    """An entry: data behind the hash of itself and its name, such as `KIND/KEY`.
+
+    With a key only those who have it can make one.
+    """
+    text = b"%s\0%s" % (name.encode(), data)
+    return (hmac.digest(key, text, "sha256") if key else hashlib.sha256(text).digest()) + data
 
 
-def unsealed(name: str, entry: bytes) -> bytes | None:
+def unsealed(name: str, entry: bytes, key: bytes = b"") -> bytes | None:
     """The data of an entry; `None` where it is not what was put under this name."""
     data = entry[_DIGEST:]
-    return data if entry == sealed(name, data) else None
+    return data if hmac.compare_digest(entry, sealed(name, data, key)) else None
 
 
 class Memo:
@@ -102,34 +110,35 @@ class Memo:
         if self.shared is not None:
             self.shared.listen(self._say)
 
-    def get_or_create(
-        self, kind: str, key: str, make: Callable[[], bytes], *, local: bool = False
-    ) -> bytes:
+    def get_or_create(self, kind: str, key: str, make: Callable[[], bytes]) -> bytes:
         """The result of this kind and key: one that is kept, or made now and kept."""
-        found = self.get(kind, key, local=local)
+        found = self.get(kind, key, bytes)
         if found is not None:
             return found
         made = make()
         if self.fresh:
-            before = self.peek(kind, key)
+            before = self.peek(kind, key, bytes)
             if before is not None and before != made:
                 self._say(f"{_short(f'{kind}/{key}')} was made again and is not what was kept")
-        self.put(kind, key, made, local=local)
+        self.put(kind, key, made)
         return made
 
-    def get(self, kind: str, key: str, *, local: bool = False) -> bytes | None:
+    def get(
+        self, kind: str, key: str, read: Callable[[bytes], Value | None], *, shared: bool = False
+    ) -> Value | None:
         """The result of this kind and key, if it is kept and whole.
 
-        A `local` one is not looked for in the shared cache.
+        `read` makes the result of its bytes; what it raises, or `None`, means that they hold none.
+        A `shared` one is looked for in the shared cache too.
         """
         if self.fresh:
             return None
-        found = self.peek(kind, key)
-        if found is None and self.shared is not None and not local:
-            found = self._fetch(self.shared, f"{kind}/{key}")
+        found = self.peek(kind, key, read)
+        if found is None and self.shared is not None and shared:
+            found = self._fetch(self.shared, f"{kind}/{key}", read)
         return found
 
-    def peek(self, kind: str, key: str) -> bytes | None:
+    def peek(self, kind: str, key: str, read: Callable[[bytes], Value | None]) -> Value | None:
         """What this machine keeps under a key, though everything is to be made again."""
         name = f"{kind}/{key}"
         path = f"{self.folder}/{name}"
@@ -139,40 +148,29 @@ class Memo:
                 entry = file.read()
         except OSError:
             return None
-        data = unsealed(name, entry)
+        value = _value(unsealed(name, entry), read)
         with contextlib.suppress(OSError):
-            if data is None:
+            if value is None:
                 os.unlink(path)  # noqa: PTH108
                 self._say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
             elif time.time() - changed > _USED:
                 os.utime(path)  # what was used lately stays
-        return data
+        return value
 
-    def put(self, kind: str, key: str, data: bytes, *, local: bool = False) -> None:
-        """Keep a result; one that cannot be written only costs time.
-
-        A `local` one says something of this machine, or is made faster than fetched: it is not
-        shared.
-        """
+    def put(self, kind: str, key: str, data: bytes, *, shared: bool = False) -> None:
+        """Keep a result, here or also in the shared cache; that it cannot be only costs time."""
         name = f"{kind}/{key}"
-        entry = sealed(name, data)
-        self._write(name, entry)
-        if self.shared is not None and not local:
-            self.shared.write(name, entry)
+        self._write(name, data)
+        if self.shared is not None and shared:
+            self.shared.write(name, sealed(name, data, self.shared.key))
 
-    def get_value(
-        self, kind: str, key: str, type: type[Value], *, local: bool = False
-    ) -> Value | None:
-        """The same of a value that was kept as JSON, if it is one of this type."""
-        data = self.get(kind, key, local=local)
-        try:
-            return None if data is None else msgspec.json.decode(data, type=type)
-        except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
-            return None
+    def get_value(self, kind: str, key: str, type: type[Value]) -> Value | None:
+        """A result that was kept as JSON, if it is of this type."""
+        return self.get(kind, key, functools.partial(msgspec.json.decode, type=type))
 
-    def put_value(self, kind: str, key: str, value: object, *, local: bool = False) -> None:
-        """Keep a value as JSON; see `put`."""
-        self.put(kind, key, msgspec.json.encode(value), local=local)
+    def put_value(self, kind: str, key: str, value: object) -> None:
+        """Keep a value as JSON."""
+        self.put(kind, key, msgspec.json.encode(value))
 
     def group(self, kind: str, key: str, *, newest: int = 8) -> list[str]:
         """The keys, `GROUP/KEY`, that are kept in a group, newest first; the others go."""
@@ -220,17 +218,22 @@ class Memo:
             tell = self._tell
         tell(line)
 
-    def _fetch(self, shared: SharedCache, name: str) -> bytes | None:
+    def _fetch(
+        self, shared: SharedCache, name: str, read: Callable[[bytes], Value | None]
+    ) -> Value | None:
         entry = shared.read(name)
-        data = None if entry is None else unsealed(name, entry)
-        if entry is not None and data is None:
+        if entry is None:
+            return None
+        data = unsealed(name, entry, shared.key)
+        value = _value(data, read)
+        if data is None or value is None:
             self._say(f"{_short(name)} in the shared cache is damaged: it is made again")
-        elif entry is not None:
-            self._write(name, entry)
-        return data
+        else:
+            self._write(name, data)
+        return value
 
-    def _write(self, name: str, entry: bytes) -> None:
-        path = self.folder / name
+    def _write(self, name: str, data: bytes) -> None:
+        path, entry = self.folder / name, sealed(name, data)
         new = path.with_name(f"{TEMPORARY}{os.urandom(8).hex()}")
         try:
             try:
@@ -247,6 +250,14 @@ class Memo:
             return
         with self._lock:
             self._written += len(entry)
+
+
+def _value(data: bytes | None, read: Callable[[bytes], Value | None]) -> Value | None:
+    """What the data of an entry holds; `None` where it is not what it should be."""
+    try:
+        return None if data is None else read(data)
+    except DAMAGE:
+        return None
 
 
 def _short(name: str) -> str:

@@ -24,6 +24,8 @@ from coursebuild.core.files.errors import EffectError, reason
 
 _VERSION = "coursebuild-1"
 """A folder in the shared place; to be changed with what entries look like."""
+_SIGNED = "coursebuild-1-signed"
+"""That of entries which only those who have a key can make."""
 _TIMEOUT = 15.0
 """Seconds that a request may take."""
 _FLUSH = 60.0
@@ -123,17 +125,19 @@ class RemotePlace:
         return sorted(name for name in names if not name.startswith("."))
 
 
-def shared_cache(where: str) -> SharedCache:
+def shared_cache(where: str, key: bytes = b"") -> SharedCache:
     """The cache at a folder or an URL; nothing is read yet.
+
+    With a key, that of the entries signed with it.
 
     Raises:
         EffectError: this installation cannot reach such a place at all.
     """
     scheme, separator, _ = where.partition("://")
     if not separator:
-        return SharedCache(where, FolderPlace(Path(where).expanduser().absolute()))
+        return SharedCache(where, FolderPlace(Path(where).expanduser().absolute()), key)
     if scheme == "file":
-        return SharedCache(where, FolderPlace(Path(unquote(urlsplit(where).path))))
+        return SharedCache(where, FolderPlace(Path(unquote(urlsplit(where).path))), key)
     try:
         from fsspec.core import url_to_fs
     except ImportError:
@@ -147,15 +151,20 @@ def shared_cache(where: str) -> SharedCache:
         raise EffectError(f"the cache {where} needs a package: {_words(error)}") from None
     except ValueError as error:
         raise EffectError(f"there is no place like {where}: {_words(error)}") from None
-    return SharedCache(where, RemotePlace(files, top))
+    return SharedCache(where, RemotePlace(files, top), key)
 
 
 class SharedCache:
     """What the store asks, whatever becomes of the place."""
 
-    def __init__(self, where: str, place: SharedFolder, timeout: float = _TIMEOUT) -> None:
+    def __init__(
+        self, where: str, place: SharedFolder, key: bytes = b"", timeout: float = _TIMEOUT
+    ) -> None:
         self.where = where
         self.place = place
+        self.key = key
+        """What entries are signed with; empty where they are not."""
+        self._folder = _SIGNED if key else _VERSION
         self.timeout = timeout
         self.trouble = ""
         """What was wrong with it first."""
@@ -175,11 +184,11 @@ class SharedCache:
 
     def read(self, name: str) -> bytes | None:
         """An entry; `None` where there is none or it cannot be had."""
-        return self._ask(lambda: self.place.read(f"{_VERSION}/{name}"), None)
+        return self._ask(lambda: self.place.read(f"{self._folder}/{name}"), None)
 
     def names(self, folder: str) -> list[str]:
         """The names of the entries in a group."""
-        return self._ask(lambda: self.place.names(f"{_VERSION}/{folder}"), [])
+        return self._ask(lambda: self.place.names(f"{self._folder}/{folder}"), [])
 
     def write(self, name: str, entry: bytes) -> None:
         """Send an entry when there is time."""
@@ -215,7 +224,7 @@ class SharedCache:
                     return
             try:
                 if not self._is_down():
-                    self.place.write(f"{_VERSION}/{name}", entry)
+                    self.place.write(f"{self._folder}/{name}", entry)
             except Exception as error:  # libraries of clouds raise what they like
                 self._fail(_words(error))
             finally:

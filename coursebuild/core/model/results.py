@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Iterable
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from coursebuild.core.model import Comparison, Recording
 from coursebuild.core.text.source import Span
@@ -88,6 +88,12 @@ class Divergence(Struct, frozen=True):
     """Of a contact: the names of its geoms, or what stands for them, as words."""
 
 
+_NUMBER = r"(-?0x[01](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|-?inf|nan)"
+EndState: TypeAlias = Annotated[
+    str, Meta(pattern=rf"^[0-9]{{1,9}} [0-9]{{1,9}}( {_NUMBER}){{2,}}$")
+]
+
+
 class Trace(Struct, frozen=True):
     """What a script looked at while it ran: all that its result depends on, beside its text.
 
@@ -112,7 +118,7 @@ class Trace(Struct, frozen=True):
     moved: bool = False
     """Whether there was an initial state to be moved, or a step to be halved, of a run that was to
     do so."""
-    states: tuple[str, ...] = ()
+    states: tuple[EndState, ...] = ()
     """Of such a run, for each `MjData` in words: its number in the order of their first use, the
     length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest since
     its simulation began), and the `qpos` and `qvel` that it ended with, as hexadecimal numbers."""

@@ -147,8 +147,8 @@ class Memory:
         """The result kept on this machine that holds now."""
         group = group_key(inputs)
         for key in self.store.group(_RESULTS, group):
-            record = self._read(self.store.peek(_RESULTS, key), inputs)
-            if record is not None and self._holds(record):
+            record = self.store.peek(_RESULTS, key, from_bytes)
+            if record is not None and self._holds(record, inputs):
                 self._note(record, key)
                 return record
         return None
@@ -156,13 +156,14 @@ class Memory:
     def results(self, inputs: Inputs) -> list[RunRecord]:
         """All results kept on this machine for these inputs, newest first."""
         keys = self.store.group(_RESULTS, group_key(inputs))
-        records = (self._read(self.store.peek(_RESULTS, key), inputs) for key in keys)
-        return [record for record in records if record is not None]
+        records = (self.store.peek(_RESULTS, key, from_bytes) for key in keys)
+        return [record for record in records if record is not None and _fits(record, inputs)]
 
     def last(self, path: str) -> RunRecord | None:
         """What became of the last run of a script, without what it printed."""
-        data = self.store.peek(_LAST, _last_key(path))
-        record = None if data is None else from_bytes(data.partition(b"\n")[2])
+        record = self.store.peek(
+            _LAST, _last_key(path), lambda data: from_bytes(data.partition(b"\n")[2])
+        )
         return record if record is not None and record.inputs.path == path else None
 
     def reasons(self, inputs: Inputs) -> list[str]:
@@ -219,7 +220,7 @@ class Memory:
             if self.fresh:
                 self._compare(record, run)
             key = f"{group_key(inputs)}/{result_key(dependencies)}"
-            self.store.put(_RESULTS, key, to_bytes(record, self.states.places))
+            self.store.put(_RESULTS, key, to_bytes(record, self.states.places), shared=True)
         self._note(record, key)
 
     def _disturbed(self, inputs: Inputs, looked: Iterable[Dependency]) -> str:
@@ -243,41 +244,32 @@ class Memory:
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""
 
-    def _holds(self, record: RunRecord) -> bool:
-        return not any(True for _ in state_changes(record.dependencies, self.states))
-
-    def _read(self, data: bytes | None, inputs: Inputs) -> RunRecord | None:
-        """The record of an entry, if it is one of these inputs."""
-        if data is None:
-            return None
-        record = from_bytes(data)
-        fits = (
-            record is not None
-            and record.inputs == inputs
-            and not record.forgotten
-            and record.kept.outcome in REMEMBERED
+    def _holds(self, record: RunRecord, inputs: Inputs) -> bool:
+        return _fits(record, inputs) and not any(
+            True for _ in state_changes(record.dependencies, self.states)
         )
-        return record if fits else None
 
     def _fetch(self, wanted: Sequence[Inputs]) -> list[RunRecord]:
         """Results that hold from the shared cache."""
         if self.store.shared is None or not wanted:
             return []
 
-        def fetch(inputs: Inputs) -> list[tuple[str, bytes | None]]:
+        def fetch(inputs: Inputs) -> list[tuple[str, RunRecord | None]]:
             group = group_key(inputs)
             here = set(self.store.group(_RESULTS, group))
             keys = [key for key in self.store.shared_group(_RESULTS, group) if key not in here]
-            return [(key, self.store.get(_RESULTS, key)) for key in keys[:_MOST_SHARED]]
+            return [
+                (key, self.store.get(_RESULTS, key, from_bytes, shared=True))
+                for key in keys[:_MOST_SHARED]
+            ]
 
         found: list[RunRecord] = []
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
             for inputs, entries in zip(wanted, pool.map(fetch, wanted), strict=True):
-                for key, data in entries:
-                    record = self._read(data, inputs)
-                    if record is not None and self._holds(record):
+                for key, record in entries:
+                    if record is not None and self._holds(record, inputs):
                         self._note(record, key)
                         found.append(record)
                         break
@@ -292,13 +284,13 @@ class Memory:
             return
         key = _last_key(record.inputs.path)
         head = f"{result}\n".encode()
-        before = self.store.peek(_LAST, key)
+        before = self.store.peek(_LAST, key, bytes)
         if result and before is not None and before.startswith(head):
             return
         run = replace(record.kept, stdout="", stderr="", trace=None, figures=())
         data = head + to_bytes(replace(record, kept=run), ())
         if before != data:
-            self.store.put(_LAST, key, data, local=True)
+            self.store.put(_LAST, key, data)
 
     def _compare(self, record: RunRecord, run: ScriptRun) -> None:
         """Hold a run made afresh against what is remembered for the same dependencies."""
@@ -307,6 +299,16 @@ class Memory:
                 old = before.run(self.states.places)
                 if (old.outcome, old.status, old.stdout) != (run.outcome, run.status, run.stdout):
                     self.differing.append((old, run))
+
+
+def _fits(record: RunRecord, inputs: Inputs) -> bool:
+    """Whether a record is a result of these inputs."""
+    return (
+        record.inputs == inputs
+        and record.kept.path == inputs.path
+        and record.kept.outcome in REMEMBERED
+        and not record.forgotten
+    )
 
 
 def longest_first(

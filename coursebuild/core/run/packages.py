@@ -12,7 +12,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import importlib.util
-import json
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -120,13 +119,11 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
 def _provided(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
     """The distributions, with versions, of each top-level module in these folders."""
     key = _signature(folders)
-    kept = store.peek("installed", key) if key is not None else None
-    with contextlib.suppress(ValueError, AttributeError, RecursionError):
-        if kept is not None:
-            return {str(k): str(v) for k, v in json.loads(kept).items()}
-    found = _scan(folders)
-    if key is not None:
-        store.put("installed", key, json.dumps(found, sort_keys=True).encode(), local=True)
+    found = None if key is None else store.get_value("installed", key, dict[str, str])
+    if found is None:
+        found = _scan(folders)
+        if key is not None:
+            store.put_value("installed", key, found)
     return found
 
 

@@ -11,14 +11,17 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable
+from typing import Annotated, TypeAlias
 
 import msgspec
-from msgspec import Struct
+from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
 from coursebuild.core.run.dependencies import Dependency, Inputs, Kind
 
+Moment: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 37)]
+"""Seconds since 1970, in a year that has a name."""
 REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
 _MARK = "\0"
 _NOTHING = Trace((), (), (), (), "")
@@ -29,7 +32,7 @@ class RunRecord(Struct, frozen=True):
 
     inputs: Inputs
     dependencies: tuple[Dependency, ...]
-    made: int
+    made: Moment
     """When, in seconds since 1970."""
     forgotten: str
     """Why it is not remembered, as the end of a sentence; empty where it is."""
@@ -69,15 +72,16 @@ def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
     return json.dumps(msgspec.to_builtins(replace(record, kept=run)), ensure_ascii=True).encode()
 
 
-def from_bytes(data: bytes) -> RunRecord | None:
-    """The record that JSON holds; `None` where it holds none."""
+def from_bytes(data: bytes) -> RunRecord:
+    """The record that JSON holds.
+
+    Raises:
+        ValueError: it holds none.
+    """
     try:
-        try:
-            return msgspec.json.decode(data, type=RunRecord)
-        except msgspec.DecodeError:  # perhaps for an escape that is half a letter
-            return msgspec.convert(json.loads(data), RunRecord)
-    except (ValueError, RecursionError):
-        return None
+        return msgspec.json.decode(data, type=RunRecord)
+    except msgspec.DecodeError:  # perhaps for an escape that is half a letter
+        return msgspec.convert(json.loads(data), RunRecord)
 
 
 def _take_out(text: str, places: Iterable[tuple[str, str]]) -> str:

@@ -46,9 +46,9 @@ def model_of_course(context: TrialContext, name: str) -> LabModel | None:
 def saved_model(context: TrialContext, native: NativeEngine, model: LabModel) -> bytes:
     """A model as an MJB file, from the store where nothing that it is made of has changed."""
     store, key = context.memory.store, model_key(context.root, model.path, model.text)
-    saved = store.get("mjb", key, local=True)
+    saved = store.get("mjb", key, bytes)
     if saved is None:
         saved = native.save(model.path, model.text)
         if model_key(context.root, model.path, model.text) == key:  # it was not edited meanwhile
-            store.put("mjb", key, saved, local=True)
+            store.put("mjb", key, saved)
     return saved

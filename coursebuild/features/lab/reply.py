@@ -1,31 +1,113 @@
 """The reply of a trial, read: plain values with arrays.
 
-Entry point: `read_trial(reply)`. docs/explanation/how-labs-run.md says what a reply holds.
+Entry points: `read_reply`, `reply_bytes`; `unpack_arrays`. docs/explanation/how-labs-run.md says what
+a reply holds.
 """
 
 from __future__ import annotations
 
 import base64
-from typing import Any
+import json
+import zlib
+from typing import Annotated, Any, NotRequired, TypeAlias, TypedDict
 
-from msgspec import Struct
+import msgspec
+from msgspec import Meta, Struct
 
+from coursebuild.core.run.run_record import Moment
 from coursebuild.features.lab.model import Entry
 
 _KINDS = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
+_LARGEST = 1 << 28
+"""Bytes of a reply."""
+
+Count: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 53)]
+Number: TypeAlias = int | float
+Readouts: TypeAlias = list[Number | str | None]
+
+
+class MainPicture(TypedDict):
+    """What the lab shows at one moment of its main run."""
+
+    time: Number
+    frame: Any
+    readouts: Readouts | None
+
+
+class MainPlots(TypedDict):
+    """What its plots show at the end."""
+
+    times: list[Number]
+    plots: list[list[list[Number | None]]]
+
+
+class MainParity(TypedDict):
+    """How native MuJoCo repeats it, or why it cannot."""
+
+    unrepeated: NotRequired[str]
+    steps: NotRequired[Count]
+    timestep: NotRequired[Number]
+    first: NotRequired[Count | None]
+    relative: NotRequired[Number]
+    exact: NotRequired[bool]
+
+
+class MainRecord(TypedDict):
+    """What an exported script is held against."""
+
+    steps: Count
+    last: Count
+    near: Count
+    state: list[Number]
+
+
+class ResetDifference(TypedDict):
+    """What a reset does not lead back to the start, and the entry that should."""
+
+    what: str
+    entry: Entry
+
+
+class MainRun(TypedDict):
+    """What the main run recorded. What is drawn of it is checked by drawing it."""
+
+    steps: Count
+    timestep: Number
+    diverged: bool
+    pictures: Annotated[list[MainPicture], Meta(min_length=1)]
+    plots: MainPlots
+    scene: dict[str, Any]
+    arrows: dict[str, Number | str] | None
+    fill: Number | None
+    mostFill: Number | None
+    parity: MainParity | None
+    recorded: NotRequired[MainRecord | None]
+    resetDiffers: ResetDifference | None
+
+
+class Attempt(Struct, frozen=True):
+    """Something that a reader can do."""
+
+    what: str = ""
+
+
+FailureKind: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern="^(throws|nan|type|warning|diverged|deep|expect|goal|stopAt|timeout|engine|shared)$"
+    ),
+]
 
 
 class TrialFailure(Struct, frozen=True):
     """Something that went wrong in a trial."""
 
     entry: Entry
-    kind: str
-    """`throws`, `nan`, `type`, `warning`, `diverged`, `deep`, `expect`, `goal`, `stopAt`,
-    `timeout`, `engine` or `shared`."""
-    message: str
-    time: float | None
+    kind: FailureKind
+    message: str | None = None
+    time: Number | None = msgspec.field(name="at", default=None)
     """Simulated time, s."""
-    during: str
+    during: Attempt | None = None
     """What was being tried."""
 
 
@@ -33,27 +115,31 @@ class TrialReply(Struct, frozen=True):
     """A reply. `main` is what the main run recorded, `None` where it did not come to its end."""
 
     version: str
-    tried: tuple[str, ...]
+    tried: tuple[Attempt, ...]
     failures: tuple[TrialFailure, ...]
-    main: dict[str, Any] | None
-    steps_per_second: int | None
+    main: MainRun | None
+    seconds: Annotated[float, Meta(ge=0)] = 0.0
+    """How long the trial took."""
+    made: Moment = 0
+    steps_per_second: Count | None = msgspec.field(name="stepsPerSecond", default=None)
 
 
-def read_trial(reply: dict[str, Any]) -> TrialReply:
-    """A reply of the trial's JavaScript."""
-    failures = tuple(
-        TrialFailure(
-            tuple(failure["entry"]),
-            failure["kind"],
-            failure.get("message") or "something that has no text",
-            failure["at"],
-            (failure.get("during") or {}).get("what", ""),
-        )
-        for failure in reply["failures"]
-    )
-    tried = tuple(step["what"] for step in reply["tried"])
-    speed = reply.get("stepsPerSecond")
-    return TrialReply(reply["version"], tried, failures, reply["main"], speed)
+def read_reply(data: bytes) -> TrialReply:
+    """The reply that was kept as bytes.
+
+    Raises:
+        ValueError, zlib.error: they hold none.
+    """
+    unpacking = zlib.decompressobj()
+    text = unpacking.decompress(data, _LARGEST)
+    if not unpacking.eof:
+        raise ValueError("it is cut, or too long")
+    return msgspec.convert(json.loads(text), TrialReply)
+
+
+def reply_bytes(reply: dict[str, Any]) -> bytes:
+    """A reply as it is kept."""
+    return zlib.compress(json.dumps(reply).encode())
 
 
 def unpack_arrays(value: Any) -> Any:

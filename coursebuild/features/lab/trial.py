@@ -19,13 +19,11 @@ import functools
 import hashlib
 import json
 import time
-import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, Tried
 from coursebuild.core.model.results import TrialLine, TrialResult
@@ -38,12 +36,12 @@ from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from coursebuild.features.lab.export import difference as export_check
 from coursebuild.features.lab.export.trial import LabExport, exported
-from coursebuild.features.lab.files import LabOutput
+from coursebuild.features.lab.files import LabOutput, LabRecord
 from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
 from coursebuild.features.lab.model import MJCF, TRIED, Lab
 from coursebuild.features.lab.models import LabModel, model_of_lab, saved_model
 from coursebuild.features.lab.names import name_diagnostics, references
-from coursebuild.features.lab.reply import TrialReply, read_trial
+from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 from coursebuild.features.lab.verdict import (
     Parity,
@@ -126,6 +124,20 @@ class LabTrials:
         self._engines.stop()
 
 
+class _Findings(Struct, frozen=True):
+    """What follows from the reply of a trial."""
+
+    reply: TrialReply
+    parity: Parity | None
+    failures: tuple[Diagnostic, ...]
+    """What the lab cannot be shown with."""
+    remarks: tuple[Diagnostic, ...]
+    config: str
+    """The lab's data with the camera that its trial has found."""
+    record: LabRecord | None
+    picture: bytes
+
+
 class _Attempt(Struct, frozen=True):
     """Trying one lab."""
 
@@ -145,56 +157,80 @@ class _Attempt(Struct, frozen=True):
         try:
             mjb = saved_model(self.context, self.engines.native, self.model)
             key = _key(inputs, mjb)
-            reply = self._load(key)
-            cached = reply is not None
-            if reply is None:
+            read = functools.partial(self._read, module, key)
+            findings = self.context.memory.store.get("labs", key, read, shared=True)
+            cached = findings is not None
+            if findings is None:
                 mistakes = self._mistakes(mjb)
                 if mistakes:
                     return self._failed(module, began), mistakes
-                reply = self._try(module, mjb, key)
+                findings = read(self._try(module, mjb, key))
         except NativeError as error:
             wrong = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
             return self._failed(module, began), [wrong]
-        reading, parity = read_trial(reply), _parity(reply)
-        seconds, made = float(reply["seconds"]), int(reply["made"])
-        found = self._failures(reading, parity) if lab.is_of_text else []
-        offer = LabExport(None) if found else self._export(reading, parity)
+        reply, parity = findings.reply, findings.parity
+        found = [*findings.failures]
+        offer = LabExport(None) if found else self._export(reply, parity)
         own = () if lab.xml is not None else (self.model.path,)
         self.context.memory.note_trial(
             inputs,
             (*own, *self.model.files),
             ok=not found,
             lasting=_is_lasting(reply),
-            seconds=seconds,
-            made=made,
+            seconds=reply.seconds,
+            made=reply.made,
         )
         line = TrialLine(
             name=module.name,
             title=lab.fields.title,
             lesson=self.trial.owner,
             status="failed" if found else "ok",
-            seconds=seconds if cached else time.monotonic() - began,
-            steps_per_second=reading.steps_per_second,
-            tried=len(reading.tried),
+            seconds=reply.seconds if cached else time.monotonic() - began,
+            steps_per_second=reply.steps_per_second,
+            tried=len(reply.tried),
             parity=_parity_text(reply, parity, offer),
-            fill=None if reading.main is None else reading.main["fill"],
+            fill=None if reply.main is None else reply.main["fill"],
             cached=cached,
             unexported=offer.reason,
         )
-        config = _framed(module.config, reading.main)
-        output = LabOutput(module.code, config, mjb, script=offer.script)
-        if self.context.static and not found and reading.main is not None:
-            output = self._drawn(output, key, reading.main)
-        found += [*deep_diagnostics(lab, reading), *reset_diagnostics(lab, reading)]
-        found += far_diagnostics(lab, reading)
-        return TrialResult(lab.span, line, output), found
+        output = LabOutput(
+            module.code, findings.config, mjb, findings.record, findings.picture, offer.script
+        )
+        return TrialResult(lab.span, line, output), [*found, *findings.remarks]
 
-    def _failures(self, reading: TrialReply, parity: Parity | None) -> list[Diagnostic]:
-        """What the lab cannot be shown with."""
-        lab = self.lab
-        found = [*trial_diagnostics(lab, reading), *self._version(reading)]
-        found += shallow_diagnostics(lab, reading)
-        return [*found, *(parity_diagnostics(lab, parity) if parity is not None else ())]
+    def _read(self, module: LabModule, key: str, data: bytes) -> _Findings:
+        """All that follows from a reply that is kept.
+
+        Where it is none, which somebody may have put there, something is raised.
+        """
+        from coursebuild.features.lab.picture.static import lab_record
+
+        lab, reply = self.lab, read_reply(data)
+        if reply.main is None and not reply.failures:
+            raise ValueError("a lab starts, or it is said why not")
+        parity = _parity(reply)
+        found = (
+            *trial_diagnostics(lab, reply),
+            *self._version(reply),
+            *shallow_diagnostics(lab, reply),
+            *(parity_diagnostics(lab, parity) if parity is not None else ()),
+        )
+        remarks = (
+            *deep_diagnostics(lab, reply),
+            *reset_diagnostics(lab, reply),
+            *far_diagnostics(lab, reply),
+        )
+        failures, main = found if lab.is_of_text else (), reply.main
+        drawn = self.context.static and not failures and main is not None
+        return _Findings(
+            reply,
+            parity,
+            failures,
+            remarks,
+            _framed(module.config, main),
+            lab_record(lab, main) if drawn and main is not None else None,
+            self._picture(key, main) if drawn and main is not None else b"",
+        )
 
     def _failed(self, module: LabModule, began: float) -> TrialResult:
         """A lab that could not be tried."""
@@ -218,15 +254,7 @@ class _Attempt(Struct, frozen=True):
         paths = [reference.path for reference in named]
         return list(name_diagnostics(named, browser.look_up(paths, mjb, self.seconds)))
 
-    def _load(self, key: str) -> dict[str, Any] | None:
-        """The reply of an earlier trial."""
-        found = self.context.memory.store.get("labs", key)
-        try:
-            return None if found is None else json.loads(zlib.decompress(found))
-        except (zlib.error, ValueError, RecursionError):
-            return None
-
-    def _try(self, module: LabModule, mjb: bytes, key: str) -> dict[str, Any]:
+    def _try(self, module: LabModule, mjb: bytes, key: str) -> bytes:
         """The reply of the trial, with the comparison in place of what it was made from."""
         request = {
             "config": tried_data(module),
@@ -241,9 +269,10 @@ class _Attempt(Struct, frozen=True):
             main["parity"] = self._compared(main, mjb)
         reply["seconds"] = round(time.monotonic() - began, 4)
         reply["made"] = int(time.time())
-        if _is_lasting(reply):
-            self.context.memory.store.put("labs", key, zlib.compress(json.dumps(reply).encode()))
-        return reply
+        data = reply_bytes(reply)
+        if _is_lasting(read_reply(data)):
+            self.context.memory.store.put("labs", key, data, shared=True)
+        return data
 
     def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
         """How the main run compares with native MuJoCo, or why it cannot be repeated."""
@@ -277,21 +306,19 @@ class _Attempt(Struct, frozen=True):
             message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
             yield diagnose("lab-engine", self.lab.span.first_line(), message)
 
-    def _drawn(self, output: LabOutput, key: str, main: dict[str, Any]) -> LabOutput:
-        """What the page needs, with the record of the main run."""
-        from coursebuild.features.lab.picture.static import draw_picture, lab_record
+    def _picture(self, key: str, main: MainRun) -> bytes:
+        """The start of the main run, drawn."""
+        from coursebuild.features.lab.picture.static import draw_picture
 
         text = f"{key}\0{self.lab.fields.height}\0{_drawing_digest()}"
-        picture = self.context.memory.store.get_or_create(
+        return self.context.memory.store.get_or_create(
             "pictures",
             hashlib.sha256(text.encode()).hexdigest(),
             lambda: draw_picture(self.lab, main),
-            local=True,
         )
-        return replace(output, record=lab_record(self.lab, main), picture=picture)
 
 
-def _framed(config: str, main: dict[str, Any] | None) -> str:
+def _framed(config: str, main: MainRun | None) -> str:
     """A lab's data with the camera that its trial has found."""
     if main is None:
         return config
@@ -303,9 +330,9 @@ def _framed(config: str, main: dict[str, Any] | None) -> str:
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
 
 
-def _is_lasting(reply: dict[str, Any]) -> bool:
+def _is_lasting(reply: TrialReply) -> bool:
     """Whether the same trial would have the same result another time."""
-    return all(failure["kind"] not in _TRANSIENT for failure in reply["failures"])
+    return all(failure.kind not in _TRANSIENT for failure in reply.failures)
 
 
 def _key(inputs: Inputs, mjb: bytes) -> str:
@@ -321,18 +348,17 @@ def _drawing_digest() -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
-def _parity(reply: dict[str, Any]) -> Parity | None:
-    main = reply["main"]
-    run = main["parity"] if main is not None else None
+def _parity(reply: TrialReply) -> Parity | None:
+    run = reply.main["parity"] if reply.main is not None else None
     if run is None or "unrepeated" in run:
         return None
     return Parity(run["steps"], run["timestep"], run["first"], run["relative"], run["exact"])
 
 
-def _parity_text(reply: dict[str, Any], parity: Parity | None, offer: LabExport) -> str:
+def _parity_text(reply: TrialReply, parity: Parity | None, offer: LabExport) -> str:
     if parity is not None:
         return parity.describe()
-    run = reply["main"]["parity"] if reply["main"] is not None else None
+    run = reply.main["parity"] if reply.main is not None else None
     if run is None:
         return ""
     if offer.script is not None:

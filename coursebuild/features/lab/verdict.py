@@ -153,10 +153,9 @@ def shallow_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 def far_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """That what moves is small in the picture, because of the lab's own camera."""
-    fill = trial.main["fill"] if trial.main is not None else None
-    if trial.main is None or fill is None:
+    main = trial.main
+    if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
         return
-    most = trial.main["mostFill"]
     if fill < _SMALL and fill < most / 2:
         what = (
             f"what moves fills {100 * fill:.2g} % of the picture, and could fill {100 * most:.2g} %"
@@ -169,20 +168,21 @@ _SMALL = 0.1
 
 
 def _failure(lab: Lab, failure: TrialFailure) -> Diagnostic:
-    tried = f"while trying: {failure.during}" if failure.during not in ("", "start") else ""
+    during = "" if failure.during is None else failure.during.what
+    tried = f"while trying: {during}" if during not in ("", "start") else ""
     text, help = _explain(lab, failure)
     span = lab.place(failure.entry)
     if lab.xml is not None and failure.kind == "engine":
-        line = error_line(failure.message, lab.xml.text)
+        line = error_line(failure.message or "", lab.xml.text)
         span = line_span(lab.xml, line, 0, span)
-    return diagnose(_RULES.get(failure.kind, "lab-throws"), span, text, label=tried, help=help)
+    return diagnose(_RULES[failure.kind], span, text, label=tried, help=help)
 
 
 def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
     """What is wrong, and what helps."""
     name = _named(lab, failure.entry)
     when = f" at t = {failure.time:.6g} s" if failure.time else ""
-    message = failure.message.rstrip(".")
+    message = (failure.message or "something that has no text").rstrip(".")
     match failure.kind:
         case "throws":
             return f"{name} throws{when}: {message}", ""
@@ -241,7 +241,7 @@ def reset_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     found = trial.main["resetDiffers"] if trial.main is not None else None
     if found is None:
         return
-    entry: Entry = tuple(found["entry"])
+    entry = found["entry"]
     message = f"a reset does not lead back to the start: `{found['what']}` differs"
     match entry:
         case ("controls", int(i), *_) if not getattr(lab.fields.controls[i], "init", False):

@@ -47,19 +47,19 @@ def test_every_position_of_an_entry_on_the_disk(tmp_path: Path) -> None:
         entry(tmp_path).write_bytes(whole[:at] + bytes([whole[at] ^ 0x10]) + whole[at + 1 :])
         fresh = Memo(tmp_path)
         lines = heard(fresh)
-        assert fresh.get("kind", KEY) is None
+        assert fresh.get("kind", KEY, bytes) is None
         said = f"the entry kind/{KEY[:12]}… in .coursebuild is damaged: it is made again"
         assert lines == [said]
         assert not entry(tmp_path).exists()
         assert fresh.get_or_create("kind", KEY, lambda: b"made again") == b"made again"
-        assert Memo(tmp_path).get("kind", KEY) == b"made again"
+        assert Memo(tmp_path).get("kind", KEY, bytes) == b"made again"
 
 
 def test_damage_found_before_anybody_listens_is_told_later(tmp_path: Path) -> None:
     entry(tmp_path).parent.mkdir(parents=True)
     entry(tmp_path).write_bytes(b"nonsense")
     store = Memo(tmp_path)
-    assert store.get("kind", KEY) is None
+    assert store.get("kind", KEY, bytes) is None
     assert len(heard(store)) == 1
 
 
@@ -71,7 +71,7 @@ def write_many(root: str, seed: int) -> None:
     for number in range(40):
         data = f"{number % 5}".encode() * 20_000
         store.put("kind", key(number % 5), data)
-        found = store.get("kind", key((number + seed) % 5))
+        found = store.get("kind", key((number + seed) % 5), bytes)
         if found is not None:
             assert found == found[:1] * 20_000
 
@@ -119,7 +119,7 @@ def test_a_writer_that_was_killed_leaves_nothing_that_is_served_or_stays(tmp_pat
         assert [path.name[:5] for path in folder.iterdir()] == [".new-"]
         process.kill()
         process.wait()
-    assert Memo(tmp_path).get("kind", KEY) is None
+    assert Memo(tmp_path).get("kind", KEY, bytes) is None
     [left] = folder.iterdir()
     prune(tmp_path / ".coursebuild", 1 << 30)
     assert left.exists(), "its writer may live"
@@ -181,10 +181,10 @@ def test_a_fresh_store_makes_everything_again_and_says_what_differs(tmp_path: Pa
     Memo(tmp_path).put("kind", KEY, b"old")
     fresh = Memo(tmp_path, fresh=True)
     lines = heard(fresh)
-    assert fresh.get("kind", KEY) is None
+    assert fresh.get("kind", KEY, bytes) is None
     assert fresh.get_or_create("kind", KEY, lambda: b"new") == b"new"
     assert lines == [f"the entry kind/{KEY[:12]}… was made again and is not what was kept"]
-    assert Memo(tmp_path).get("kind", KEY) == b"new"
+    assert Memo(tmp_path).get("kind", KEY, bytes) == b"new"
     lines.clear()
     fresh.get_or_create("kind", KEY, lambda: b"new")
     assert lines == []
@@ -202,7 +202,7 @@ def test_a_group_lists_its_newest_and_drops_the_rest(tmp_path: Path) -> None:
     listed = store.group("kind", group)
     assert listed == [f"{group}/{key(number)}" for number in range(11, 3, -1)]
     assert len(list((tmp_path / f".coursebuild/kind/{group}").iterdir())) == 8
-    assert store.get("kind", listed[0]) == b"x"
+    assert store.get("kind", listed[0], bytes) == b"x"
     assert store.group("kind", key(99)) == []
 
 
@@ -243,7 +243,7 @@ def test_what_is_used_stays(tmp_path: Path) -> None:
     for number in range(3):
         store.put("kind", key(number), b"x" * 1000)
         os.utime(entry(tmp_path, f"kind/{key(number)}"), (1000 + number, 1000 + number))
-    assert store.get("kind", key(0)) is not None
+    assert store.get("kind", key(0), bytes) is not None
     prune(tmp_path / ".coursebuild", 1200)
     assert [path.name for path in (tmp_path / ".coursebuild/kind").iterdir()] == [key(0)]
 

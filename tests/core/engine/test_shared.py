@@ -29,6 +29,15 @@ def machine(tmp_path: Path, name: str, shared: SharedCache) -> tuple[Memo, list[
     return store, lines
 
 
+def get_or_create(store: Memo, key: str, make: Callable[[], bytes]) -> bytes:
+    """A result of a kind that is shared."""
+    found = store.get("labs", key, bytes, shared=True)
+    if found is None:
+        found = make()
+        store.put("labs", key, found, shared=True)
+    return found
+
+
 def never() -> bytes:
     raise AssertionError("it is in the shared cache")
 
@@ -45,19 +54,19 @@ def where(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 def test_what_one_machine_makes_another_has(tmp_path: Path, where: str) -> None:
     one, told_one = machine(tmp_path, "one", shared_cache(where))
-    assert one.get_or_create("labs", KEY, lambda: b"\0made\xff") == b"\0made\xff"
-    one.put("scripts", f"{GROUP}/{KEY}", b"a result")
-    one.put("digests", KEY, b"of this machine", local=True)
+    assert get_or_create(one, KEY, lambda: b"\0made\xff") == b"\0made\xff"
+    one.put("scripts", f"{GROUP}/{KEY}", b"a result", shared=True)
+    one.put("digests", KEY, b"of this machine")
     one.close()
     two, told_two = machine(tmp_path, "two", shared_cache(where))
-    assert two.get_or_create("labs", KEY, never) == b"\0made\xff"
+    assert get_or_create(two, KEY, never) == b"\0made\xff"
     assert two.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
-    assert two.get("scripts", f"{GROUP}/{KEY}") == b"a result"
-    assert two.get("digests", KEY) is None
+    assert two.get("scripts", f"{GROUP}/{KEY}", bytes, shared=True) == b"a result"
+    assert two.get("digests", KEY, bytes, shared=True) is None
     assert two.shared_group("scripts", KEY) == []
     # What was fetched is kept here too.
     alone, _ = Memo(tmp_path / "two"), None
-    assert alone.get("labs", KEY) == b"\0made\xff"
+    assert alone.get("labs", KEY, bytes, shared=True) == b"\0made\xff"
     assert alone.group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
     assert told_one == told_two == []
 
@@ -65,14 +74,14 @@ def test_what_one_machine_makes_another_has(tmp_path: Path, where: str) -> None:
 def test_a_damaged_shared_entry_is_not_served_and_made_good(tmp_path: Path) -> None:
     place = tmp_path / "shared"
     one, _ = machine(tmp_path, "one", shared_cache(str(place)))
-    one.put("labs", KEY, b"made")
+    one.put("labs", KEY, b"made", shared=True)
     one.close()
     path = place / UPPER / "labs" / KEY
     whole = path.read_bytes()
     for at in range(len(whole)):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
         two, told = machine(tmp_path, f"two{at}", shared_cache(str(place)))
-        assert two.get_or_create("labs", KEY, lambda: b"made") == b"made"
+        assert get_or_create(two, KEY, lambda: b"made") == b"made"
         two.close()
         said = f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"
         assert told == [said]
@@ -111,6 +120,24 @@ def failing(error: Exception) -> Callable[[], object]:
     return fail
 
 
+def test_signed_entries_are_believed_by_those_who_have_the_key(tmp_path: Path) -> None:
+    place = tmp_path / "shared"
+    for name, key, made in (("one", b"secret", b"ours"), ("other", b"", b"theirs")):
+        store, _ = machine(tmp_path, name, shared_cache(str(place), key))
+        store.put("labs", KEY, made, shared=True)
+        store.close()
+    signed, plain = (place / f"{UPPER}{end}/labs" / KEY for end in ("-signed", ""))
+    said = [f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"]
+    readers = {b"secret": (b"ours", []), b"": (b"theirs", []), b"guess": (None, said)}
+    for key, (found, told) in readers.items():
+        store, lines = machine(tmp_path, f"reader {key!r}", shared_cache(str(place), key))
+        assert (store.get("labs", KEY, bytes, shared=True), lines) == (found, told)
+    signed.write_bytes(plain.read_bytes())
+    store, lines = machine(tmp_path, "victim", shared_cache(str(place), b"secret"))
+    assert (store.get("labs", KEY, bytes, shared=True), lines) == (None, said)
+    assert Memo(tmp_path / "victim").get("labs", KEY, bytes) is None
+
+
 @pytest.mark.parametrize(
     ("error", "words"),
     [
@@ -127,7 +154,7 @@ def test_a_place_that_fails_is_told_of_once_and_left_alone(
     place = Broken(failing(error))
     store, told = machine(tmp_path, "one", SharedCache("s3://there", place))
     for number in range(20):
-        assert store.get_or_create("labs", f"{number:064x}", lambda: b"made") == b"made"
+        assert get_or_create(store, f"{number:064x}", lambda: b"made") == b"made"
     assert store.shared_group("scripts", GROUP) == []
     store.close()
     assert told == [f"the shared cache s3://there cannot be used: {words}"]
@@ -140,7 +167,7 @@ def test_a_place_that_hangs_costs_its_time_once(tmp_path: Path) -> None:
     store, told = machine(tmp_path, "one", SharedCache("s3://there", place, timeout=0.2))
     began = time.monotonic()
     for number in range(20):
-        assert store.get_or_create("labs", f"{number:064x}", lambda: b"made") == b"made"
+        assert get_or_create(store, f"{number:064x}", lambda: b"made") == b"made"
     store.close()
     assert time.monotonic() - began < 300
     stop.set()
@@ -151,7 +178,7 @@ def test_sending_ends_when_it_takes_too_long(tmp_path: Path) -> None:
     stop = threading.Event()
     place = Broken(lambda: stop.wait(600))
     store, told = machine(tmp_path, "one", SharedCache("s3://there", place))
-    store.put("labs", KEY, b"made")
+    store.put("labs", KEY, b"made", shared=True)
     assert store.shared is not None
     store.shared.flush(0.2)
     stop.set()
@@ -164,7 +191,7 @@ def test_all_that_is_written_arrives_and_no_thread_stays(tmp_path: Path) -> None
     place = tmp_path / "shared"
     store, told = machine(tmp_path, "one", shared_cache(str(place)))
     for number in range(300):
-        store.put("labs", f"{number:064x}", b"x")
+        store.put("labs", f"{number:064x}", b"x", shared=True)
     store.close()
     assert len(list((place / UPPER / "labs").iterdir())) == 300
     until = time.monotonic() + 120
@@ -178,7 +205,7 @@ def test_a_folder_whose_parent_is_not_there_is_not_made(tmp_path: Path) -> None:
     """A network's folder that is not mounted must not be filled where it would be."""
     place = tmp_path / "not mounted" / "cache"
     store, told = machine(tmp_path, "one", shared_cache(str(place)))
-    assert store.get_or_create("labs", KEY, lambda: b"made") == b"made"
+    assert get_or_create(store, KEY, lambda: b"made") == b"made"
     store.close()
     assert told == [f"the shared cache {place} cannot be used: no such file or directory"]
     assert not place.parent.exists()

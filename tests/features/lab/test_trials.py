@@ -2,33 +2,45 @@
 
 from __future__ import annotations
 
+import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
+import zlib
+from collections import Counter
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from coursebuild.core.features import Trial
+from coursebuild.core.engine.memo import Memo, sealed, unsealed
+from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.dependencies import Inputs
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.mjcf import compile_all
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.checks import labs_in
+from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.files import engine_digest
-from coursebuild.features.lab.engines.native import NativeEngine, native_digest
-from coursebuild.features.lab.inputs import trial_inputs
+from coursebuild.features.lab.engines.native import NativeEngine, NativeError, native_digest
+from coursebuild.features.lab.files import LabOutput
+from coursebuild.features.lab.inputs import lab_trials, trial_inputs
+from coursebuild.features.lab.trial import Engines, LabTrials
+from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options
 from support.lab_lessons import BALL, RIGHT, Make, checked, course, fence
 from support.lab_values import OpenEngines, try_labs
 from support.made_courses import make_course
+from support.poisoned_values import poisoned
 from support.scratch_course import GOOD, Folder, block, ended, wait_until_alone
 
 pytestmark = pytest.mark.engine
@@ -137,6 +149,65 @@ def test_no_engine_is_asked_where_all_is_kept(
         for name in names:
             monkeypatch.setattr(engine, name, refuse)
     assert cached(kept) == [True]
+
+
+class NoBrowser(LabEngine):
+    """Stands for an engine that would have to try the lab."""
+
+    def mistakes(self, pieces: Sequence[LabCode]) -> list[str | None]:
+        raise MissedError
+
+
+class NoNative(NativeEngine):
+    """One that runs no script."""
+
+    def script(self, request: dict[str, Any]) -> dict[str, Any]:
+        raise NativeError("is not run")
+
+
+class MissedError(Exception):
+    pass
+
+
+@pytest.mark.filterwarnings("ignore:.* encountered:RuntimeWarning")
+@pytest.mark.parametrize("count", [60, pytest.param(500, marks=pytest.mark.slow)])
+def test_poisoned_trials_are_one_that_can_be_shown_or_told(kept: Folder, count: int) -> None:
+    """A trial is believed as a whole: its page is drawn of it, or it is tried again."""
+    shutil.rmtree(kept.root / ".coursebuild/labs")
+    assert cached(kept) == [False]
+    (entry,) = (kept.root / ".coursebuild/labs").iterdir()
+    name = f"labs/{entry.name}"
+    sound = entry.read_bytes()
+    whole = unsealed(name, sound)
+    assert whole is not None
+    course, ball = load_course(kept.root), kept.text("models/ball.xml")
+    models = {"ball": compile_all(kept.root, [("models/ball.xml", ball)])[0]}
+    engines = Engines(kept.root)
+    engines.browser, engines.native = NoBrowser(), NoNative(kept.root)
+    told: list[str] = []
+    outcomes = Counter[str]()
+    bombs = map(zlib.compress, (b" " * (1 << 29), b"[" * 100_000))
+    texts = map(zlib.compress, poisoned(zlib.decompress(whole), count))
+    for data in (*bombs, whole[:-1], *texts):
+        entry.write_bytes(sealed(name, data))
+        shutil.rmtree(kept.root / ".coursebuild/pictures", ignore_errors=True)
+        memory = Memory(kept.root, Memo(kept.root))
+        told.clear()
+        memory.store.listen(told.append)
+        context = TrialContext(kept.root, course, models, memory, static=True)
+        try:
+            ((result,), wrong) = LabTrials(context, engines).run(lab_trials(course))
+        except MissedError:
+            assert [line[:26] for line in told] == [f"the entry {name[:16]}"]
+            assert not entry.exists()
+            outcomes["missed"] += 1
+        else:
+            assert isinstance(result.output, LabOutput)
+            assert not told and json.loads(result.output.config)
+            assert wrong or result.output.picture.startswith(b"\x89PNG")
+            outcomes["shown"] += 1
+    assert min(outcomes.values()) > count / 20, outcomes
+    entry.write_bytes(sound)
 
 
 def test_failure_of_a_lab_is_kept_and_one_that_took_too_long_is_not(tmp_path: Path) -> None:

@@ -8,7 +8,13 @@ from coursebuild.core.model import document_blocks
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.model import Lab
-from coursebuild.features.lab.reply import TrialFailure, TrialReply, read_trial
+from coursebuild.features.lab.reply import (
+    Attempt,
+    TrialFailure,
+    TrialReply,
+    read_reply,
+    reply_bytes,
+)
 from coursebuild.features.lab.verdict import (
     Parity,
     trial_diagnostics,
@@ -111,12 +117,12 @@ def test_a_lab_inside_a_quiz_has_places_too() -> None:
 
 def test_what_is_so_from_the_start_is_told_once() -> None:
     failures = (
-        TrialFailure((), "diverged", "qpos[0] is NaN", 1.0, "start"),
-        TrialFailure(("controls", 0), "diverged", "qpos[0] is NaN", 1.5, "a"),
-        TrialFailure(("controls", 1), "warning", "badctrl", 1.5, "b"),
-        TrialFailure(("controls", 2, "run"), "throws", "x", 1.5, "c"),
+        TrialFailure((), "diverged", "qpos[0] is NaN", 1.0, Attempt("start")),
+        TrialFailure(("controls", 0), "diverged", "qpos[0] is NaN", 1.5, Attempt("a")),
+        TrialFailure(("controls", 1), "warning", "badctrl", 1.5, Attempt("b")),
+        TrialFailure(("controls", 2, "run"), "throws", "x", 1.5, Attempt("c")),
     )
-    told = trial_diagnostics(make_lab(LINES), TrialReply("", (), failures, None, None))
+    told = trial_diagnostics(make_lab(LINES), TrialReply("", (), failures, None))
     assert [d.rule for d in told] == ["lab-diverged", "lab-warning", "lab-throws"]
 
 
@@ -160,10 +166,11 @@ def test_a_reply_with_holes_is_read() -> None:
         "failures": [{"entry": [], "kind": "throws", "at": None}],
         "main": None,
     }
-    trial = read_trial(reply)
-    assert trial.tried == ("start",)
+    trial = read_reply(reply_bytes(reply))
+    assert trial.tried == (Attempt("start"),)
     assert trial.steps_per_second is None
-    assert trial.failures == (TrialFailure((), "throws", "something that has no text", None, ""),)
+    (told,) = trial_diagnostics(make_lab(LINES), trial)
+    assert told.message == "the lab throws: something that has no text"
 
 
 def test_what_only_the_browsers_engine_says_of_an_edited_model_is_told_at_its_line() -> None:
@@ -172,8 +179,8 @@ def test_what_only_the_browsers_engine_says_of_an_edited_model_is_told_at_its_li
     (lab,) = parsed.value.blocks
     assert isinstance(lab, Lab)
     message = "XML Error: Error opening file 'part.xml'\nElement 'include', line 2\n\n"
-    failure = TrialFailure((), "engine", message, None, "start")
-    (told,) = trial_diagnostics(lab, TrialReply("3.14.0", (), (failure,), None, None))
+    failure = TrialFailure((), "engine", message, None, Attempt("start"))
+    (told,) = trial_diagnostics(lab, TrialReply("3.14.0", (), (failure,), None))
     assert (told.rule, told.span.text) == ("lab-engine", '<include file="part.xml"/>')
     said = "the browser's engine says: error opening file 'part.xml' in <include>"
     assert (told.message, "beside which there are no files" in told.help) == (said, True)

@@ -43,8 +43,6 @@ class MeasuringRun:
 
     stage, done = "measuring", "measured"
     """What is said while things are measured, and of a thing that was."""
-    local = True
-    """Whether what is found says something of this machine only."""
 
     def __init__(
         self, options: Options, diagnostics: Iterable[Diagnostic] = (), *, again: bool = False
@@ -106,7 +104,7 @@ class MeasuringRun:
     def keep(self, kind: str, parts: tuple[object, ...], value: object) -> None:
         """Keep what was made of these."""
         if not self.again:
-            self.options.store.put_value(kind, fingerprint(parts), value, local=self.local)
+            self.options.store.put_value(kind, fingerprint(parts), value)
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from coursebuild.features.lab.reply import unpack_arrays
+from coursebuild.features.lab.reply import MainRun, unpack_arrays
 
 _RELATIVE = 1e-9
 _ABSOLUTE = 1e-12
@@ -35,15 +35,14 @@ def recorded(run: dict[str, Any], horizon: int) -> dict[str, Any] | None:
     }
 
 
-def difference(
-    main: dict[str, Any], run: dict[str, Any], *, exact: bool, rtol: float
-) -> str | None:
+def difference(main: MainRun, run: dict[str, Any], *, exact: bool, rtol: float) -> str | None:
     """How a script's run differs from the main run of the trial, in words; `None` if it does not.
 
     `exact`: the states must be the same to the last bit; else the one that was recorded may be
     apart by `rtol`, relative to its largest number, which counts as at least 1.
     """
     kept = main["recorded"]
+    assert kept is not None, "where nothing was recorded, no script is offered"
     if run["steps"] != kept["steps"]:
         return f"it makes {run['steps']} steps, and the lab {kept['steps']}"
     if exact and run["last"] != kept["last"]:

@@ -10,7 +10,6 @@ import functools
 import hashlib
 import json
 from pathlib import Path
-from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import asdict
@@ -28,6 +27,7 @@ from coursebuild.features.lab.export.script import (
 )
 from coursebuild.features.lab.export.text import ExportMetadata
 from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.reply import MainRun
 from coursebuild.features.lab.schema import Select, Slider
 from coursebuild.features.lab.verdict import PARITY_RTOL, Parity
 
@@ -49,7 +49,7 @@ def exported(
     native: NativeEngine,
     trial: Trial,
     lab: Lab,
-    main: dict[str, Any],
+    main: MainRun,
     parity: Parity | None,
 ) -> LabExport:
     """The script of a lab, from the store where the same was tried before.
@@ -69,14 +69,14 @@ def exported(
     made_of = (_digest(), lab.config, asdict(metadata), main.get("recorded"), readouts, same)
     key = hashlib.sha256(json.dumps(made_of).encode()).hexdigest()
     store = context.memory.store
-    found = store.get_value("exports", key, LabExport, local=True)
+    found = store.get_value("exports", key, LabExport)
     if found is not None:
         return found
     try:
         offer = _offered(context.root, native, lab, metadata, main, same)
     except NativeError as error:
         return LabExport(None, f"the script {error}")
-    store.put_value("exports", key, offer, local=True)
+    store.put_value("exports", key, offer)
     return offer
 
 
@@ -85,7 +85,7 @@ def _offered(
     native: NativeEngine,
     lab: Lab,
     metadata: ExportMetadata,
-    main: dict[str, Any],
+    main: MainRun,
     same: bool,
 ) -> LabExport:
     export = export_script(lab, metadata)
@@ -119,7 +119,7 @@ def _origin(course: Course, owner: str) -> str:
     return f"a lab of the page “{title}”"
 
 
-def _seconds(lab: Lab, main: dict[str, Any]) -> float:
+def _seconds(lab: Lab, main: MainRun) -> float:
     """Simulated time of the main run."""
     stop = lab.fields.stopAt
     if lab.verify.seconds is not None:

@@ -21,7 +21,7 @@ from coursebuild.features.lab.picture.plots import plot_svg
 from coursebuild.features.lab.picture.scenery import scene_solids
 from coursebuild.features.lab.picture.studio import Floor, round_length
 from coursebuild.features.lab.picture.textures import SKY, texture_of
-from coursebuild.features.lab.reply import unpack_arrays
+from coursebuild.features.lab.reply import MainRun, unpack_arrays
 
 _WIDTH = 640
 _USUAL = 1.6
@@ -34,7 +34,7 @@ _LARGE = 1e9
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def draw_picture(lab: Lab, main: dict[str, Any]) -> bytes:
+def draw_picture(lab: Lab, main: MainRun) -> bytes:
     """The start of the main run of a lab's trial, as PNG."""
     scene = unpack_arrays(main["scene"])
     frame = unpack_arrays(main["pictures"][0]["frame"])
@@ -90,7 +90,7 @@ def _size(lab: Lab) -> tuple[int, int]:
     return (_WIDTH, max(160, min(round(_WIDTH * lab.fields.height / 480), 480)))
 
 
-def lab_record(lab: Lab, main: dict[str, Any]) -> LabRecord:
+def lab_record(lab: Lab, main: MainRun) -> LabRecord:
     """What a page shows of a lab whose trial's main run is `main`."""
     first, last = main["pictures"][0], main["pictures"][-1]
     recorded = main["plots"]

@@ -1,0 +1,40 @@
+"""JSON that somebody has changed so that it is still JSON."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import random
+from collections.abc import Iterator
+from typing import Any
+
+_PUT: tuple[Any, ...] = (
+    *(None, True, -1, 0, 7.5, 10**400, 1 << 62, -1e308, math.nan, math.inf),
+    *("", "\x1b[2J", "</script><script>x</script>", "../../../etc/passwd", "\ud800", "A" * 5000),
+    *([], {}, [[]], [[[1, "a"]]], {"type": "f64", "data": "AAAA"}, {"type": "u8", "data": "?"}),
+)
+
+
+def _places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    yield path
+    for key, child in value.items() if isinstance(value, dict) else ():
+        yield from _places(child, (*path, key))
+    for index, child in enumerate(value[:3]) if isinstance(value, list) else ():
+        yield from _places(child, (*path, index))
+
+
+def poisoned(text: bytes, count: int) -> Iterator[bytes]:
+    """As many changes of a JSON text: each puts something in one place, or takes it away."""
+    value, chance = json.loads(text), random.Random(21)
+    places = list(_places(value))
+    for _ in range(count):
+        changed, path = [copy.deepcopy(value)], (0, *chance.choice(places))
+        parent: Any = changed
+        for step in path[:-1]:
+            parent = parent[step]
+        if chance.random() < 0.15 and len(path) > 1:
+            del parent[path[-1]]
+        else:
+            parent[path[-1]] = chance.choice(_PUT)
+        yield json.dumps(changed[0]).encode()
