@@ -12,7 +12,7 @@ the texts; `documents.Documents` is one that gives what was parsed before.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
@@ -22,7 +22,16 @@ from coursebuild.core.checks.compiled import scenarios_of_no_model
 from coursebuild.core.files.course_features import load_course_features
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_course, read_sources
-from coursebuild.core.model import Course, Declarations, Document, Lesson, Level, Page, Status
+from coursebuild.core.model import (
+    Course,
+    Declarations,
+    Document,
+    Lesson,
+    Level,
+    Limits,
+    Page,
+    Status,
+)
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.source_parts import check_source_parts
@@ -100,8 +109,7 @@ class _Loader:
         self.parser = parser
         self.files = read.value
         self.found = list(read.diagnostics)
-        sources = (*self.files.lessons, *self.files.pages)
-        self.sources: Mapping[str, Source] = {source.path: source for source in sources}
+        self.sources: Mapping[str, Source] = {}
         self.callouts = frozenset(kind.name for kind in CALLOUTS)
         self.unnamed: dict[str, Source] = {}
         """Lesson files that the map does not name, by path; one that was surely meant is taken out.
@@ -110,6 +118,11 @@ class _Loader:
     def course(self, declared: tuple[Declarations, ...]) -> Course | None:
         """The whole course, or `None` where there is no usable map."""
         course = self._map()
+        limit = (Limits() if course is None else course.limits).text
+        lessons = self._within(limit, self.files.lessons)
+        texts = self._within(limit, self.files.pages)
+        self.files = replace(self.files, lessons=lessons, pages=texts)
+        self.sources = {source.path: source for source in (*lessons, *texts)}
         if course is None:
             if self.files.map is not None:
                 self._announce(self.files.lessons, ())
@@ -126,7 +139,7 @@ class _Loader:
         )
         levels = tuple(self._level(level) for level in course.levels)
         self._unlisted()
-        pages = self._pages(course.pages)
+        pages = self._pages(course.pages, course.limits.text)
         self._unlisted_pages(course)
         course = replace(
             course,
@@ -144,6 +157,22 @@ class _Loader:
                 message = f"there is no folder `{package.path}`"
                 self.found.append(diagnose("field-value", package.span, message))
         return course
+
+    def _within(self, limit: int, sources: Iterable[Source]) -> tuple[Source, ...]:
+        """Those that are not too long; the others count as such that cannot be read."""
+        found = []
+        for source in sources:
+            if len(source.text) <= limit:
+                found.append(source)
+                continue
+            message = f"{source.path} has {len(source.text):_} characters, and may have {limit:_}"
+            help = "make more lessons of it, or set `text` in `[limits]` of the map"
+            self.found.append(
+                diagnose("text-long", source.span(limit, limit + 1), message, help=help)
+            )
+            unreadable = (*self.files.unreadable, source.path)
+            self.files = replace(self.files, unreadable=unreadable)
+        return tuple(found)
 
     def _text(self, path: str) -> str | None:
         """The text of a file of the project; `None` where there is none."""
@@ -236,16 +265,17 @@ class _Loader:
                 found = diagnose("page-unlisted", source.span(0, 0), message, help=help)
                 self.found.append(found)
 
-    def _pages(self, pages: tuple[Page, ...]) -> tuple[Page, ...]:
+    def _pages(self, pages: tuple[Page, ...], limit: int) -> tuple[Page, ...]:
         # Such as lie elsewhere were not read with the course.
         paths = (page.path for page in pages)
         away = [path for path in paths if path not in self.files.unreadable]
         away = [p for p in away if p not in self.sources and (self.root / p).exists()]
         read = read_sources(self.root, away)
         self.found += read.diagnostics
-        if read.value:
-            self._announce((), read.value)
-        others = {source.path: source for source in read.value}
+        sources = self._within(limit, read.value)
+        if sources:
+            self._announce((), sources)
+        others = {source.path: source for source in sources}
         return tuple(self._page(page, others) for page in pages)
 
     def _page(self, page: Page, others: Mapping[str, Source]) -> Page:

@@ -196,7 +196,7 @@ def compile_models(
     stage = functools.partial(progress.stage, "compiling models")
     everything = [(model.source.path, model.source.text) for model in course.models]
     everything += [(mjcf.TEXT_PATH, text.text) for text in texts]
-    results = compile_kept(options.root, options.store, everything, stage)
+    results = compile_kept(options.root, options.store, everything, stage, course.limits.memory)
     models = tuple(zip((model.name for model in course.models), results, strict=False))
     made = tuple(zip(texts, results[len(models) :], strict=True))
     found = check_compiled(course, dict(models), made, mjcf.readable_error)

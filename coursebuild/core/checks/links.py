@@ -42,6 +42,7 @@ from coursebuild.core.model import (
     document_blocks,
     document_inlines,
     document_scripts,
+    is_comment,
     line_anchor,
     linked_lines,
     listing_anchor,
@@ -163,6 +164,7 @@ def document_links(course: Course, document: Document, known: LinkTargets) -> It
     drawn = {figure.span for figure in recorded_figures(document)}
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
+            yield from _forbidden(block, course)
             yield from _check_html(block, document, known)
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, Link):
@@ -171,7 +173,19 @@ def document_links(course: Course, document: Document, known: LinkTargets) -> It
             elif isinstance(inline, Image) and inline.url_span not in drawn:
                 yield from _check_media("the image ", inline.url, inline.url_span, document, known)
             elif isinstance(inline, RawInline):
+                yield from _forbidden(inline, course)
                 yield from _check_html(inline, document, known)
+
+
+def _forbidden(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnostic]:
+    """What the course does not allow of raw HTML."""
+    if course.html == "none" and not (is_comment(html) or html.html.startswith("</")):
+        message, help = "the course allows no raw HTML", "write it in Markdown"
+        yield diagnose("html-forbidden", html.span, message, help=help)
+    elif course.html == "safe":
+        help = 'if you trust all who write the course, its map may say `html = "trusted"`'
+        for part in html.forbidden:
+            yield diagnose("html-forbidden", part.span, part.message, help=help)
 
 
 def _check_html(

@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model.inlines import Inline, Label, MediaAddress
+from coursebuild.core.model.inlines import ForbiddenHtml, Inline, Label, MediaAddress
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _TITLE = re.compile(r"\ufeff?# +(.*\S)")
@@ -94,6 +94,7 @@ class HtmlBlock(Struct, frozen=True):
     span: Span
     html: str
     media: tuple[MediaAddress, ...] = ()
+    forbidden: tuple[ForbiddenHtml, ...] = ()
 
 
 class HtmlFlow(Struct, frozen=True):

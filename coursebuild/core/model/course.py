@@ -8,8 +8,9 @@ from __future__ import annotations
 import enum
 import hashlib
 import re
+from typing import Annotated, Literal
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from coursebuild.core.model.blocks import Comparison, Document, Filter
 from coursebuild.core.model.scenarios import Declarations
@@ -119,6 +120,17 @@ class NamedPath(Struct, frozen=True):
     span: Span
 
 
+class Limits(Struct, frozen=True, forbid_unknown_fields=True):
+    """What reading and trying the course may take."""
+
+    text: Annotated[
+        int, Meta(ge=1, le=100_000_000, description="characters of a lesson or page")
+    ] = 250_000
+    memory: Annotated[
+        int, Meta(ge=1, le=1 << 20, description="MiB for compiling a model, and for trying a lab")
+    ] = 1024
+
+
 class Course(Struct, frozen=True):
     """A whole course."""
 
@@ -157,6 +169,9 @@ class Course(Struct, frozen=True):
     truth_span: Span | None = None
     width: int = 0
     """Columns of a line of text as `fmt` wraps it; 0: it leaves the author's lines."""
+    html: Literal["none", "safe", "trusted"] = "safe"
+    """Which raw HTML lessons and pages may have."""
+    limits: Limits = Limits()
 
     @property
     def key(self) -> str:

@@ -195,12 +195,20 @@ class MediaAddress(Struct, frozen=True):
     span: Span
 
 
+class ForbiddenHtml(Struct, frozen=True):
+    """What a page must not hold of raw HTML, unless the course trusts all who write it."""
+
+    span: Span
+    message: str
+
+
 class RawInline(Struct, frozen=True):
     """Inline HTML, kept."""
 
     span: Span
     html: str
     media: tuple[MediaAddress, ...] = ()
+    forbidden: tuple[ForbiddenHtml, ...] = ()
 
 
 class SoftBreak(Struct, frozen=True):

@@ -1,7 +1,7 @@
 """Walking a document: every block and every inline in order.
 
 Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_blocks` and
-`walk_inlines`; `is_blank`.
+`walk_inlines`; `is_blank`, `is_comment`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,15 @@ from coursebuild.core.model.blocks import (
     Script,
     Table,
 )
-from coursebuild.core.model.inlines import Emphasis, Inline, Link, Strikethrough, Strong, Term
+from coursebuild.core.model.inlines import (
+    Emphasis,
+    Inline,
+    Link,
+    RawInline,
+    Strikethrough,
+    Strong,
+    Term,
+)
 
 _HOLDERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may have others in them."""
@@ -90,9 +98,14 @@ def is_blank(blocks: Iterable[Block]) -> bool:
     """Whether all blocks of a document show nothing: comments, and paragraphs of odd blanks."""
     return all(
         (isinstance(block, Paragraph) and not block.children)
-        or (isinstance(block, HtmlBlock) and _COMMENTS.fullmatch(block.html) is not None)
+        or (isinstance(block, HtmlBlock) and is_comment(block))
         for block in blocks
     )
+
+
+def is_comment(html: HtmlBlock | RawInline) -> bool:
+    """Whether HTML shows nothing: comments only."""
+    return _COMMENTS.fullmatch(html.html) is not None
 
 
 def document_has(document: Document, *kinds: type[Block]) -> bool:

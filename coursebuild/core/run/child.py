@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import resource
 import selectors
 import signal
 import subprocess
@@ -24,6 +25,8 @@ from typing import Any, Self
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.runner import clean_environment
 
+MEMORY = 1024
+"""MiB that a child may take."""
 _START = 120.0
 """Seconds in which the child must be ready."""
 
@@ -32,12 +35,19 @@ class JsonChild:
     """The child and its folder."""
 
     def __init__(
-        self, script: str, seconds: float, python: str | None = None, patience: float = 10.0
+        self,
+        script: str,
+        seconds: float,
+        python: str | None = None,
+        patience: float = 10.0,
+        memory: int = MEMORY,
     ) -> None:
         """A child ends itself, by SIGPROF, after so many seconds of processor time for a request.
 
-        One that does not compute is waited for `patience` times as long.
+        One that does not compute is waited for `patience` times as long. One that asks for more
+        than `memory` MiB gets none, where the system can see to that.
         """
+        self.memory = memory
         self._python = python or sys.executable
         self._script = script
         self._seconds = seconds
@@ -123,6 +133,9 @@ class JsonChild:
                 raise EffectError(
                     f"MuJoCo cannot be loaded: {said[-1] if said else 'the import crashed'}"
                 )
+        with contextlib.suppress(AttributeError, OSError):  # only Linux can
+            resource.prlimit(process.pid, resource.RLIMIT_DATA, (self.memory << 20,) * 2)
+            resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))
         return process
 
     def _read_line(self, seconds: float) -> bytes | None:

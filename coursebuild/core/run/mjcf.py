@@ -19,11 +19,14 @@ import msgspec
 
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mjcf_worker
-from coursebuild.core.run.child import JsonChild
+from coursebuild.core.run.child import MEMORY, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles
 
 TIMEOUT = 60.0
 """Seconds that one model may take; large meshes take some."""
+OWN_FAULT = "MuJoCo's compiler "
+"""A message about the process that compiles begins so."""
+_NO_MEMORY = re.compile(r"unknown exception|allocate memory|MemoryError|bad_alloc", re.IGNORECASE)
 _TEXT_NAME = ".coursebuild-text.xml"
 TEXT_PATH = f"models/{_TEXT_NAME}"
 """Where a text would stand; no file has this name."""
@@ -34,6 +37,7 @@ def compile_all(
     texts: Sequence[tuple[str, str]],
     *,
     timeout: float = TIMEOUT,
+    memory: int = MEMORY,
     python: str | None = None,
 ) -> tuple[CompileResult, ...]:
     """Compile models, all in one child; a result for each.
@@ -42,6 +46,7 @@ def compile_all(
         root: the course folder.
         texts: each with the path where it stands, or would (`TEXT_PATH`).
         timeout: seconds that one may take.
+        memory: MiB that they may take.
         python: another interpreter than the one that runs this, with a MuJoCo of its own.
 
     Raises:
@@ -49,15 +54,15 @@ def compile_all(
     """
     if not texts:
         return ()
-    with _Compiler(root.resolve(), timeout, python) as compiler:
+    with _Compiler(root.resolve(), timeout, python, memory) as compiler:
         return tuple(compiler.compile(*text) for text in texts)
 
 
 class _Compiler(JsonChild):
     """The child that compiles."""
 
-    def __init__(self, root: Path, timeout: float, python: str | None) -> None:
-        super().__init__(mjcf_worker.__file__, timeout, python)
+    def __init__(self, root: Path, timeout: float, python: str | None, memory: int) -> None:
+        super().__init__(mjcf_worker.__file__, timeout, python, memory=memory)
         self.root = root
         self.timeout = timeout
 
@@ -69,11 +74,13 @@ class _Compiler(JsonChild):
         }
         reply: mjcf_worker.CompileReply | None = self.ask(request)
         if reply is None:
-            return CompileResult(f"MuJoCo's compiler {self.death()}")
+            return CompileResult(f"{OWN_FAULT}{self.death()}")
         if reply["facts"] is not None:
             facts = reply["facts"] | {"includes": parts(self.root, path, text)}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
         message = self._without_paths(reply["error"].strip())
+        if _NO_MEMORY.search(message):
+            return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
         return CompileResult(message, error_line(message, text))
 
     def _without_paths(self, message: str) -> str:

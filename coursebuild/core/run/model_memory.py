@@ -18,12 +18,11 @@ from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf, mjcf_worker, mujoco_files
+from coursebuild.core.run.child import MEMORY
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.values import fingerprint
 
 _KIND = "models"
-_OWN_FAULT = "MuJoCo's compiler "
-"""A message about the process that compiles begins so."""
 
 
 def compile_kept(
@@ -31,6 +30,7 @@ def compile_kept(
     store: Memo,
     texts: Sequence[tuple[str, str]],
     stage: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
+    memory: int = MEMORY,
 ) -> tuple[CompileResult, ...]:
     """A result for each text, see `mjcf.compile_all`.
 
@@ -42,10 +42,10 @@ def compile_kept(
     left = [each for each in keys if each not in found]
     if left:
         with stage():
-            made = mjcf.compile_all(root, left)
+            made = mjcf.compile_all(root, left, memory=memory)
         for each, result in zip(left, made, strict=True):
             found[each] = result
-            if not result.error.startswith(_OWN_FAULT) and model_key(root, *each) == keys[each]:
+            if not result.error.startswith(mjcf.OWN_FAULT) and model_key(root, *each) == keys[each]:
                 with contextlib.suppress(UnicodeEncodeError):  # a name of a file that is no text
                     store.put_value(_KIND, keys[each], result)
     return tuple(found[each] for each in texts)

@@ -14,6 +14,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
+from coursebuild.core.model import Limits
 from coursebuild.core.syntax.fields import NotNegative, Text
 
 Slug: TypeAlias = Annotated[
@@ -203,12 +204,25 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     menu: Annotated[bool, Meta(description="whether it stands in the menu of every page")] = True
 
 
+class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """How far those who write the course are trusted."""
+
+    html: Annotated[
+        Literal["none", "safe", "trusted"],
+        Meta(
+            description="raw HTML in texts: none, none that runs or loads anything, or any at all"
+        ),
+    ] = "safe"
+
+
 class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     """The course map: the whole syllabus, and how the course is built."""
 
     course: CourseTable
     verify: VerifyTable | None = None
     format: FormatTable | None = None
+    security: SecurityTable = SecurityTable()
+    limits: Limits = Limits()
     callouts: Annotated[
         dict[str, Text | CalloutTable],
         Meta(description="more kinds of callouts by name, with a label or a table"),

@@ -119,6 +119,8 @@ def _course(
         packages=_paths(table, "packages", about.packages),
         environment=tuple(sorted(verify.env.items())),
         width=fields.format.width if fields.format is not None else 0,
+        html=fields.security.html,
+        limits=fields.limits,
     )
 
 

@@ -30,14 +30,13 @@ LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
 
 _TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
-_LINK = re.compile(
-    r"""\s(?:href|src)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE
+_ATTRIBUTE = re.compile(
+    r"""\s([^\s"'<>/=]+)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))|\s[^\s"'<>/=]+"""
 )
+_LINKS = frozenset("cite href poster src xlink:href".split())
 _SHOWS = frozenset("audio embed iframe img input object source track video".split())
 """Elements that show a file."""
-_SHOWN = re.compile(
-    r"""\s(src|srcset|poster|data)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))""", re.IGNORECASE
-)
+_SHOWN = frozenset("data poster src srcset".split())
 _CANDIDATE = re.compile(r"[\s,]*([^\s,]+)[^,]*")
 """An address of a `srcset`, with the size that follows it."""
 
@@ -109,8 +108,9 @@ class Balance:
     def add(self, tag: Tag, text: str, place: Callable[[int, int], Span]) -> None:
         """Take note of a tag of `text`; `place` says where a part of that text stands."""
         name, span = tag.name, place(tag.start, tag.end)
-        for link in _LINK.finditer(text, tag.start, tag.end) if name else ():
-            start, end = link.span(link.lastindex or 0)
+        for attribute, start, end in _attributes(text, tag):
+            if attribute not in _LINKS:
+                continue
             wrong = check_raw_scheme(unescape(text[start:end]), place(start, end))
             if wrong is not None:
                 self._report(wrong)
@@ -161,16 +161,26 @@ def media_of(html: str, place: Callable[[int, int], Span]) -> tuple[MediaAddress
         MediaAddress(start, end, unescape(html[start:end]), place(start, end))
         for tag in tags(html)
         if tag.name in _SHOWS
-        for attribute in _SHOWN.finditer(html, tag.start, tag.end)
-        for start, end in _addresses(attribute)
+        for attribute in _attributes(html, tag)
+        if attribute[0] in _SHOWN
+        for start, end in _addresses(html, *attribute)
     )
 
 
-def _addresses(attribute: re.Match[str]) -> Iterator[tuple[int, int]]:
+def _attributes(text: str, tag: Tag) -> Iterator[tuple[str, int, int]]:
+    """The attributes of a tag that have a value, by name, and where their values stand.
+
+    They are read one after the other: one may stand in the value of another.
+    """
+    for found in _ATTRIBUTE.finditer(text, tag.start, tag.end) if tag.name else ():
+        if found[1]:
+            yield found[1].lower(), *found.span(found.lastindex or 0)
+
+
+def _addresses(text: str, attribute: str, start: int, end: int) -> Iterator[tuple[int, int]]:
     """Where the addresses in the value of an attribute stand."""
-    start, end = attribute.span(attribute.lastindex or 0)
-    if attribute[1].lower() == "srcset":
-        for candidate in _CANDIDATE.finditer(attribute.string, start, end):
+    if attribute == "srcset":
+        for candidate in _CANDIDATE.finditer(text, start, end):
             yield candidate.span(1)
     elif start < end:
         yield start, end

@@ -52,6 +52,7 @@ from coursebuild.core.syntax.links import (
 )
 from coursebuild.core.syntax.markdown import Definitions, environment
 from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.syntax.safe_html import forbidden_in
 from coursebuild.core.syntax.spans import PositionedToken, locate
 from coursebuild.core.syntax.unread_markup import unread_markup
 from coursebuild.core.text.diagnostics import diagnose
@@ -319,7 +320,8 @@ class _Pass:
                 self.links = max(0, self.links + step)
             elif tag.name in LITERAL:
                 self.code = max(0, self.code + step)
-        return RawInline(span, token.content, media_of(token.content, place))
+        media, forbidden = media_of(token.content, place), forbidden_in(token.content, place)
+        return RawInline(span, token.content, media, forbidden)
 
     def _image(self, token: PositionedToken, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])

@@ -38,6 +38,9 @@ from coursebuild.core.text.source import Excerpt, Span
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
 _FORBIDDEN = frozenset({"data", "file", "javascript", "vbscript"})
 _PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
+_BLANK = "".join(map(chr, range(33)))
+_UNSEEN = re.compile("[\t\n\r]")
+"""What browsers take out of an address before they read it; `_BLANK` at its ends."""
 _OURS = ("lesson", "model", "page", "term")
 
 
@@ -86,10 +89,11 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
 
 def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
     """What is wrong with the scheme of an address in raw HTML, which is published as it is."""
-    found = _SCHEME.match(url.strip())
+    url = _UNSEEN.sub("", url.strip(_BLANK))
+    found = _SCHEME.match(url)
     if found is not None and found[1].lower() in _OURS:
         message = f"`{found[1]}:` means nothing in raw HTML"
-        help = f"write the link in Markdown: `[…]({url.strip()})`"
+        help = f"write the link in Markdown: `[…]({url})`"
         return diagnose("link-scheme", span, message, help=help)
     return check_scheme(url, span, image=True)
 

@@ -35,6 +35,7 @@ from coursebuild.core.syntax.recording import (
     record_fence,
     record_table,
 )
+from coursebuild.core.syntax.safe_html import forbidden_in
 from coursebuild.core.syntax.spans import PositionedToken, locate, normalized, trimmed
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.text.diagnostics import Parsed, diagnose
@@ -201,7 +202,8 @@ class TextReader:
             for tag in tags(html.text):
                 self.balance.add(tag, html.text, html.span)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
-        return model.HtmlBlock(self._span(token), text, media_of(html.text, html.span))
+        media, forbidden = media_of(html.text, html.span), forbidden_in(html.text, html.span)
+        return model.HtmlBlock(self._span(token), text, media, forbidden)
 
     def _rule(self, token: PositionedToken) -> model.ThematicBreak:
         return model.ThematicBreak(self._span(token))

@@ -31,6 +31,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "A file of the course cannot be read, or is reached through a link out of the project.",
     ),
+    ("text-long", "error", "A lesson or page is longer than the course allows."),
     # the course map
     ("map-missing", "error", "There is no content/course.toml."),
     ("map-syntax", "error", "course.toml is not valid TOML."),
@@ -135,6 +136,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "html-unbalanced",
         "error",
         "Raw HTML opens an element that it does not close, or closes one that is not open.",
+    ),
+    (
+        "html-forbidden",
+        "error",
+        "Raw HTML has an element, an attribute or an address that the course does not allow.",
     ),
     # callouts and io
     ("callout-unknown", "error", "A callout is of an unknown kind."),

@@ -27,6 +27,7 @@ from msgspec import Struct
 
 from coursebuild.core.features import Trial, TrialContext, Tried
 from coursebuild.core.model.results import TrialLine, TrialResult
+from coursebuild.core.run.child import MEMORY
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
@@ -64,9 +65,9 @@ _TRANSIENT = ("timeout", "engine")
 class Engines:
     """The browser's engine and the native one; each is started when it is first needed."""
 
-    def __init__(self, root: Path) -> None:
-        self.native = NativeEngine(root)
-        self.browser = LabEngine()
+    def __init__(self, root: Path, memory: int = MEMORY) -> None:
+        self.native = NativeEngine(root, memory=memory)
+        self.browser = LabEngine(memory)
 
     def __enter__(self) -> Self:
         return self
@@ -91,7 +92,7 @@ class LabTrials:
     ) -> None:
         """`seconds`: processor time that a trial may take."""
         self._context, self._seconds = context, seconds
-        self._engines = Engines(context.root) if engines is None else engines
+        self._engines = engines or Engines(context.root, context.course.limits.memory)
 
     def run(self, trials: Sequence[Trial]) -> Tried:
         """Try them in turn, and end the engines."""

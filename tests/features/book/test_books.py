@@ -82,7 +82,7 @@ def with_wild_lesson(folder: Folder, following: str) -> None:
     folder.replace("content/course.toml", following, ENTRY + following)
     titles = re.compile(r'^(title|summary) = ".*"$', flags=re.MULTILINE)
     text = titles.sub(lambda m: f'{m[1]} = "{HOSTILE}"', folder.text("content/course.toml"))
-    folder.write("content/course.toml", text)
+    folder.write("content/course.toml", text + '\n[security]\nhtml = "trusted"\n')
 
 
 def wild_chapter(book: Path) -> str:

@@ -82,7 +82,7 @@ def test_a_lab_that_simulates_too_much_is_told_from_an_endless_loop(shared: Benc
 
 def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
     eat = "ctx.all = []; for (;;) ctx.all.push(new Array(10000).fill(ctx.all.length + 0.5))"
-    bench = Bench(tmp_path, LabEngine(memory=160 << 20))
+    bench = Bench(tmp_path, LabEngine(memory=160))
     with bench.browser, bench.native:
         reply = bench.trial(make_lab(setup=eat))
         assert told(reply) == [(("setup",), "timeout", "took more than 160 MiB")]

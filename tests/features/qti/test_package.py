@@ -196,6 +196,7 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_told(make_course: Mak
     folder.replace(
         "content/course.toml",
         "[[level]]",
+        '[security]\nhtml = "trusted"\n\n'
         '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n\n[[level]]',
     )
     done = export(folder)

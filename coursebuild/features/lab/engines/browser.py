@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.child import MEMORY
 from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.files import script_path, wasm_path
 
-_MEMORY = 1 << 30
-"""Bytes: the engine's WebAssembly memory counts."""
 _START_SECONDS = 60.0
 _PIECES = Path(__file__).with_name("pieces.js")
 
@@ -29,8 +28,9 @@ _PIECES = Path(__file__).with_name("pieces.js")
 class LabEngine:
     """Tries labs, one after the other; a context manager for use in one thread."""
 
-    def __init__(self, memory: int = _MEMORY) -> None:
-        self._memory = memory
+    def __init__(self, memory: int = MEMORY) -> None:
+        """`memory`: MiB, of which those of WebAssembly are a part."""
+        self._memory = memory << 20
         self._isolate: Isolate | None = None
         self._stopped = False
         self.version = ""

@@ -11,7 +11,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from coursebuild.core.run.child import JsonChild
+from coursebuild.core.run.child import MEMORY, JsonChild
 from coursebuild.features.lab.engines import native_worker
 
 
@@ -25,10 +25,11 @@ class NativeEngine(JsonChild):
     Args:
         root: the course's folder.
         seconds: what one model, or one run, may take.
+        memory: MiB that it may take.
     """
 
-    def __init__(self, root: Path, seconds: float = 120.0) -> None:
-        super().__init__(native_worker.__file__, seconds)
+    def __init__(self, root: Path, seconds: float = 120.0, memory: int = MEMORY) -> None:
+        super().__init__(native_worker.__file__, seconds, memory=memory)
         self._root = root.resolve()
         self._limit = seconds
 

@@ -43,7 +43,7 @@ def main() -> None:
         signal.setitimer(signal.ITIMER_PROF, request["limit"])
         try:
             reply = {"error": "", **tasks[request["task"]](mujoco, numpy, request)}
-        except (ValueError, mujoco.FatalError, MemoryError) as error:
+        except (ValueError, RuntimeError, mujoco.FatalError, MemoryError) as error:
             reply = {"error": str(error) or type(error).__name__}
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps(reply), file=replies, flush=True)

@@ -1,0 +1,118 @@
+"""Raw HTML of which nothing can run, ask another host or pass for a part of the interface.
+
+Entry point: `forbidden_in`.
+
+1. A text is allowed where it is nothing but text, comments, and tags of the elements and attributes
+   that are named here, written so plainly that every reader of HTML finds the same tags in it.
+2. Nothing is taken out or written anew: what is published is the text that was judged.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from html import unescape
+
+from coursebuild.core.model.inlines import ForbiddenHtml
+from coursebuild.core.text.source import Span
+
+_ELEMENTS = frozenset(
+    "a abbr address article aside audio b bdi bdo big blockquote br caption center cite code col "
+    "colgroup data dd del details dfn div dl dt em figcaption figure footer h1 h2 h3 h4 h5 h6 "
+    "header hgroup hr i img ins kbd li mark nav ol p picture pre q rp rt ruby s samp section "
+    "small source span strike strong sub summary sup table tbody td tfoot th thead time tr track "
+    "tt u ul var video wbr "
+    # SVG
+    "circle clippath defs desc ellipse g line lineargradient marker mask path pattern polygon "
+    "polyline radialgradient rect stop svg symbol text textpath title tspan use "
+    # MathML
+    "math menclose merror mfrac mi mmultiscripts mn mo mover mpadded mphantom mprescripts mroot "
+    "mrow ms mspace msqrt mstyle msub msubsup msup mtable mtd mtext mtr munder munderover none "
+    "semantics".split()
+)
+_WORDS = frozenset(
+    "abbr align alt autoplay border cellpadding cellspacing class colspan compact "
+    "controls coords datetime decoding default dir display download headers height hidden "
+    "hreflang id itemprop kind label lang loading loop media muted nowrap open playsinline "
+    "preload rel reversed role rowspan rules scope sizes span srclang start tabindex target title "
+    "translate type valign value width xml:lang xml:space xmlns xmlns:xlink "
+    # SVG and MathML
+    "accent accentunder clippathunits columnalign columnspan columnspacing cx cy d depth dx dy "
+    "fence focusable form fr fx fy gradienttransform gradientunits lengthadjust linethickness "
+    "lspace mathsize mathvariant markerheight markerunits markerwidth maskcontentunits maskunits "
+    "maxsize minsize movablelimits notation offset orient pathlength patterncontentunits "
+    "patterntransform patternunits points preserveaspectratio r refx refy rowalign rowspacing "
+    "rspace rx ry scriptlevel separator spreadmethod startoffset stretchy symmetric textlength "
+    "transform version viewbox voffset x x1 x2 y y1 y2".split()
+)
+"""Attributes with any value."""
+_STYLES = frozenset(
+    "background-color bgcolor clip-path clip-rule color displaystyle dominant-baseline fill "
+    "fill-opacity fill-rule font-family font-size font-style font-weight letter-spacing marker-end "
+    "marker-mid marker-start mask mathbackground mathcolor opacity paint-order shape-rendering "
+    "stop-color stop-opacity stroke stroke-dasharray stroke-dashoffset stroke-linecap "
+    "stroke-linejoin stroke-miterlimit stroke-opacity stroke-width style text-anchor "
+    "text-decoration text-rendering vector-effect visibility word-spacing writing-mode".split()
+)
+"""Attributes whose value is CSS, or is read as such."""
+_STYLE = re.compile(r"(?:(?!url|position)[^\\\"'@{}<>]|url\(#[\w-]+\))*+", re.IGNORECASE)
+_ADDRESSES = frozenset("cite href poster src srcset xlink:href".split())
+"""Attributes whose schemes and files are looked at in every course."""
+
+_ATTRIBUTE = r"""\s+([A-Za-z][A-Za-z0-9:_-]*)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?"""
+_TAG = re.compile(rf"<([A-Za-z][A-Za-z0-9-]*)((?:{_ATTRIBUTE})*+)\s*/?>")
+_ATTRIBUTES = re.compile(_ATTRIBUTE)
+_PLAIN = re.compile(
+    r"[^<]++|<(?![A-Za-z/!?])|</[A-Za-z][A-Za-z0-9-]*\s*>|<!--(?!-?>)(?:(?!--!?>|</title).)*+-->",
+    re.DOTALL | re.IGNORECASE,
+)
+"""Text, the end of an element, a comment."""
+
+
+def forbidden_in(html: str, place: Callable[[int, int], Span]) -> tuple[ForbiddenHtml, ...]:
+    """What a page must not hold of a piece of HTML; `place` says where a part of it stands."""
+    return tuple(
+        ForbiddenHtml(place(start, end), message) for start, end, message in _forbidden(html)
+    )
+
+
+def _forbidden(html: str) -> Iterator[tuple[int, int, str]]:
+    at = 0
+    while at < len(html):
+        tag = _TAG.match(html, at)
+        plain = None if tag else _PLAIN.match(html, at)
+        if tag is not None:
+            yield from _in_tag(html, tag)
+        elif plain is None and html.startswith("<!--", at) and "-->" not in html[at:]:
+            return  # an error in every course
+        elif plain is None:
+            end = html.find(">", at) + 1 or len(html)
+            yield at, end, "this is not HTML that every browser reads in the same way"
+        found = tag or plain
+        at = end if found is None else found.end()
+
+
+def _in_tag(html: str, tag: re.Match[str]) -> Iterator[tuple[int, int, str]]:
+    name = tag[1].lower()
+    if name not in _ELEMENTS:
+        yield *tag.span(), f"`<{tag[1]}>` must not stand in a page"
+        return
+    for attribute in _ATTRIBUTES.finditer(html, *tag.span(2)):
+        written, value = attribute[1], unescape((attribute[2] or "").strip("\"'"))
+        what = _wrong(name, written.lower(), value)
+        if what:
+            yield attribute.start(1), attribute.end(), f"{what} must not stand in a page"
+
+
+def _wrong(element: str, name: str, value: str) -> str:
+    """What is wrong with an attribute, as words; empty where it is allowed."""
+    if "</title" in value.lower():  # outside of a drawing, all that a browser sees in a title
+        return f"`{name}` with the end of a title"
+    if name in _ADDRESSES:
+        outside = element == "use" and not value.startswith("#")
+        return f"`<use>` of another file, `{value}`," if outside else ""
+    if name == "name":  # of a picture, it would hide a property of the document
+        return "" if element in ("a", "details") else "the attribute `name`"
+    if name in _STYLES:
+        return "" if _STYLE.fullmatch(value) else f"`{name}` with such a value"
+    return "" if name in _WORDS or name.startswith("aria-") else f"the attribute `{name}`"
