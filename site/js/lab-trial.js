@@ -3,6 +3,7 @@
  * docs/explanation/how-labs-run.md says how it is called:
  *
  *   reserve(name, size) → ArrayBuffer    to be filled from outside: 'wasm', and 'mjb' before each trial
+ *   buffer(name)        → ArrayBuffer    one of those, or 'beats': a number that a trial counts up whenever it gets on
  *   boot('')            → ''             compiles and starts the engine; ends before the next call
  *   booted('')          → version        or throws why it did not start
  *   trial(requestJson)  → replyJson
@@ -25,6 +26,8 @@ const printed = []
 let engine = null
 let guard = null
 let failure = 'the engine has not been started'
+const beats = new Uint32Array(1) // counted up whenever a trial gets on, for those who look from outside while it runs
+buffers.set('beats', beats.buffer)
 
 globalThis.setTimeout = () => {
   throw new Error('a lab sets no timers: they would ring in the next one')
@@ -35,6 +38,8 @@ globalThis.reserve = (name, size) => {
   buffers.set(name, buffer)
   return buffer
 }
+
+globalThis.buffer = (name) => buffers.get(name)
 
 globalThis.boot = () => {
   const module = new WebAssembly.Module(buffers.get('wasm'))
@@ -56,7 +61,11 @@ globalThis.trial = (json) => {
   const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : fromBase64(request.mjb)
   printed.length = 0
   guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
-  const reply = runTrial(engine, request, bytes, () => performance.now(), guard)
+  const now = () => {
+    beats[0]++
+    return performance.now()
+  }
+  const reply = runTrial(engine, request, bytes, now, guard)
   return JSON.stringify({ ...reply, printed: printed.slice(0, 100) })
 }
 

@@ -23,7 +23,7 @@ import time
 from collections.abc import Coroutine, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from pathlib import Path
-from typing import Any, Self, TypedDict
+from typing import Any, NamedTuple, Self, TypedDict
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.resources import assets_dir
@@ -48,6 +48,8 @@ _BATCH = 100
 _BATCH_SECONDS = 20.0
 _SINGLE_SECONDS = 5.0
 _LONGEST_MESSAGE = 160
+_LOOK = 1.0
+"""Seconds between two looks at whether a script gets on."""
 _SLOWEST = 10.0
 """How many times longer than on an idle machine a script may take before it is ended."""
 
@@ -88,6 +90,15 @@ def _missing(error: Exception) -> EffectError:
     return EffectError(f"mini-racer's V8 cannot be used: {error}", help=help)
 
 
+class Progress(NamedTuple):
+    """By what is seen from outside that a script gets on."""
+
+    beats: memoryview
+    """Bytes that it changes."""
+    patience: float
+    """Seconds for which they may stay as they are."""
+
+
 class Isolate:
     """A JavaScript context of its own, with some scripts loaded, for one thread at a time.
 
@@ -125,17 +136,26 @@ class Isolate:
             if self._running is not None:
                 self._running.cancel()
 
-    def call(self, function: str, argument: str, seconds: float) -> str:
+    def call(
+        self, function: str, argument: str, seconds: float, progress: Progress | None = None
+    ) -> str:
         """Call a global function from string to string.
 
         Raises:
-            LimitError: it ran for more than `seconds`, or took too much memory.
+            LimitError: it ran for more than `seconds`, or too long without progress, or took too
+                much memory.
             ScriptError: it threw.
         """
-        result = self._evaluate(f"{function}({json.dumps(argument)})", seconds)
+        result = self._evaluate(f"{function}({json.dumps(argument)})", seconds, progress)
         if not isinstance(result, str):
             raise TypeError(f"{function} returned no string")
         return result
+
+    def buffer(self, name: str) -> memoryview:
+        """The bytes that the scripts' global `buffer(name)` gives, as they are at any time."""
+        place = self._evaluate(f"buffer({json.dumps(name)})", _START_SECONDS)
+        assert isinstance(place, memoryview)
+        return place
 
     def fill(self, name: str, data: bytes) -> None:
         """Hand over bytes: the scripts' global `reserve(name, size)` gives the place for them."""
@@ -143,13 +163,13 @@ class Isolate:
         assert isinstance(place, memoryview)
         place[:] = data
 
-    def _evaluate(self, code: str, seconds: float) -> object:
+    def _evaluate(self, code: str, seconds: float, progress: Progress | None = None) -> object:
         from py_mini_racer import JSEvalException, JSOOMException
 
         with self._lock:
             if self._is_stopped:
                 raise StoppedError
-            self._running = running = self._submit(self._in_time(code, seconds))
+            self._running = running = self._submit(self._in_time(code, seconds, progress))
         try:
             return running.result()
         except CancelledError:
@@ -165,7 +185,7 @@ class Isolate:
     def _submit(self, work: Coroutine[Any, Any, Any]) -> Future[Any]:
         return asyncio.run_coroutine_threadsafe(work, self._loop)
 
-    async def _in_time(self, code: str, seconds: float) -> object:
+    async def _in_time(self, code: str, seconds: float, progress: Progress | None) -> object:
         """The value of a script, in the loop's thread.
 
         Processor time is what counts, since other work on this machine must not end a good script;
@@ -174,9 +194,12 @@ class Isolate:
         task = asyncio.ensure_future(self._racer.eval_cancelable(code))
         began, began_work = time.monotonic(), time.process_time()
         try:
-            spent = 0.0
-            while spent < seconds:
-                done, _ = await asyncio.wait((task,), timeout=max(seconds - spent, 0.01))
+            spent, seen, limit = 0.0, b"", seconds
+            while spent < limit:
+                if progress is not None and seen != (now := bytes(progress.beats)):
+                    seen, limit = now, min(seconds, spent + progress.patience)
+                left = min(limit - spent, _LOOK if progress is not None else seconds)
+                done, _ = await asyncio.wait((task,), timeout=max(left, 0.01))
                 if done:
                     return task.result()
                 passed = time.monotonic() - began
@@ -185,7 +208,8 @@ class Isolate:
             task.cancel()
         # Where the script came to its own end just now, V8 would end the next one in its place.
         await asyncio.gather(task, self._racer.eval_cancelable("0"), return_exceptions=True)
-        raise LimitError(f"ran for more than {seconds:g} s")
+        held = seconds if progress is None else min(seconds, progress.patience)
+        raise LimitError(f"ran for more than {held:g} s")
 
 
 @contextlib.contextmanager

@@ -1,7 +1,7 @@
 """The reply of a trial, read: plain values with arrays.
 
-Entry points: `read_reply`, `reply_bytes`; `unpack_arrays`. docs/explanation/how-labs-run.md says what
-a reply holds.
+Entry points: `read_reply`, `reply_bytes`; `unpack_arrays`. What a reply holds is said in
+docs/explanation/how-labs-run.md.
 """
 
 from __future__ import annotations

@@ -80,6 +80,16 @@ def test_a_lab_that_simulates_too_much_is_told_from_an_endless_loop(shared: Benc
     assert told(shared.trial(make_lab())) == []
 
 
+def test_code_that_never_returns_is_told_long_before_the_trial_had_to_end(tmp_path: Path) -> None:
+    button = {"type": "button", "label": "b", "run": LOOP}
+    bench = Bench(tmp_path, LabEngine(patience=1.0))
+    with bench.browser, bench.native:
+        stuck = bench.trial(make_lab(verify={"seconds": 0.02}, controls=[button]), seconds=600.0)
+        assert told(stuck) == [(("controls", 0, "run"), "timeout", "ran for more than 1 s")]
+        slow = bench.trial(make_lab(verify={"seconds": 1e9}), seconds=3.0)
+        assert told(slow) == [((), "timeout", "did not finish in time")]
+
+
 def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
     eat = "ctx.all = []; for (;;) ctx.all.push(new Array(10000).fill(ctx.all.length + 0.5))"
     bench = Bench(tmp_path, LabEngine(memory=160))

@@ -17,20 +17,26 @@ from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import MEMORY
-from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
+from coursebuild.core.run.v8 import Isolate, LimitError, Progress, ScriptError, StoppedError
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.files import script_path, wasm_path
 
 _START_SECONDS = 60.0
+_PATIENCE = 5.0
+"""Seconds for which a piece of lab code may run at once: the reader's lab stands still as long."""
 _PIECES = Path(__file__).with_name("pieces.js")
 
 
 class LabEngine:
     """Tries labs, one after the other; a context manager for use in one thread."""
 
-    def __init__(self, memory: int = MEMORY) -> None:
-        """`memory`: MiB, of which those of WebAssembly are a part."""
+    def __init__(self, memory: int = MEMORY, patience: float = _PATIENCE) -> None:
+        """`memory`: MiB, of which those of WebAssembly are a part.
+
+        `patience`: seconds of processor time for which a trial need not get on.
+        """
         self._memory = memory << 20
+        self._patience = patience
         self._isolate: Isolate | None = None
         self._stopped = False
         self.version = ""
@@ -88,7 +94,8 @@ class LabEngine:
         isolate = self._ready()
         try:
             isolate.fill("mjb", mjb)
-            text = isolate.call("trial", json.dumps(request), seconds)
+            progress = Progress(isolate.buffer("beats"), self._patience)
+            text = isolate.call("trial", json.dumps(request), seconds, progress)
         except LimitError as error:
             return self._ended(isolate, "timeout", str(error))
         except ScriptError as error:  # lab code has broken what all share

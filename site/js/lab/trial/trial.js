@@ -37,9 +37,9 @@ class Ended extends Error {}
 /** When the trial began, and when it last got on; they outlive a trial that was stopped from outside. */
 const progress = { began: 0, last: 0 }
 
-/** The entry that keeps a trial from its end: its code has run for a tenth of the time, so that it may never return. */
+/** The entry that keeps a trial from its end: its code has run for a twentieth of the time, so that it may never return. */
 export function stuck(now) {
-  return now - progress.last > (now - progress.began) / 10 ? current.entry : null
+  return now - progress.last > (now - progress.began) / 20 ? current.entry : null
 }
 
 /** @param {import('./guard.js').Guard | null} guard of what labs share */
