@@ -61,6 +61,7 @@ _AHEAD = (
     "site/prepare_templates.py",
     "coursebuild/core/pages/assets.py",
     "coursebuild/core/pages/compressed.py",
+    "coursebuild/core/pages/font_files.py",
     "coursebuild/core/pages/fonts.py",
     "coursebuild/core/pages/templates.py",
     "templates/icon.svg",

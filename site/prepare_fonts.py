@@ -24,11 +24,7 @@ from fontTools.ttLib import TTFont
 from fontTools.varLib import instancer
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.core.pages import fonts
-
-PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
-FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, PER_MILLE.split()), strict=True))
-"""How often characters stand in English text, per thousand."""
+from coursebuild.core.pages import font_files, fonts
 
 WEIGHTS = {fonts.TEXT: (400, 700), fonts.CODE: (400, 700)}
 """The weights that the style sheet uses."""
@@ -84,20 +80,6 @@ def narrow_radicals(font: TTFont) -> None:
             advances[name] = (widest, glyph.xMin)
 
 
-def measured(font: TTFont) -> tuple[float, float, float, float] | None:
-    """Mean advance width, weighted by `FREQUENCY`, ascent, descent and line gap of a font, in em.
-
-    Nothing for a font without the letters of `FREQUENCY`.
-    """
-    names, advances = font.getBestCmap(), font["hmtx"]
-    if not all(ord(c) in names for c in FREQUENCY):
-        return None
-    em, head = font["head"].unitsPerEm, font["hhea"]
-    total = sum(advances[names[ord(c)]][0] * weight for c, weight in FREQUENCY.items())
-    width = total / sum(FREQUENCY.values()) / em
-    return width, head.ascent / em, -head.descent / em, head.lineGap / em
-
-
 def prepare(folder: Path, cuts: Path) -> None:
     """Put ready fonts in the place of those in a folder, and cut some into another."""
     listing = folder / "fonts.json"
@@ -108,7 +90,7 @@ def prepare(folder: Path, cuts: Path) -> None:
         data = source.read_bytes()
         source.unlink()
         with TTFont(io.BytesIO(data)) as whole:
-            face["measure"] = measured(whole)
+            face["measure"] = font_files.measured(whole)
         weights = WEIGHTS.get(face["family"])
         face["weight"] = weights or face["weight"]
         with ready(data, weights) as font:
@@ -129,7 +111,10 @@ def prepare(folder: Path, cuts: Path) -> None:
 def made_from(bundle: Path) -> str:
     """A hash of the fonts and of what cuts them."""
     digest = hashlib.sha256()
-    for path in (*map(Path, (__file__, fonts.__file__)), *sorted((bundle / "fonts").iterdir())):
+    for path in (
+        *map(Path, (__file__, fonts.__file__, font_files.__file__)),
+        *sorted((bundle / "fonts").iterdir()),
+    ):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())
     return digest.hexdigest()
 

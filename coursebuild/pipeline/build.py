@@ -24,6 +24,7 @@ from coursebuild.report import Report
 
 if TYPE_CHECKING:
     from coursebuild.core.model import Course
+    from coursebuild.core.text.diagnostics import Diagnostic
     from coursebuild.numerics.reports import Reports
     from coursebuild.pipeline.site import Site
 
@@ -59,10 +60,22 @@ def prepare(
         if not checked.is_sound:
             yield checked.report(), None
             return
+        from coursebuild.core.pages.templates import TemplateFailure
         from coursebuild.pipeline.site import site_files
 
         assert checked.course is not None and checked.verified is not None
         results, reports = checked.verified.results, checked.reports
-        site = (make or site_files)(checked.course, results, documents, options, reports)
-        report = checked.report(site.diagnostics)
+        wrong: tuple[Diagnostic, ...] = ()
+        try:
+            site = (make or site_files)(checked.course, results, documents, options, reports)
+            wrong = site.diagnostics
+            if checked.course.theme.templates:  # which may fail in any page
+                for file in site.files:
+                    if file.path.endswith(".html"):
+                        file.make()
+        except TemplateFailure as failure:
+            from coursebuild.pipeline.theme import told
+
+            wrong = (told(checked.course, failure),)
+        report = checked.report(wrong)
         yield report, site if report.ok else None

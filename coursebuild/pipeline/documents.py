@@ -185,9 +185,10 @@ class Documents(Parser):
         kept = self._store.peek(PAGES, key, lambda data: decode(data, DrawnPage))
         return kept or self._reader.draw(request())
 
-    def context(self, path: str, inputs: PageInputs, language: str) -> PageContext:
+    def context(self, path: str, inputs: PageInputs, course: Course) -> PageContext:
         """The document at a path with all its text, on the page with these inputs."""
-        return self._reader.context(self._texts[path], inputs, language)
+        own = course.theme.template_texts
+        return self._reader.context(self._texts[path], inputs, course.language, own)
 
     # --- here, or in copies of this process
 

@@ -114,7 +114,7 @@ def _exported(
 
     def page(document: Document) -> PageContext:
         path = document.source.path
-        return documents.context(path, entries[path].inputs(library), course.language)
+        return documents.context(path, entries[path].inputs(library), course)
 
     context = ExportContext(
         library, assets, site, page, functools.partial(read_bytes, options.root)

@@ -32,6 +32,7 @@ from coursebuild.core.model import (
     Page,
     Status,
 )
+from coursebuild.core.model.theme import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.source_parts import check_source_parts
@@ -140,6 +141,7 @@ class _Loader:
         levels = tuple(self._level(level) for level in course.levels)
         self._unlisted()
         pages = self._pages(course.pages, course.limits.text)
+        theme = self._theme(course.theme)
         self._unlisted_pages(course)
         course = replace(
             course,
@@ -148,6 +150,7 @@ class _Loader:
             models=self.files.models,
             files=self._others(course),
             declarations=declared,
+            theme=theme,
         )
         self.found += self.parser.check(course)
         self.found += _check_engine(course)
@@ -173,6 +176,16 @@ class _Loader:
             unreadable = (*self.files.unreadable, source.path)
             self.files = replace(self.files, unreadable=unreadable)
         return tuple(found)
+
+    def _theme(self, theme: Theme) -> Theme:
+        """The theme with its files; most courses have none."""
+        if theme == Theme() and not (self.root / TEMPLATES).is_dir():
+            return theme
+        from coursebuild.pipeline.theme import load_theme
+
+        loaded = load_theme(self.root, theme)
+        self.found += loaded.diagnostics
+        return loaded.value
 
     def _text(self, path: str) -> str | None:
         """The text of a file of the project; `None` where there is none."""

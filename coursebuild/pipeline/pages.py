@@ -143,6 +143,7 @@ class Pages:
             tuple((p.path, page_title(self._library, p)) for p in self._library.added_pages),
             results.engine,
             results.python,
+            course.theme.template_texts,
             names,
         )
 
@@ -246,5 +247,6 @@ def page_request(entry: PageEntry, library: Library) -> PageRequest:
     course, text = library.course, text_of(entry, library)
     inputs = encode(entry.inputs(library))
     text_key = "" if text is None else text.key
-    key = step_key("page", course.language, course.base_url, inputs, text_key)
-    return PageRequest(inputs, text, course.language, course.base_url, key)
+    own = course.theme.template_texts
+    key = step_key("page", course.language, course.base_url, own, inputs, text_key)
+    return PageRequest(inputs, text, course.language, course.base_url, own, key)

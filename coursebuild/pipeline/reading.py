@@ -32,7 +32,7 @@ from coursebuild.core.pages.assets import strings_for
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord, record
-from coursebuild.core.pages.templates import templates_of
+from coursebuild.core.pages.templates import Texts, templates_of
 from coursebuild.core.pages.tools import Tools, known_mathml, mark_now
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.pages.zips import imports
@@ -98,6 +98,8 @@ class PageRequest(Struct, frozen=True):
     language: str
     """Of the interface."""
     base_url: str
+    templates: Texts
+    """Those of the course's own."""
     key: str
     """Under which it is kept."""
 
@@ -155,7 +157,7 @@ class PageReader:
         self._waiting: dict[str, tuple[SourceText, _Whole]] = {}
         """Documents that were read and not drawn yet, by path."""
         self._room = _ROOM
-        self._tools: dict[str, Tools] = {}
+        self._tools: dict[tuple[str, Texts], Tools] = {}
 
     def close(self) -> None:
         """End the engine that typesets formulas, until it is needed again."""
@@ -248,7 +250,7 @@ class PageReader:
         with self._lock:
             whole = None if request.text is None else self._whole(request.text)
             document = None if whole is None else whole.document
-            tools = self._tools_for(request.language, whole)
+            tools = self._tools_for(request.language, request.templates, whole)
             head, html, context = draw(inputs, document, tools)
             found, body = record(head, html, request.base_url)
             notes = page_notes(inputs, context, body)
@@ -258,23 +260,25 @@ class PageReader:
             self._store.put(PAGES, request.key, encode(page))
             return page
 
-    def context(self, text: SourceText, inputs: PageInputs, language: str) -> PageContext:
+    def context(
+        self, text: SourceText, inputs: PageInputs, language: str, templates: Texts
+    ) -> PageContext:
         """A document with all its text, on its page."""
         from coursebuild.core.pages.context import PageContext
 
         assert inputs.shown is not None, "a page with a document shows it"
         whole = self._whole(text)
-        tools = self._tools_for(language, whole)
+        tools = self._tools_for(language, templates, whole)
         return PageContext.made(tools, inputs.shown, Place(inputs.head.path), whole.document)
 
-    def _tools_for(self, language: str, whole: _Whole | None) -> Tools:
+    def _tools_for(self, language: str, own: Texts, whole: _Whole | None) -> Tools:
         """Words, templates and marked code, with the formulas of a document."""
-        if language not in self._tools:
+        if (language, own) not in self._tools:
             texts = template_texts()
-            templates = templates_of(texts, prepared_folder())
+            templates = templates_of(texts, prepared_folder(), own)
             strings = strings_for(texts, language)
-            self._tools[language] = Tools(strings, templates, mark=_Marks(self._store))
-        tools = self._tools[language]
+            self._tools = {(language, own): Tools(strings, templates, mark=_Marks(self._store))}
+        tools = self._tools[language, own]
         return tools if whole is None else replace(tools, formulas=whole.formulas)
 
 

@@ -141,7 +141,8 @@ class SiteMaker:
         from_whole = facts is None
         facts = facts or _ANYTHING
         facts = replace(facts, text=facts.text | common_characters(self.library))
-        key = step_key("shared files", facts, from_whole)
+        theme = replace(self.course.theme, templates=())
+        key = step_key("shared files", facts, from_whole, theme)
         found = self.store.get("shared", key, lambda data: decode(data, SharedFiles))
         if found is None:
             found = self._shared_made(facts, whole=from_whole)
@@ -155,7 +156,7 @@ class SiteMaker:
         from coursebuild.core.pages.shared import shared_files
 
         cut = (lambda job: job.data) if whole else functools.partial(_cut_font, self.store)
-        made, names = shared_files(self.assets, cut, facts)
+        made, names = shared_files(self.assets, cut, facts, self.course.theme)
         files = (*made, *self._copies(made))
         return SharedFiles(names, {file.path: file.data for file in files})
 

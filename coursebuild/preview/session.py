@@ -29,6 +29,7 @@ from coursebuild.core.model.results import Outcome, Results, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library, Owner, named_models, owners
+from coursebuild.core.pages.templates import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
@@ -41,6 +42,7 @@ from coursebuild.pipeline.load import MAP, Loaded, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
+from coursebuild.pipeline.theme import told
 from coursebuild.pipeline.verify import Verified
 from coursebuild.preview.files import Files
 
@@ -97,6 +99,8 @@ class Session:
         self._models_of = PerDocument(named_models)
         self._static: dict[str, tuple[Diagnostic, ...]] = {}
         """What reading and checking found, by file."""
+        self._failed: tuple[Diagnostic, ...] = ()
+        """That a template of the course failed when a page was drawn."""
         self._targets: LinkTargets | None = None
         self._site_paths: dict[str, str] = {}
         """The site paths of lessons and pages, by the path of their file."""
@@ -125,7 +129,7 @@ class Session:
         """Everything that is known to be wrong."""
         with self.changed:
             static = (d for found in self._static.values() for d in found)
-            return (*static, *self.found_by_running)
+            return (*static, *self.found_by_running, *self._failed)
 
     def blocking(self, path: str) -> list[Diagnostic]:
         """What keeps the page at a site path as it was: mistakes in its text or in the map."""
@@ -253,6 +257,7 @@ class Session:
             if is_same_script(self._ran.get(run.path), scripts.get(run.path))
         )
         results = replace(self._results, runs=runs, verdicts=compare(course, runs))
+        self._failed = ()
         self.course = course
         self.library = library = Library.of(
             course,
@@ -316,7 +321,11 @@ class Session:
             wrong = {path for path, found in self._static.items() if has_errors(found)}
             broken = {site for path, site in self._site_paths.items() if path in wrong}
         assert library is not None
-        serve = self.files.make(library, broken, pause)
+        try:
+            serve = self.files.make(library, broken, pause)
+        except TemplateFailure as failure:
+            self._fail(failure)
+            return
         with self.changed:
             serve()
             self.tell()
@@ -326,7 +335,20 @@ class Session:
     def find(self, path: str) -> bytes | None:
         """A file of the site, if there is one and it can be had."""
         with self.changed:
-            return self.files.find(path)
+            try:
+                return self.files.find(path)
+            except TemplateFailure as failure:
+                self._fail(failure)
+                return None
+
+    def _fail(self, failure: TemplateFailure) -> None:
+        """Tell that a template of the course fails."""
+        with self.changed:
+            assert self.course is not None
+            found = (told(self.course, failure),)
+            if found != self._failed:
+                self._failed = found
+                self.tell()
 
     def _is_sound(self, document: Document) -> bool:
         """Whether nothing is wrong in a document, which can be drawn then."""
@@ -367,6 +389,7 @@ def _is_same(old: Course | None, new: Course) -> bool:
         old is not None
         and old.map.text == new.map.text
         and old.models == new.models
+        and old.theme == new.theme
         and old.declarations == new.declarations
         and old.files == new.files
         and [d.source for d in old.documents] == [d.source for d in new.documents]

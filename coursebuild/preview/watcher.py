@@ -18,7 +18,7 @@ from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError, reason
 
-FOLDERS = ("content", "features", "models", "mjcourse")
+FOLDERS = ("content", "features", "models", "mjcourse", "theme")
 LOOK = 0.200
 """Seconds from one look for new and removed folders, and at files elsewhere, to the next."""
 _STEP = 2

@@ -201,7 +201,7 @@ def test_marks_and_lines(theme: str) -> None:
     """Frames of controls, lines of plots, their labels, the ring around what has the focus."""
     found = []
     strokes = {value for rule in ALL for value in _strokes(rule)}
-    assert strokes > {"var(--blue)", "var(--rule-firm)"}
+    assert strokes > {"var(--accent)", "var(--rule-firm)"}
     for value in sorted({*MEANT, *strokes}):
         least = min(contrast(a, b) for a in colours(value, theme) for b in plain(theme))
         if least < 4.5:

@@ -24,7 +24,7 @@ TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-FOLDERS = ("content", "features", "models", "mjcourse")
+FOLDERS = ("content", "features", "models", "mjcourse", "theme")
 """What a course's author writes, and the library that a course may have of its own."""
 _HEADER = "coursebuild up to date 1"
 _FINE = 50_000_000

@@ -124,6 +124,13 @@ def read_sources(root: Path, paths: list[str]) -> Parsed[tuple[Source, ...]]:
     return Parsed(reader.sources(paths), tuple(reader.diagnostics))
 
 
+def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
+    """The text files below a folder of the course, sorted."""
+    reader = _Reader(root.resolve())
+    found = reader.sources([*reader.walk(folder)])
+    return Parsed(found, tuple(reader.diagnostics))
+
+
 class _Reader:
     """Reads files of one course and keeps what went wrong."""
 

@@ -14,6 +14,7 @@ from msgspec import Meta, Struct
 
 from coursebuild.core.model.blocks import Comparison, Document, Filter
 from coursebuild.core.model.scenarios import Declarations
+from coursebuild.core.model.theme import Theme
 from coursebuild.core.text.source import Source, Span
 
 _COMMENT = re.compile("<!--(.*?)-->", re.DOTALL)
@@ -172,6 +173,7 @@ class Course(Struct, frozen=True):
     html: Literal["none", "safe", "trusted"] = "safe"
     """Which raw HTML lessons and pages may have."""
     limits: Limits = Limits()
+    theme: Theme = Theme()
 
     @property
     def key(self) -> str:

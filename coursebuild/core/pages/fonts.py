@@ -12,6 +12,8 @@ Entry points: `read_faces`, `font_jobs` (which files to make, from which charact
 3. While a font loads, text is set in a local one, scaled so that lines break and stand as they
    will: see `FALLBACKS`.
 
+4. Fonts of the course's own come first: of the tool's only the characters are used that they lack.
+
 A job's `key` names its result: who calls may keep results by it.
 """
 
@@ -27,6 +29,10 @@ from msgspec import Struct
 
 TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
 """Families, as the bundle names them."""
+COURSE = {"text": "Course Text", "interface": "Course Interface", "code": "Course Code"}
+"""The families of a course's own fonts in the style sheet, by what is set in them."""
+_OWN = {TEXT: COURSE["text"], CODE: COURSE["code"]}
+"""Those that come before families of the bundle."""
 
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·½×éöü–—‘’“”…•−")
 """Characters that are always kept, so that few edits change a font."""
@@ -74,13 +80,26 @@ def read_faces(listing: bytes) -> tuple[Face, ...]:
 
 
 def font_jobs(
-    faces: Iterable[tuple[Face, bytes]], text: str, mathematics: str
+    faces: Iterable[tuple[Face, bytes]],
+    text: str,
+    mathematics: str,
+    own: Iterable[tuple[Face, bytes]] = (),
 ) -> tuple[FontJob, ...]:
-    """What to cut for pages that use the characters of `text`, and of `mathematics` in formulas."""
+    """What to cut for pages that use the characters of `text`, and of `mathematics` in formulas.
+
+    `own` are the fonts of the course, which stand in the place of others of their families.
+    """
     jobs: list[FontJob] = []
+    letters = BASE | set(text)
+    theirs: dict[str, set[str]] = {}
+    for face, data in own:
+        shown = letters & characters_in(face.characters)
+        jobs.append(FontJob(face, data, "".join(sorted(shown))))
+        theirs.setdefault(face.family, set()).update(shown)
     given: dict[tuple[str, str], set[str]] = {}
     for face, data in faces:
-        wanted = BASE | set(text) if face.family != MATH else _mathematical(mathematics)
+        lacking = letters - theirs.get(_OWN.get(face.family, ""), set())
+        wanted = lacking if face.family != MATH else _mathematical(mathematics)
         taken = given.setdefault((face.family, face.style), set())
         kept = (wanted & characters_in(face.characters)) - taken
         if face.unicode_range is not None:
@@ -233,10 +252,11 @@ def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
 
 def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) -> tuple[str, ...]:
     """The rule of a fallback, scaled to the face with the Latin letters, where that is used."""
-    wanted = (fallback.family, fallback.style, "latin")
+    families = fallback.family, _OWN[fallback.family]
     for job, _ in files:
-        if (job.face.family, job.face.style, job.face.subset) == wanted:
-            measure = job.face.measure
+        face = job.face
+        if face.family in families and (face.style, face.subset) == (fallback.style, "latin"):
+            measure = face.measure
             assert measure is not None, "a font with the Latin letters was measured"
             scale = measure[0] / fallback.width
             ascent, descent, gap = (x / scale for x in measure[1:])

@@ -39,6 +39,9 @@ PAGE_WORDS = (
 )
 """Interface texts that the page's script shows."""
 
+LOGO_HEIGHT = 28
+"""Pixels, as in the style sheet."""
+
 
 class Names(Struct, frozen=True):
     """Site paths of the files that every page refers to."""
@@ -51,11 +54,15 @@ class Names(Struct, frozen=True):
     touch_icon: str
     scripts: tuple[tuple[str, str], ...] = ()
     """Of the parts of pages, by the mark of each (`PagePart`)."""
+    logo: str = ""
+    logo_dark: str = ""
+    logo_width: int = 0
+    """In pixels, where it is `LOGO_HEIGHT` high."""
 
     def paths(self) -> frozenset[str]:
         """The site paths alone."""
         named = (getattr(self, field) for field in self.__struct_fields__)
-        single = (path for path in named if isinstance(path, str))
+        single = (path for path in named if isinstance(path, str) and path)
         return frozenset((*single, *(path for _, path in self.scripts)))
 
 
@@ -147,7 +154,9 @@ def _values(
         "script": place.href(names.script),
         "part_scripts": _part_scripts(place, names, parts),
         "manifest": place.href(urls.MANIFEST),
-        "touch_icon": place.href(names.touch_icon),
+        "touch_icon": place.href(names.touch_icon) if names.touch_icon else "",
+        "logos": _logos(place, names),
+        "logo_size": (names.logo_width, LOGO_HEIGHT) if names.logo_width else (),
         "home": place.href(urls.HOME),
         "credits": place.href(names.credits),
         "menu": _menu(library, place),
@@ -157,6 +166,15 @@ def _values(
         "results": library.results,
         "page_words": _page_words(library, parts),
     }
+
+
+def _logos(place: urls.Place, names: Names) -> tuple[tuple[str, str], ...]:
+    """Addresses of the logo, each with its class: two where dark pages have one of their own."""
+    if names.logo and names.logo_dark:
+        light, dark = place.href(names.logo), place.href(names.logo_dark)
+        return (light, "figure-light"), (dark, "figure-dark")
+    only = names.logo or names.logo_dark
+    return ((place.href(only), ""),) if only else ()
 
 
 def _copies(page: str) -> tuple[tuple[str, str], ...]:

@@ -144,7 +144,7 @@ class Library(Struct, frozen=True, dict=True):
             course=course,
             results=results,
             words=strings_for(assets.templates, course.language),
-            templates=templates_of(assets.templates, assets.compiled),
+            templates=templates_of(assets.templates, assets.compiled, course.theme.template_texts),
             lessons={lesson.id: lesson for lesson in course.lessons},
             levels={level.id: level for level in course.levels},
             pages={page.id: page for page in course.pages},

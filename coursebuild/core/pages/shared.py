@@ -19,10 +19,12 @@ from msgspec import Struct
 
 from coursebuild.core.features import Feature, PagePart
 from coursebuild.core.model.results import OutputFile
+from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages import fonts, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
-from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.frame import LOGO_HEIGHT, Names
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.theme import picture_size, theme_faces, theme_style
 from coursebuild.core.registry import features
 
 
@@ -73,16 +75,19 @@ def common_characters(library: Library) -> frozenset[str]:
     return frozenset(text)
 
 
-def needed_fonts(assets: Assets, facts: PageFacts) -> tuple[fonts.FontJob, ...]:
+def needed_fonts(assets: Assets, facts: PageFacts, theme: Theme) -> tuple[fonts.FontJob, ...]:
     """The fonts that pages with these facts, taken together, need, to be cut."""
     faces = fonts.read_faces(assets.file("fonts/fonts.json"))
     given = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
     text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))
-    return fonts.font_jobs(given, text, mathematics)
+    return fonts.font_jobs(given, text, mathematics, theme_faces(theme))
 
 
 def shared_files(
-    assets: Assets, subset: Callable[[fonts.FontJob], bytes], facts: PageFacts
+    assets: Assets,
+    subset: Callable[[fonts.FontJob], bytes],
+    facts: PageFacts,
+    theme: Theme,
 ) -> tuple[tuple[OutputFile, ...], Names]:
     """The files for pages with these facts, taken together, and their names."""
     files: list[OutputFile] = []
@@ -104,31 +109,53 @@ def shared_files(
         stem, _, ending = job.face.file.rpartition(".")
         return publish(f"fonts/{stem}.{'woff2' if data.startswith(b'wOF2') else ending}", data)
 
-    fonts_made = [(job, font(job)) for job in needed_fonts(assets, facts)]
+    def picture(name: str, file: ThemeFile | None) -> str:
+        return "" if file is None else publish(f"{name}.{file.ending}", file.data)
+
+    fonts_made = [(job, font(job)) for job in needed_fonts(assets, facts, theme)]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
     own = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
+    own += theme_style(theme)
     scripts = [
         (part.mark, script(part.bundled) if part.bundled else own_script(feature, part))
         for feature in features()
         for part in feature.parts
         if part.bundled or part.code
     ]
+    if theme.icon is None and theme.touch_icon is None:
+        icon = publish("icon.svg", assets.template("icon.svg").encode())
+        touch_icon = publish("icon-touch.png", assets.file("icons/icon-touch.png"))
+    else:
+        icon = picture("icon", theme.icon or theme.touch_icon)
+        touch_icon = picture("icon-touch", theme.touch_icon)
     names = Names(
         style=publish("site.css", rules.encode() + assets.file("css/site.css") + own.encode()),
         theme_script=script("theme.js"),
         script=script("site.js"),
-        icon=publish("icon.svg", assets.template("icon.svg").encode()),
-        credits=publish("licences.txt", _licences(assets)),
-        touch_icon=publish("icon-touch.png", assets.file("icons/icon-touch.png")),
+        icon=icon,
+        credits=publish("licences.txt", _licences(assets, theme)),
+        touch_icon=touch_icon,
         scripts=tuple(scripts),
+        logo=picture("logo", theme.logo),
+        logo_dark=picture("logo-dark", theme.logo_dark),
+        logo_width=_logo_width(theme.logo or theme.logo_dark),
     )
     return tuple(files), names
 
 
-def _licences(assets: Assets) -> bytes:
+def _logo_width(logo: ThemeFile | None) -> int:
+    size = picture_size(logo) if logo is not None else None
+    return round(LOGO_HEIGHT * size[0] / size[1]) if size else 0
+
+
+def _licences(assets: Assets, theme: Theme) -> bytes:
     """The licences of fonts and libraries that the site ships."""
-    parts = []
-    for path, data in assets.files("licences"):
-        name = path.removeprefix("licences/").removesuffix(".txt")
-        parts.append(f"{name}\n{'=' * len(name)}\n\n{data.decode().strip()}\n")
+    named = [
+        (path.removeprefix("licences/").removesuffix(".txt"), data.decode())
+        for path, data in assets.files("licences")
+    ]
+    for family in theme.fonts:
+        files = (file.path.rpartition("/")[2] for file in family.files)
+        named.append((", ".join(files), family.licence.text))
+    parts = [f"{name}\n{'=' * len(name)}\n\n{text.strip()}\n" for name, text in named]
     return "\n\n".join(parts).encode()

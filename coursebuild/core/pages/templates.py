@@ -1,34 +1,82 @@
 """The templates of pages, in Jinja's language.
 
-Entry points: `templates_of`; `compile_templates`, for who bundles the tool.
+Entry points: `templates_of`; `compile_templates`, for who bundles the tool; `TemplateFailure`.
 
 1. What is not `Markup` is escaped where it is written.
 2. A name or an attribute that is not there is an error.
 3. Templates that are those which the tool was bundled with are loaded from the Python that they
    were compiled to then. Others, in a source tree, are compiled when they are asked for.
+4. A course may have templates of its own in the place of some. What goes wrong in these is its
+   author's to mend, and is told with its place.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
+import traceback
 from pathlib import Path
 from typing import TypeAlias
 
-from jinja2 import BaseLoader, DictLoader, Environment, ModuleLoader, StrictUndefined
+from jinja2 import (
+    BaseLoader,
+    ChoiceLoader,
+    DictLoader,
+    Environment,
+    FunctionLoader,
+    ModuleLoader,
+    StrictUndefined,
+    TemplateSyntaxError,
+)
+
+from coursebuild.core.model.theme import TEMPLATES
 
 Texts: TypeAlias = tuple[tuple[str, str], ...]
 """Files of `templates/` by path."""
 
 
 @functools.lru_cache(maxsize=8)
-def templates_of(texts: Texts, folder: Path | None = None) -> Environment:
-    """The templates among files of the tool; `folder` has those that were compiled before."""
-    pages = _pages(texts)
+def templates_of(texts: Texts, folder: Path | None = None, own: Texts = ()) -> Environment:
+    """The templates among files of the tool; `folder` has those that were compiled before.
+
+    `own` are those of the course, which come first.
+    """
     archive = None if folder is None else folder / archive_name(texts)
+    found: list[BaseLoader] = [DictLoader(_pages(texts))]
     if archive is not None and archive.is_file():
-        return _environment(ModuleLoader(archive))
-    return _environment(DictLoader(pages))
+        found = [ModuleLoader(archive)]
+    if own:
+        theirs = {name: (text, f"{TEMPLATES}{name}", None) for name, text in own}
+        found = [FunctionLoader(theirs.get), *found]
+    return _environment(ChoiceLoader(found))
+
+
+class TemplateFailure(Exception):  # noqa: N818
+    """What a template of the course does wrong: its path, the line, and what, in words."""
+
+    def __init__(self, path: str, line: int, message: str) -> None:
+        super().__init__(path, line, message)
+        self.path, self.line, self.message = path, line, message
+
+    @classmethod
+    def of(cls, error: Exception) -> TemplateFailure | None:
+        """That of an error which came about in a template of the course, if it did."""
+        if isinstance(error, TemplateFailure):
+            return error
+        for frame, line in reversed(tuple(traceback.walk_tb(error.__traceback__))):
+            path = frame.f_code.co_filename
+            if path.startswith(TEMPLATES):
+                return cls(path, line, str(error) or type(error).__name__)
+        return None
+
+
+def template_mistake(text: str) -> tuple[int, str] | None:
+    """The line at which a text is no template, and why."""
+    try:
+        _environment(DictLoader({})).from_string(text)
+    except TemplateSyntaxError as error:
+        return error.lineno, error.message or "it is no template"
+    return None
 
 
 def compile_templates(texts: Texts, folder: Path) -> None:

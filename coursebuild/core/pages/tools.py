@@ -17,6 +17,7 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.quantities import text_html
 from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.templates import TemplateFailure
 
 
 def known_mathml(formulas: Mapping[Formula, str | MathError]) -> Mathml:
@@ -55,7 +56,12 @@ class Tools(Struct, frozen=True):
         It sees `t`, the interface's words, and `authored`, see `text`.
         """
         seen = {"t": self.words, "authored": self.text, **values}
-        return Markup(self.templates.get_template(template).render(seen).rstrip("\n"))
+        try:
+            return Markup(self.templates.get_template(template).render(seen).rstrip("\n"))
+        except Exception as error:
+            if (failure := TemplateFailure.of(error)) is not None:
+                raise failure from error
+            raise
 
     def text(self, text: str) -> Markup:
         """Text of an author that is not Markdown, with its quantities kept together."""

@@ -36,6 +36,8 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _SVG = "{http://www.w3.org/2000/svg}"
 _XLINK = "{http://www.w3.org/1999/xlink}href"
 _URL = re.compile(r"url\(#([^()\s]+)\)")
+_FAR = re.compile(r"""@import[^;]*|url\(\s*["']?(?!#|data:image/|["'\s])[^()]*\)""")
+"""What in a style asks for another file."""
 _ACTIVE = ("script", "foreignObject", "iframe", "audio", "video")
 
 ReadFile = Callable[[str], bytes | None]
@@ -145,6 +147,8 @@ def _active(element: ET.Element) -> str:
         return f"holds active content, `{kind}`"
     links = (element.attrib[key] for key in (_XLINK, "href") if key in element.attrib)
     far = next((link for link in links if not link.startswith(("#", "data:image/"))), "")
+    styles = (*element.attrib.values(), *([element.text or ""] if kind == "style" else ()))
+    far = far or next((found[0] for style in styles if (found := _FAR.search(style))), "")
     return f"leads to `{far}`" if far else ""
 
 

@@ -16,6 +16,7 @@ from msgspec import Meta, Struct
 
 from coursebuild.core.model import Limits
 from coursebuild.core.syntax.fields import NotNegative, Text
+from coursebuild.core.syntax.theme import ThemeTable
 
 Slug: TypeAlias = Annotated[
     str,
@@ -219,6 +220,7 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     """The course map: the whole syllabus, and how the course is built."""
 
     course: CourseTable
+    theme: ThemeTable | None = None
     verify: VerifyTable | None = None
     format: FormatTable | None = None
     security: SecurityTable = SecurityTable()

@@ -43,6 +43,7 @@ from coursebuild.core.syntax.course_settings import (
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
+from coursebuild.core.syntax.theme import check_contrast, theme
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.wording import TOML, short
 from coursebuild.core.text.diagnostics import (
@@ -79,6 +80,7 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(found))
     course = _course(source, root, decoding.value, levels)
+    found += check_contrast(course.theme)
     return Parsed(course, sort_diagnostics(found))
 
 
@@ -121,6 +123,7 @@ def _course(
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
+        theme=theme(root.get("theme"), fields.theme),
     )
 
 

@@ -56,6 +56,20 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ),
     ("no-lessons", "error", "The course has no lesson to publish."),
     ("no-scripts", "warning", "No script can run here, so that nothing is verified."),
+    # the theme
+    ("theme-file", "error", "A file that the theme names is not there, or is not what it must be."),
+    (
+        "theme-contrast",
+        "warning",
+        "The accent is too near to the colour of the page for text to be read in it.",
+    ),
+    ("template-unknown", "error", "A file stands in the place of a template that there is not."),
+    ("template-broken", "error", "A template of the course cannot be read, or fails."),
+    (
+        "template-outdated",
+        "warning",
+        "The tool has changed the template that one of the course was copied from.",
+    ),
     # fields of JSON and TOML
     ("json-syntax", "error", "The JSON in a fence is malformed."),
     ("field-unknown", "error", "A field that nothing reads."),

@@ -18,17 +18,20 @@ import functools
 import json
 from collections.abc import Iterable, Iterator
 
+from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
+from coursebuild.core.model.theme import ThemeFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.assets import Assets, hashed_name, page_script
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.theme import picture_size
 
-PAPER = "#fcfbf8"
-"""The ground of a page in light colours, as in the style sheet."""
+PAPER = GROUNDS_LIGHT[0]
+"""The ground of a page in light colours."""
 
 _FORMAT = 1
 _DIGITS = 12
@@ -47,23 +50,22 @@ _MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.WORKER, "llms.txt", "llms-full.txt"
 
 def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:
     """All of them."""
-    yield from _application(site.library.course, site.assets)
+    yield from _application(site.library.course, site.assets, site.names)
     key = step_key("list of files", site.names)
     yield FileList(urls.FILES, key, functools.partial(listing, shell_of(site.names)))
 
 
-def _application(course: Course, assets: Assets) -> tuple[OutputFile, ...]:
-    large = tuple(_icon(assets, f"icon-{side}.png") for side in (192, 512))
-    masked = _icon(assets, "icon-maskable.png")
-    scalable = hashed_name("assets/icon.svg", assets.template("icon.svg").encode())
-    icons = [
-        {"src": scalable, "type": "image/svg+xml", "sizes": "any"},
-        *(
-            {"src": icon.path, "type": "image/png", "sizes": f"{side}x{side}"}
-            for side, icon in zip((192, 512), large, strict=True)
-        ),
-        {"src": masked.path, "type": "image/png", "sizes": "512x512", "purpose": "maskable"},
-    ]
+def _application(course: Course, assets: Assets, names: Names) -> tuple[OutputFile, ...]:
+    theme = course.theme
+    pictures = [_entry(names.icon, theme.icon or theme.touch_icon)]
+    if theme.touch_icon is not None and theme.icon is not None:
+        pictures.append(_entry(names.touch_icon, theme.touch_icon))
+    drawn: list[OutputFile] = []
+    if not (theme.icon or theme.touch_icon):
+        for name, side in (("192", 192), ("512", 512), ("maskable", 512)):
+            drawn.append(_icon(assets, f"icon-{name}.png"))
+            pictures.append(_png(drawn[-1].path, f"{side}x{side}"))
+        pictures[-1]["purpose"] = "maskable"
     manifest = {
         "id": "./",
         "name": course.title,
@@ -77,16 +79,27 @@ def _application(course: Course, assets: Assets) -> tuple[OutputFile, ...]:
         "theme_color": PAPER,
         "background_color": PAPER,
         "categories": ["education"],
-        "icons": icons,
+        "icons": pictures,
     }
     text = json.dumps({k: v for k, v in manifest.items() if v}, ensure_ascii=False, indent=1)
     worker = page_script(assets.file("js/service-worker.js"))
     return (
-        *large,
-        masked,
+        *drawn,
         OutputFile(urls.MANIFEST, f"{text}\n".encode("utf-8", "replace")),
         OutputFile(urls.WORKER, worker),
     )
+
+
+def _entry(path: str, file: ThemeFile | None) -> dict[str, str]:
+    """An icon of the manifest; the tool's own is an SVG."""
+    if file is None or file.ending == "svg":
+        return {"src": path, "type": "image/svg+xml", "sizes": "any"}
+    width, height = picture_size(file) or (0, 0)
+    return _png(path, f"{width}x{height}")
+
+
+def _png(path: str, size: str) -> dict[str, str]:
+    return {"src": path, "type": "image/png", "sizes": size}
 
 
 def short_name(title: str) -> str:

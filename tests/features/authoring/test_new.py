@@ -11,7 +11,7 @@ import pytest
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.course_map import with_lesson
-from support.scratch_course import FIRST, SECOND, Done, Folder
+from support.scratch_course import FIRST, ROOT, SECOND, Done, Folder
 
 pytestmark = pytest.mark.site
 
@@ -94,6 +94,8 @@ REFUSED = [
     ("lesson 1.7 there", "there is a file content/lessons/1.7-there.md already"),
     ("model ../x", "`../x` is no name of a model: use letters, digits, `_` and `-`"),
     ("model there", "there is a file models/there.xml already"),
+    ("template lessn.html", "there is no template `lessn.html`; did you mean `lesson.html`?"),
+    ("template ../base.html", "there is no template `../base.html`; did you mean `base.html`?"),
 ]
 
 
@@ -129,6 +131,18 @@ def test_new_model_compiles(make: Callable[..., Folder]) -> None:
     done = folder.main("new", "model", "parts/falling-ball")
     assert done == Done(0, "wrote models/parts/falling-ball.xml\n", "")
     assert folder.main("check").status == 0
+
+
+def test_new_template_is_the_one_of_the_tool_and_known_for_it(make: Callable[..., Folder]) -> None:
+    folder = make(FIRST)
+    done = folder.main("new", "template", "blocks/code.html")
+    assert done == Done(0, "wrote theme/templates/blocks/code.html\n", "")
+    first, _, rest = folder.text("theme/templates/blocks/code.html").partition("\n")
+    assert rest == (ROOT / "templates/blocks/code.html").read_text(encoding="utf-8")
+    assert folder.main("new", "template", "blocks/code.html").status == 2
+    assert folder.main("new", "template", "blocks/code.html", "--print").out == f"{first}\n{rest}"
+    done = folder.main("check")
+    assert (done.status, "warning" in done.out) == (0, False), done.out
 
 
 def test_read_only_folder_is_told(tmp_path: Path, make: Callable[..., Folder]) -> None:

@@ -1,4 +1,4 @@
-"""`coursebuild new`: add a lesson or a model."""
+"""`coursebuild new`: add a lesson, a model, or a template of one's own."""
 
 from __future__ import annotations
 
@@ -8,17 +8,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coursebuild.cli.arguments import options_of
+from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.model.theme import TEMPLATES
 from coursebuild.core.syntax.course_schema import slug_of
+from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import with_lesson
 from coursebuild.pipeline.load import load_course
+from coursebuild.pipeline.theme import copied_template, template_names
 
 EXAMPLES = """\
 examples:
   coursebuild new lesson 1.4 "Large swings"
   coursebuild new model pendulum
+  coursebuild new template base.html
 """
 _LESSON = "## First section\n\nText.\n"
 _MODEL = """\
@@ -46,12 +51,18 @@ def declare(parser: argparse.ArgumentParser) -> None:
     model = kinds.add_parser("model", help="a file of models/ with a ball above a floor")
     model.add_argument("name", metavar="NAME", help="letters, digits, `_` and `-`; `/` for folders")
     model.set_defaults(add=_new_model)
+    template = kinds.add_parser("template", help="a copy of a template of pages, to be changed")
+    template.add_argument("name", metavar="NAME", help="as in base.html or blocks/callout.html")
+    template.add_argument("--print", action="store_true", help="print it, and write no file")
+    template.set_defaults(add=_new_template)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the files."""
     root = options_of(arguments).root
     changes: Sequence[FileChange] = arguments.add(root, arguments)
+    if getattr(arguments, "print", False):
+        return write("".join((change.new or b"").decode() for change in changes), CLEAN)
     return apply_changes(root, changes)
 
 
@@ -73,3 +84,12 @@ def _new_model(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     if not _NAME.fullmatch(name):
         raise UsageError(f"`{name}` is no name of a model: use letters, digits, `_` and `-`")
     return [FileChange(f"models/{name}.xml", None, _MODEL.format(name).encode())]
+
+
+def _new_template(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
+    name = arguments.name
+    text = copied_template(name)
+    if text is None:
+        near = did_you_mean(name, template_names())
+        raise UsageError(f"there is no template `{name}`" + (f"; {near}" if near else ""))
+    return [FileChange(f"{TEMPLATES}{name}", None, text.encode())]

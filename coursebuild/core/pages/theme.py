@@ -1,0 +1,76 @@
+"""The course's own face in what all pages share.
+
+Entry points: `theme_faces`, its fonts; `theme_style`, the end of the style sheet; `picture_size`.
+"""
+
+from __future__ import annotations
+
+import re
+
+from coursebuild.core.drawing.contrast import ENOUGH, GROUNDS_DARK, legible
+from coursebuild.core.model.theme import Theme, ThemeFile
+from coursebuild.core.pages.font_files import course_face
+from coursebuild.core.pages.fonts import Face
+
+_ACCENT = "#17487a", "#9fc6ef"
+"""That of the style sheet, on light and dark pages."""
+_BOLD = 600
+"""The weight of headings."""
+_BOX = re.compile(r"""<svg\b[^>]*?\sviewBox=["']\s*\S+?[\s,]+\S+?[\s,]+([\d.]+)[\s,]+([\d.]+)""")
+_SIDE = r"""<svg\b[^>]*?\s{}=["']\s*([\d.]+)"""
+
+
+def theme_faces(theme: Theme) -> list[tuple[Face, bytes]]:
+    """The faces of its fonts, each with the font; those that cannot be read are told elsewhere."""
+    named = ((family.use, file) for family in theme.fonts for file in family.files)
+    found = (course_face(use, file.path.rpartition("/")[2], file.data) for use, file in named)
+    return [face for face in found if not isinstance(face, str)]
+
+
+def theme_style(theme: Theme) -> str:
+    """What stands at the end of the style sheet."""
+    css = (f"{file.text.rstrip()}\n" for file in theme.css)
+    return "".join((_accent(theme), _synthesis(theme), *css))
+
+
+def accents(theme: Theme) -> tuple[str, str]:
+    """The accent on light and on dark pages."""
+    light, dark = theme.accent, theme.accent_dark
+    if light is None and dark is None:
+        return _ACCENT
+    first = light.colour if light else _ACCENT[0]
+    return first, dark.colour if dark else legible(first, GROUNDS_DARK, ENOUGH)
+
+
+def _accent(theme: Theme) -> str:
+    light, dark = accents(theme)
+    if (light, dark) == _ACCENT:
+        return ""
+    return f"@media screen{{:root{{--accent:light-dark({light},{dark})}}}}\n"
+
+
+def _synthesis(theme: Theme) -> str:
+    """Where a font has no bold or no italics, the browser makes them of what there is."""
+    for family in theme.fonts:
+        faces = [face for face, _ in theme_faces(Theme(fonts=(family,)))]
+        if not any(face.weight[1] >= _BOLD for face in faces) or not any(
+            face.style == "italic" for face in faces
+        ):
+            return "body{font-synthesis:weight style}math{font-synthesis:none}\n"
+    return ""
+
+
+def picture_size(file: ThemeFile) -> tuple[float, float] | None:
+    """Width and height of a picture, as far as their ratio goes; `None` where it does not say."""
+    if file.ending == "png":
+        width, height = (int.from_bytes(file.data[at : at + 4], "big") for at in (16, 20))
+        return width, height
+    box = _BOX.search(file.text)
+    sides = box.groups() if box else [_side(file.text, name) for name in ("width", "height")]
+    numbers = [float(side) for side in sides if side and re.fullmatch(r"\d+\.?\d*|\.\d+", side)]
+    return (numbers[0], numbers[1]) if len(numbers) == 2 and min(numbers) > 0 else None
+
+
+def _side(svg: str, name: str) -> str | None:
+    found = re.search(_SIDE.format(name), svg)
+    return found and found[1]

@@ -1,0 +1,129 @@
+"""The table `[theme]` of course.toml: logo, icons, accent, style sheets, fonts.
+
+Entry points: `ThemeTable`; `theme`, the value of it, its files not read yet; `check_contrast`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, TypeAlias
+
+from msgspec import Meta, Struct
+
+from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, LEAST, contrast, legible
+from coursebuild.core.model.theme import Accent, FontFamily, Theme, ThemeFile
+from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+
+_PATH = r"^theme(/[\w-][\w.-]*)+\.{}$"
+Picture: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=_PATH.format("(svg|png)"),
+        extra={"expects": "an SVG or PNG in `theme/`, as in `theme/logo.svg`"},
+    ),
+]
+Png: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=_PATH.format("png"),
+        extra={"expects": "a PNG in `theme/`, as in `theme/icon.png`"},
+    ),
+]
+StyleSheet: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=_PATH.format("css"),
+        extra={"expects": "a style sheet in `theme/`, as in `theme/style.css`"},
+    ),
+]
+Font: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=_PATH.format("(ttf|otf|woff2?)"),
+        extra={"expects": "a font in `theme/`, as in `theme/Vollkorn.ttf`"},
+    ),
+]
+Licence: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=_PATH.format("(txt|md)"),
+        extra={"expects": "a text in `theme/`, as in `theme/OFL.txt`"},
+    ),
+]
+Colour: TypeAlias = Annotated[
+    str,
+    Meta(pattern="^#[0-9A-Fa-f]{6}$", extra={"expects": "a colour as in `#17487a`"}),
+]
+
+
+class FontTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A typeface of the course's own."""
+
+    use: Annotated[Literal["text", "interface", "code"], Meta(description="what is set in it")]
+    files: Annotated[tuple[Font, ...], Meta(min_length=1, description="its styles, upright first")]
+    licence: Annotated[Licence, Meta(description="by which it may be published")]
+
+
+class ThemeTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """The face of the site."""
+
+    logo: Annotated[Picture | None, Meta(description="beside the title of every page")] = None
+    logo_dark: Annotated[Picture | None, Meta(description="the same on dark pages")] = None
+    icon: Annotated[Picture | None, Meta(description="of the browser's tab, square")] = None
+    touch_icon: Annotated[
+        Png | None, Meta(description="of an installed course, square; 512 pixels are enough")
+    ] = None
+    accent: Annotated[Colour | None, Meta(description="of links and buttons")] = None
+    accent_dark: Annotated[
+        Colour | None, Meta(description="the same on dark pages; without it, a lighter `accent`")
+    ] = None
+    css: Annotated[tuple[StyleSheet, ...], Meta(description="read after the tool's own")] = ()
+    font: tuple[FontTable, ...] = ()
+
+
+def theme(node: Node | None, fields: ThemeTable | None) -> Theme:
+    """What the table says."""
+    if fields is None or not isinstance(node, ObjectNode):
+        return Theme()
+
+    def file(name: str, path: str | None) -> ThemeFile | None:
+        return None if path is None else ThemeFile(path, node.place(name))
+
+    def accent(name: str, colour: str | None) -> Accent | None:
+        return None if colour is None else Accent(colour.lower(), node.place(name))
+
+    return Theme(
+        logo=file("logo", fields.logo),
+        logo_dark=file("logo_dark", fields.logo_dark),
+        icon=file("icon", fields.icon),
+        touch_icon=file("touch_icon", fields.touch_icon),
+        accent=accent("accent", fields.accent),
+        accent_dark=accent("accent_dark", fields.accent_dark),
+        css=_files(node, "css", fields.css),
+        fonts=tuple(
+            FontFamily(
+                font.use,
+                _files(table, "files", font.files),
+                ThemeFile(font.licence, table.place("licence")),
+            )
+            for table, font in zip(node.objects("font"), fields.font, strict=True)
+        ),
+    )
+
+
+def check_contrast(theme: Theme) -> Iterator[Diagnostic]:
+    """Warnings of accents that cannot be read on the grounds of a page."""
+    schemes = ((theme.accent, GROUNDS_LIGHT, "light"), (theme.accent_dark, GROUNDS_DARK, "dark"))
+    for accent, grounds, scheme in schemes:
+        if accent is not None and (ratio := contrast(accent.colour, grounds)) < LEAST:
+            message = f"on {scheme} pages `{accent.colour}` has a contrast of {ratio:.2f} : 1"
+            near = legible(accent.colour, grounds)
+            help = f"text needs {LEAST} : 1; the nearest colour that has it is `{near}`"
+            yield diagnose("theme-contrast", accent.span, message, help=help)
+
+
+def _files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[ThemeFile, ...]:
+    array = node.get(name)
+    items = array.items if isinstance(array, ArrayNode) else ()
+    return tuple(ThemeFile(path, item.span) for path, item in zip(paths, items, strict=True))

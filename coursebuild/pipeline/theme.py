@@ -1,0 +1,156 @@
+"""The files of a course's theme: read, and checked.
+
+Entry points: `load_theme`; `copied_template`, a template as a course begins with it; `told`, what
+to say of one that fails.
+
+A copied template names in its first line the text that it was copied from, by some digits of its
+hash. Where the tool has another text by now, the author hears of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from coursebuild import __version__
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.read import read_bytes, read_folder
+from coursebuild.core.files.resources import template_texts
+from coursebuild.core.model import Course
+from coursebuild.core.model.theme import TEMPLATES, Theme, ThemeFile
+from coursebuild.core.pages.font_files import course_face
+from coursebuild.core.pages.templates import TemplateFailure, template_mistake
+from coursebuild.core.pages.theme import picture_size
+from coursebuild.core.scripts.figures import drawn_file
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.source import Source
+
+_ORIGIN = re.compile(r"\{# Copied from coursebuild (\S+): (\w+)")
+_LOADS = re.compile(r"""@import[^;]*|url\(\s*["']?(?!#|data:|["'\s])[^()]*\)""", re.IGNORECASE)
+"""What in a style sheet asks for another file."""
+
+
+def load_theme(root: Path, theme: Theme) -> Parsed[Theme]:
+    """The theme with what its files hold, and what is wrong with them."""
+    wrong: list[Diagnostic] = []
+
+    def read(file: ThemeFile | None) -> ThemeFile | None:
+        if file is None:
+            return None
+        try:
+            return replace(file, data=read_bytes(root, file.path))
+        except EffectError as error:
+            wrong.append(diagnose("theme-file", file.span, error.message))
+            return None
+
+    def all_read(files: tuple[ThemeFile, ...]) -> tuple[ThemeFile, ...]:
+        return tuple(found for file in files if (found := read(file)) is not None)
+
+    templates = read_folder(root, TEMPLATES.rstrip("/"))
+    whole = replace(
+        theme,
+        logo=read(theme.logo),
+        logo_dark=read(theme.logo_dark),
+        icon=read(theme.icon),
+        touch_icon=read(theme.touch_icon),
+        css=all_read(theme.css),
+        fonts=tuple(
+            replace(
+                family,
+                files=all_read(family.files),
+                licence=read(family.licence) or family.licence,
+            )
+            for family in theme.fonts
+        ),
+        templates=templates.value,
+    )
+    found = (*wrong, *templates.diagnostics, *_check_files(whole), *_check_templates(whole))
+    return Parsed(whole, found)
+
+
+def _check_files(theme: Theme) -> Iterator[Diagnostic]:
+    for file in theme.pictures:
+        drawn = drawn_file(file.path, file.data)
+        if isinstance(drawn, str):
+            yield diagnose("theme-file", file.span, f"`{file.path}` {drawn}")
+        elif file in (theme.icon, theme.touch_icon):
+            width, height = picture_size(file) or (1, 1)
+            if width != height:
+                message = f"`{file.path}` is not square: {width:g} × {height:g}"
+                yield diagnose("theme-file", file.span, message)
+    for file in theme.css:
+        loads = _LOADS.search(re.sub(r"/\*.*?\*/", "", file.text, flags=re.DOTALL))
+        if loads is not None:
+            message = f"`{file.path}` loads another file: `{loads[0].strip()}`"
+            help = "name style sheets in `css`, and write pictures into them, as `url(data:…)`"
+            yield diagnose("theme-file", file.span, message, help=help)
+    for family in theme.fonts:
+        for file in family.files:
+            face = course_face(family.use, file.path.rpartition("/")[2], file.data)
+            if isinstance(face, str):
+                yield diagnose("theme-file", file.span, f"`{file.path}` {face}")
+
+
+# --- templates
+
+
+def _originals() -> dict[str, str]:
+    """The templates of the tool, by name."""
+    return {name: text for name, text in template_texts() if name.endswith(".html")}
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def copied_template(name: str) -> str | None:
+    """The template of a name as a course begins with it; `None` where there is none."""
+    text = _originals().get(name)
+    if text is None:
+        return None
+    return f"{{# Copied from coursebuild {__version__}: {_digest(text)} #}}\n{text}"
+
+
+def template_names() -> tuple[str, ...]:
+    """The names of all templates."""
+    return tuple(_originals())
+
+
+def _check_templates(theme: Theme) -> Iterator[Diagnostic]:
+    originals = _originals() if theme.templates else {}
+    for source in theme.templates:
+        name = source.path.removeprefix(TEMPLATES)
+        if name not in originals:
+            message, help = f"coursebuild has no template `{name}`", did_you_mean(name, originals)
+            yield diagnose("template-unknown", source.span(0, 0), message, help=help)
+            continue
+        mistake = template_mistake(source.text)
+        if mistake is not None:
+            yield _broken(source, *mistake)
+        first = source.text.partition("\n")[0]
+        origin, now = _ORIGIN.match(first), _digest(originals[name])
+        if origin is None or origin[2] != now:
+            message = f"`{name}` of coursebuild has changed since it was copied"
+            if origin is None:
+                message = f"it is not said which `{name}` of coursebuild this was copied from"
+            help = (
+                f"`coursebuild new template {name} --print` gives it, and a first line to take over"
+            )
+            yield diagnose("template-outdated", source.span(0, len(first)), message, help=help)
+
+
+def told(course: Course, failure: TemplateFailure) -> Diagnostic:
+    """What to tell of a template that failed while a page was drawn."""
+    sources = {source.path: source for source in course.theme.templates}
+    return _broken(sources[failure.path], failure.line, failure.message)
+
+
+def _broken(source: Source, line: int, message: str) -> Diagnostic:
+    """That a template is wrong at a line."""
+    start = source.line_starts[min(line, len(source.line_starts)) - 1]
+    span = source.span(start, start + len(source.line_text(line).rstrip()))
+    return diagnose("template-broken", span, message[:1].lower() + message[1:].rstrip("."))
