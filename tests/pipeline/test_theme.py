@@ -34,7 +34,7 @@ def course(tmp_path: Path, stores: Path) -> Folder:
     picture = io.BytesIO()
     Image.new("RGB", (64, 64)).save(picture, "PNG")
     folder = Folder(tmp_path / "course")
-    (course_map,) = (fence for fence in fences(DOCS / "how-to/theme.md") if fence.is_("map"))
+    (course_map,) = (fence for fence in fences(DOCS / "how-to/theme.md") if fence.kind == "toml")
     folder.write(MAP, course_map.text)
     folder.write("content/lessons/1.1-pendulum.md", "## Swing\n\n*It* swings: θ, ж.\n")
     for name, part in (("logo", "h40"), ("logo-dark", "v9")):
