@@ -8,7 +8,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.growth import processor_time_growth
 from support.lab_lessons import Make
-from support.scratch_course import GOOD
+from support.scratch_course import GOOD, block
 
 MAP = "content/course.toml"
 
@@ -23,6 +23,15 @@ def test_a_line_of_megabytes_is_told_and_not_read(make: Make) -> None:
     folder.write(folder.lesson(2), GOOD.replace("hello.py", "again.py") + "a *b* " * 50_000)
     folder.write(MAP, folder.text(MAP) + "\n[limits]\ntext = 400_000\n")
     assert folder.main("check").status == 0
+
+
+def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
+    folder = make("## A\n\n" + block("big.py", "print(len(bytearray(300 << 20)))\n", "314572800"))
+    assert folder.main("check").status == 0
+    folder.write(MAP, folder.text(MAP) + "\n[limits]\nscripts = 256\n")
+    done = folder.main("check")
+    assert done.status == 1
+    assert "error[script-failed]" in done.out and "MemoryError" in done.out
 
 
 @pytest.mark.parametrize("piece", ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `"])

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model import Comparison, Recording
+from coursebuild.core.model import Comparison, Limits, Recording
 from coursebuild.core.text.source import Span
 
 
@@ -55,6 +55,8 @@ class ScriptJob(Struct, frozen=True):
     """Folders of the project that it may write into."""
     figures: tuple[str, ...] = ()
     """Names of the files that it draws."""
+    memory: int = Limits().scripts
+    """MiB that it may take, where the system can see to that."""
 
 
 class Sign(enum.Enum):

@@ -21,6 +21,7 @@ from typing import assert_never
 from msgspec import Struct
 
 from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
+from coursebuild.core.model import Limits
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 
 VERSION = "6"
@@ -98,6 +99,8 @@ def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) 
         more.append(("folders that it may write into", " ".join(job.writes)))
     if job.figures:
         more.append(("figures that it draws", " ".join(job.figures)))
+    if job.memory != Limits().scripts:
+        more.append(("MiB that it may take", str(job.memory)))
     if job.perturbation:
         more.append((_PERTURBATION, str(job.perturbation)))
     around = tuple(sorted((*around, *more)))

@@ -279,6 +279,7 @@ class _Work:
             "writes": [f"{self.root}/{folder}" for folder in job.writes],
             "figures": list(job.figures),
             "perturbation": job.perturbation,
+            "memory": job.memory,
         }
         return json.dumps(request).encode()
 

@@ -60,6 +60,8 @@ class Job(TypedDict):
     """Folders of the project that the script may write into."""
     figures: list[str]
     """Names of files that it draws, in its working directory."""
+    memory: int
+    """MiB that it may take."""
     perturbation: int
     """The direction in which initial states are moved (`initial_state_perturbation`); 0: none;
     −1: steps are halved (`half_steps`)."""

@@ -247,6 +247,9 @@ class _Supervisor:
             interrupt = number == signal.SIGINT
             signal.signal(number, signal.default_int_handler if interrupt else signal.SIG_DFL)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file in the project
+        memory, (_, most) = job["memory"] << 20, resource.getrlimit(resource.RLIMIT_DATA)
+        if most == resource.RLIM_INFINITY or most > memory:
+            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
         os.chdir(job["root"])
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Document, Lesson, Page, Script, document_scripts
+from coursebuild.core.model import Course, Document, Lesson, Limits, Page, Script, document_scripts
 from coursebuild.core.model.results import ScriptJob
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Span
@@ -27,6 +27,7 @@ class Extraction(Struct, frozen=True):
     """The id of the lesson or page that it stands in."""
     packages: tuple[str, ...] = ()
     environment: tuple[tuple[str, str], ...] = ()
+    memory: int = Limits().scripts
 
     @property
     def path(self) -> str:
@@ -75,7 +76,9 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     packages = tuple(package.path for package in course.packages)
     for owner, document in owners(course):
         for script in document_scripts(document):
-            extraction = Extraction(script, owner, packages, course.environment)
+            extraction = Extraction(
+                script, owner, packages, course.environment, course.limits.scripts
+            )
             key = _key(script.path)
             clash = _clash(extraction, files, folders)
             if clash is None:
@@ -107,6 +110,7 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
             each.environment,
             each.script.writes,
             tuple(figure.name for figure in each.script.figures),
+            each.memory,
         )
         for each in extractions
     )
