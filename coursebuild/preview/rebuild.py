@@ -19,7 +19,8 @@ import functools
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from msgspec.structs import replace
@@ -27,9 +28,9 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import ScriptRun, Verdict
+from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.memory import Memory
-from coursebuild.core.run.runner import RunStoppedError, ScriptServer
+from coursebuild.core.run.runner import Finished, RunAll, RunStoppedError, ScriptServer, Started
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -195,10 +196,36 @@ class BackgroundRebuild:
             raise
         self._options.store.fresh = False  # what was made anew once holds from now on
         session.take_results(course, verified)
-        self._run_again(scripts, verified.results.verdicts)
+        self._run_again(scripts, session.drifted(verified.results.runs))
 
-    def _run_all(self, scripts: Sequence[Extraction]) -> Callable[..., tuple[ScriptRun, ...]]:
-        """What runs scripts, until one that runs is another by now: nobody waits for its output."""
+    def _run_all(self, scripts: Sequence[Extraction]) -> RunAll:
+        """What runs scripts, and shows what each prints as soon as it has ended."""
+        begun = {extraction.path: extraction for extraction in scripts}
+        session, serve = self._session, self._run_unless_edited(scripts)
+
+        def run_all(
+            root: Path,
+            todo: Sequence[ScriptJob],
+            *,
+            parallel: int,
+            started: Started,
+            finished: Finished,
+        ) -> tuple[ScriptRun, ...]:
+            def ended(run: ScriptRun) -> None:
+                finished(run)
+                session.take_run(begun[run.path], run)
+
+            runs = serve(root, todo, parallel=parallel, started=started, finished=ended)
+            # Whoever sees a new output need not wait for labs as well to accept it.
+            drifted = session.drifted(runs)
+            left = [job for job in todo if job.path in drifted]
+            session.take_second_runs(serve(root, left, parallel=parallel))
+            return runs
+
+        return run_all
+
+    def _run_unless_edited(self, scripts: Sequence[Extraction]) -> RunAll:
+        """What runs scripts until one that runs is another by now: nobody waits for its output."""
         begun = {extraction.path: extraction for extraction in scripts}
         session, edits = self._session, self._seen
 
@@ -213,15 +240,14 @@ class BackgroundRebuild:
 
         return functools.partial(self._server.run, unwanted=unwanted)
 
-    def _run_again(self, scripts: Sequence[Extraction], verdicts: Sequence[Verdict]) -> None:
-        """Run those that drifted once more."""
+    def _run_again(self, scripts: Sequence[Extraction], drifted: Collection[str]) -> None:
+        """Run those that drifted once more, where what they did was remembered."""
         session, options = self._session, self._options
-        drifted = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
         unsure = [e for e in scripts if e.path in drifted and session.printed_again(e.path) is None]
         if unsure:
             self._busy("running scripts again")
             memory = Memory(options.root, options.store, fresh=True)
-            served = replace(options, run_all=self._run_all(scripts))
+            served = replace(options, run_all=self._run_unless_edited(scripts))
             try:
                 again = run(unsure, served, self._progress, "running scripts again", memory)
             except RunStoppedError:

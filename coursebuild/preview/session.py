@@ -13,7 +13,7 @@ Entry point: `Session`.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Generic, TypeVar
 
 from msgspec.structs import replace
@@ -288,6 +288,22 @@ class Session:
             if self.course is not None:
                 self._show(self.course)
             self.tell()
+
+    def take_run(self, script: Extraction, run: ScriptRun) -> None:
+        """Show what one script did, while others run."""
+        with self.changed:
+            others = (other for other in self._results.runs if other.path != run.path)
+            self._results = replace(self._results, runs=(*others, run))
+            self._ran[run.path] = script
+            if self.course is not None:
+                self._show(self.course)
+            self.tell()
+
+    def drifted(self, runs: Sequence[ScriptRun]) -> set[str]:
+        """The scripts of these that print something else than is recorded."""
+        with self.changed:
+            verdicts = () if self.course is None else compare(self.course, runs)
+        return {v.recording.script or "" for v in verdicts if v.status == "drift"}
 
     def known_runs(self, scripts: Iterable[Extraction]) -> dict[str, ScriptRun]:
         """What these scripts did, by path; nothing where one of them is another than it was."""

@@ -126,6 +126,7 @@ def test_what_cannot_be_recorded_is_not_offered(make: Make) -> None:
         (output, _) = events.news["outputs"]
         assert output["offer"] is None
         assert output["refused"] == "two runs of the script printed different lines"
+        events.until(lambda told: bool(told.news["numbers"]))
         (number,) = events.news["numbers"]
         assert (number["better"], number["offer"]) == ("", None)
         assert number["label"] == "the nearest printed value is 1.975"

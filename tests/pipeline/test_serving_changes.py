@@ -259,6 +259,23 @@ def test_script_that_was_changed_is_not_waited_for(make: Make) -> None:
         assert folder.read("begun") == b"xxx"
 
 
+def test_what_a_script_prints_is_shown_while_others_run(make: Make) -> None:
+    reads = "print(open('models/ball.xml').read().count('geom'))"
+    waits = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)\n"
+    folder = make("## A\n\n" + block("a.py", reads, "1") + block("b.py", waits + reads, "1"))
+    folder.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    folder.write("go", "")
+    with serving(folder, "--jobs", "2") as preview, preview.events() as events:
+        events.settled()
+        (folder.root / "go").unlink()
+        folder.replace("models/ball.xml", "<geom size='1'/>", "<geom size='1'/><geom size='2'/>")
+        events.until(lambda told: told.news["outputs"][0]["state"] == "drift")
+        assert events.news["outputs"][1]["state"] == "verified"  # as far as is known
+        folder.write("go", "")
+        events.settled("output-drift", "output-drift")
+        assert all(output["offer"] for output in events.news["outputs"])
+
+
 def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
     folder = make(GOOD + "[gone](lesson:7.7)\n")
     good = folder.read("content/course.toml")
