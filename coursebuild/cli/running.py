@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import resource
 
 from coursebuild.cli.commands import run_command
 from coursebuild.cli.interrupts import Terminated, heeded
@@ -16,6 +17,10 @@ from coursebuild.core.files.errors import EffectError, PublishRefusedError, Usag
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+
+_FILES = 64
+"""Pipes of processes, the store, event loops, what scripts open."""
 
 
 def run(directory: str | None, words: Sequence[str], *, alone: bool) -> int:
@@ -38,6 +43,10 @@ def run(directory: str | None, words: Sequence[str], *, alone: bool) -> int:
 
 
 def _run(directory: str | None, words: Sequence[str]) -> int:
+    files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if files < _FILES:
+        message = f"only {files} files may be open at a time, and {_FILES} are needed"
+        return fail(WRONG, message, f"`ulimit -n {4 * _FILES}` raises the limit")
     try:
         return run_command(directory, words)
     except UsageError as error:

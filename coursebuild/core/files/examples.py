@@ -205,9 +205,11 @@ class _Update:
             write_atomic(
                 self.root, path, self.wanted[path], expected=self.current[path], durable=False
             )
-        except FileChangedError:  # somebody saved it since we looked
-            self.written.remove(path)
-            self._block(path, Obstacle.EDITED, (self.root / path).read_bytes())
+        except FileChangedError:  # somebody saved it since we looked, maybe another run of the tool
+            now = self._look(path)[1]
+            if now != self.wanted[path]:
+                self.written.remove(path)
+                self._block(path, Obstacle.EDITED, now)
 
     def _remove(self, path: str) -> None:
         full = self.root / path
@@ -292,9 +294,14 @@ def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:
         json.dumps({"version": 1, "files": files}, indent=1, ensure_ascii=False) + "\n"
     ).encode()
     path = root / MANIFEST
-    try:
-        current: bytes | None = path.read_bytes()
-    except FileNotFoundError:
-        current = None
-    if current != data:
-        write_atomic(root, MANIFEST, data, expected=current, durable=False)
+    while True:
+        try:
+            current: bytes | None = path.read_bytes()
+        except FileNotFoundError:
+            current = None
+        if current == data:
+            return
+        # Where there are no locks, another run may write it too.
+        with contextlib.suppress(FileChangedError):
+            write_atomic(root, MANIFEST, data, expected=current, durable=False)
+            return

@@ -23,6 +23,7 @@ import time
 from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.run.runner import clean_environment
 
 MEMORY = 1024
@@ -52,7 +53,8 @@ class JsonChild:
         self._script = script
         self._seconds = seconds
         self._patience = patience
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._life = contextlib.ExitStack()
+        self._folder = ""
         self._process: subprocess.Popen[bytes] | None = None
         self._interrupted = False
         self._buffer = b""
@@ -62,9 +64,8 @@ class JsonChild:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        if self._folder is not None:
-            self._folder.cleanup()
-            self._folder = None
+        self._life.close()
+        self._folder = ""
 
     def ask(self, request: Any) -> Any:
         """The child's answer; `None` if it died, or said nothing for too long.
@@ -114,12 +115,11 @@ class JsonChild:
         return f"ended with status {status}"
 
     def _start(self) -> subprocess.Popen[bytes]:
-        if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="coursebuild-")
+        self._folder = self._folder or self._life.enter_context(temporary_folder())
         with tempfile.TemporaryFile() as errors:
             self._process = process = subprocess.Popen(
                 [self._python, "-E", "-P", self._script],
-                cwd=self._folder.name,
+                cwd=self._folder,
                 env=clean_environment(os.environ),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,

@@ -20,12 +20,11 @@ import os
 import selectors
 import signal
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
 
-from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import supervisor
 from coursebuild.core.run.notes import read_notes
@@ -138,8 +137,14 @@ class ScriptServer:
         work = _Work(root.resolve(), jobs, started, finished, self._place)
         if not work.waiting:
             return work.results()
+        with temporary_folder() as work.scratch:
+            self._run(work, parallel, unwanted)
+        return work.results()
+
+    def _run(
+        self, work: _Work, parallel: int, unwanted: Callable[[frozenset[str]], bool] | None
+    ) -> None:
         busy: set[Worker] = set()
-        work.scratch = _scratch()
         log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
@@ -160,7 +165,6 @@ class ScriptServer:
             if not had_log:
                 with contextlib.suppress(OSError):
                     log.unlink()
-        return work.results()
 
     def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
         worker = self._worker(work.environment)
@@ -343,11 +347,3 @@ def _lost(path: str, status: int) -> ScriptRun:
     name = signal.Signals(-status).name
     text = f"the process that supervises this script was ended by {name}\n"
     return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)
-
-
-def _scratch() -> str:
-    """A folder for the scripts' temporary folders."""
-    try:
-        return tempfile.mkdtemp(prefix="coursebuild-")
-    except OSError as error:
-        raise EffectError(f"there is no place for temporary files: {reason(error)}") from None

@@ -18,6 +18,7 @@ import atexit
 import contextlib
 import json
 import re
+import resource
 import threading
 import time
 from collections.abc import Coroutine, Iterator, Sequence
@@ -42,6 +43,8 @@ a fifth less without; the code of labs runs as fast with the other. That one com
 after 2,000 calls: as early as V8 does by itself, it took a quarter of the time of typesetting."""
 _MEMORY = 128 << 20
 """Bytes of JavaScript objects."""
+_ADDRESSES = 1 << 40
+"""Bytes of addresses with which V8 starts for certain; it reserves most of them and uses few."""
 _START_SECONDS = 20.0
 _BATCH = 100
 """Formulas at a time; one takes about 0.3 ms."""
@@ -73,8 +76,15 @@ def start() -> None:
     """Start V8, where it does not run yet; no thread begins, and copies of this process share it.
 
     Raises:
-        EffectError: it is not there.
+        EffectError: it is not there, or would end this process: it reserves addresses, which a
+            limit on them forbids.
     """
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < _ADDRESSES:
+        raise EffectError(
+            f"V8 needs more than the {limit >> 30} GiB of addresses that this process may have",
+            help="`ulimit -v unlimited` takes the limit away; it reserves addresses, not memory",
+        )
     try:
         from py_mini_racer import LibNotFoundError, init_mini_racer
 

@@ -219,6 +219,24 @@ def test_saved_while_we_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert (tmp_path / B[0]).read_bytes() == b"mine too\n"
 
 
+def test_two_runs_at_once_write_the_same(tmp_path: Path) -> None:
+    """As they do where a file system has no locks: nobody edited anything."""
+    other: list[ExamplesReport] = []
+
+    class Scripts(dict[str, bytes]):
+        asked = 0
+
+        def __getitem__(self, path: str) -> bytes:
+            self.asked += 1
+            if self.asked == 3:  # both files were looked at, and the first is about to be written
+                other.append(write_examples(tmp_path, [A, B]))
+            return super().__getitem__(path)
+
+    report = write_examples(tmp_path, Scripts([A, B]))
+    assert [summary(one) for one in (report, *other)] == [((A[0], B[0]), (), (), ())] * 2
+    assert summary(write_examples(tmp_path, [A, B])) == ((), (A[0], B[0]), (), ())
+
+
 def test_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_examples(tmp_path, [A])
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from msgspec.structs import replace
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
+from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model import Course, FeatureBlock, document_blocks
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.scripts.extract import extract
@@ -147,7 +147,7 @@ class Reruns:
             self._before = self._users()
         if not self._before:
             return ""
-        with tempfile.TemporaryDirectory(prefix="coursebuild-diet-") as folder:
+        with temporary_folder() as folder:
             root = Path(folder).resolve()
             self._copy(root)
             for path, data in files.items():
