@@ -18,12 +18,11 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import mjcf_texts
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.run.environments import environment, latest_version, other_version
-from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.against import RunStanding, is_comparable, judgement, run_standings
@@ -57,6 +56,11 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
     with project_lock(options.root, progress.say):
         loaded = load(options.root)
         course = loaded.course
+        if course is not None and course.python is not None:
+            raise UsageError(
+                f"--against: scripts of this course run with {course.python.path}; to try another "
+                "version, install it in a second environment and name that in the map"
+            )
         if course is None:
             wrong = next(d for d in loaded.diagnostics if d.severity is Severity.ERROR)
             raise EffectError(
@@ -155,10 +159,10 @@ class _Work(Struct):
         """How the scripts do there, by path."""
         from coursebuild.core.run.runner import ScriptServer
 
-        options = self.options
-        memory = Memory(options.root, options.store, fresh=fresh, place=place)
-        with ScriptServer(place=place) as server:
-            served = replace(options, run_all=server.run)
+        there = replace(self.options, place=place)
+        memory = there.memory(fresh=fresh)
+        with ScriptServer() as server:
+            served = replace(there, run_all=server.run)
             runs = run(scripts, served, self.progress, stage, memory)
         return run_standings(self.course, self.here, runs)
 

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.registry import feature_trials, unproven
+from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports import Reports
@@ -83,6 +84,8 @@ class CheckedCourse(Struct, frozen=True):
     verified: Verified | None = None
     reports: Reports = Reports()
     """Those that pages may show."""
+    place: OtherEnvironment | None = None
+    """Where the scripts ran, if not here."""
 
     @property
     def is_sound(self) -> bool:
@@ -105,7 +108,7 @@ class CheckedCourse(Struct, frozen=True):
             documents=chosen.documents,
             labs=verified.labs,
         )
-        return replace(report, depends=depends_on(course, verified.results))
+        return replace(report, depends=depends_on(course, verified.results, self.place))
 
 
 def read_and_verify(
@@ -127,10 +130,11 @@ def read_and_verify(
     if course is None:
         return CheckedCourse(began, loaded.diagnostics, Selection((), (), None))
     chosen = select(course, names, options.root)
+    options = options.for_course(course)
     verified = verify(course, options, progress, chosen.documents, static=static, shard=shard)
     reports = shown_reports(options.root, course)
     found = (*loaded.diagnostics, *verified.diagnostics, *reports.diagnostics)
-    return CheckedCourse(began, found, chosen, course, verified, reports.value)
+    return CheckedCourse(began, found, chosen, course, verified, reports.value, options.place)
 
 
 def _sensitivity(
@@ -143,7 +147,8 @@ def _sensitivity(
     by_path = {run.path: run for run in verified.results.runs}
     ran = [extraction for extraction in extract(course).value if extraction.path in by_path]
     runs = [by_path[extraction.path] for extraction in ran]
-    measured = measure(course, options, progress, ran, runs, chosen.documents, halve=True)
+    own = options.for_course(course)
+    measured = measure(course, own, progress, ran, runs, chosen.documents, halve=True)
     return measured, [warning for one in measured for warning in noise(one)]
 
 

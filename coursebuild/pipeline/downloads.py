@@ -23,6 +23,7 @@ from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.dark import dark_colours, dark_drawing
 from coursebuild.core.pages.library import Library
+from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.packages import distributions, module_files
 from coursebuild.core.text.source import text_digest
 from coursebuild.pipeline.documents import Documents
@@ -98,7 +99,9 @@ def _surroundings(
     style = tuple(OutputFile(path.name, path.read_bytes()) for path in root.glob("matplotlibrc"))
     around = zips.Surroundings((), ours, meshes, style, imports)
     modules = zips.imported_modules(library.course, around)
-    packages = tuple(zips.Package(*p) for p in distributions(store, modules))
+    place = course_environment(root, library.course).value
+    installed = distributions(store, modules, None if place is None else place.packages)
+    packages = tuple(zips.Package(*one) for one in installed)
     return replace(around, packages=packages)
 
 

@@ -33,7 +33,6 @@ from coursebuild.core.run.dependencies import (
     sought_files,
     state_changes,
 )
-from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.mjcf import parts
 from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
@@ -58,7 +57,7 @@ class _Explainer:
     def __init__(self, course: Course, options: Options) -> None:
         self.course = course
         self.root = options.root
-        self.memory = Memory(options.root, options.store)
+        self.memory = options.for_course(course).memory()
         self.models = {
             model.source.path: parts(options.root, model.source.path, model.source.text)
             for model in course.models

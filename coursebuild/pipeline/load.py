@@ -34,6 +34,8 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.theme import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.run.interpreter import course_environment
+from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.source_parts import check_source_parts
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
@@ -153,7 +155,10 @@ class _Loader:
             theme=theme,
         )
         self.found += self.parser.check(course)
-        self.found += _check_engine(course)
+        environment = course_environment(self.root, course)
+        self.found += environment.diagnostics
+        if course.python is None or environment.value is not None:
+            self.found += _check_engine(course, environment.value)
         self.found += check_source_parts(course, self._text)
         for package in course.packages:
             if not (self.root / package.path).is_dir():
@@ -308,10 +313,12 @@ class _Loader:
         return tuple(path for path in self.files.files if path not in taken)
 
 
-def _check_engine(course: Course) -> list[Diagnostic]:
-    installed = engine_version()
+def _check_engine(course: Course, place: OtherEnvironment | None) -> list[Diagnostic]:
+    installed = engine_version() if place is None else place.engine
     if course.engine is None or course.engine_span is None or course.engine == installed:
         return []
+    where = "" if course.python is None else f" for `{course.python.path}`"
     message = f"the course is written for MuJoCo {course.engine}, and {installed} is installed"
+    message += where
     help = "install that version, or bring the outputs up to date and change `engine`"
     return [diagnose("engine-version", course.engine_span, message, help=help)]

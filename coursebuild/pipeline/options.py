@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import SIZE, Memo
 from coursebuild.core.files.changes import undo_changes
@@ -19,10 +20,13 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
 from coursebuild.core.model import Course, Lesson, Page, Status
+from coursebuild.core.run.interpreter import course_environment
+from coursebuild.core.run.memory import Memory
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
 
 if TYPE_CHECKING:
     from coursebuild.core.run.runner import RunAll
+    from coursebuild.core.run.surroundings import OtherEnvironment
 
 
 class Options(Struct, frozen=True):
@@ -41,11 +45,21 @@ class Options(Struct, frozen=True):
     """Whether it is said of each script why it runs."""
     run_all: RunAll | None = None
     """What runs scripts, where it is not `run_scripts`: a server stays warm from run to run."""
+    place: OtherEnvironment | None = None
+    """Where scripts run, where that is not here; see `for_course`."""
 
     @property
     def store(self) -> Memo:
         """Where results are kept."""
         return Memo(self.root) if self.cache is None else self.cache
+
+    def for_course(self, course: Course) -> Options:
+        """With the environment that the map names for scripts, as far as they can run there."""
+        return replace(self, place=course_environment(self.root, course).value)
+
+    def memory(self, *, fresh: bool = False) -> Memory:
+        """What is remembered of scripts; `fresh`: all are to run again."""
+        return Memory(self.root, self.store, fresh=fresh, place=self.place)
 
 
 def find_course(directory: str | None) -> Path:

@@ -33,7 +33,7 @@ class ExtractedScripts(Struct, frozen=True):
 
     all: tuple[Extraction, ...]
     runnable: tuple[Extraction, ...]
-    """Those whose file is what the lesson says."""
+    """Those whose file is what the lesson says; none where their interpreter is missing."""
     diagnostics: tuple[Diagnostic, ...]
     written: tuple[str, ...]
     removed: tuple[str, ...]
@@ -56,7 +56,8 @@ def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     by_path = {e.path: e for e in parsed.value}
     blocked = {example.path for example in report.blocked}
     found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
-    runnable = tuple(e for e in parsed.value if e.path not in blocked)
+    can_run = course.python is None or options.place is not None
+    runnable = tuple(e for e in parsed.value if can_run and e.path not in blocked)
     return ExtractedScripts(
         parsed.value,
         runnable,
@@ -114,7 +115,7 @@ def run(
     `known`: results, by path, that hold.
     """
     chosen = tuple(chosen)
-    memory = Memory(options.root, options.store) if memory is None else memory
+    memory = options.memory() if memory is None else memory
     todo = jobs(chosen, perturbation)
     done = {**(known or {}), **recorded_runs(chosen, options)}
     inputs = {
@@ -170,6 +171,7 @@ def _run(
             parallel=options.jobs,
             started=started,
             finished=finished,
+            place=options.place,
         )
 
 

@@ -17,7 +17,6 @@ from msgspec.structs import replace
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.model.sensitivity import HALVED, RUNS, Sensitivity
-from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.sensitivity import sensitivity, worth_moving
@@ -80,7 +79,7 @@ def _runs(
     found: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
     if not scripts:
         return found
-    memory = Memory(options.root, options.store)
+    memory = options.memory()
     with ScriptServer() as server:
         served = replace(options, run_all=server.run)
         for number in numbers:

@@ -26,7 +26,6 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
-from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import apply_edits, updated_body
@@ -65,6 +64,7 @@ def _update(
     course = loaded.course
     if course is None:
         return judge(None, loaded.diagnostics, began)
+    options = options.for_course(course)
     chosen = select(course, names, options.root)
     extracted = extract_scripts(course, options)
     scripts = _with_recordings(course, chosen, extracted.runnable)
@@ -127,7 +127,7 @@ def _again(
         for extraction, one in zip(scripts, first, strict=True)
         if (not one.cached or one.path in wrong) and not extraction.script.once
     ]
-    memory = Memory(options.root, options.store, fresh=True)
+    memory = options.memory(fresh=True)
     second = run(left, options, progress, "running scripts again", memory)
     ran = {r.path: r for r in second}
     return tuple(ran.get(one.path, one) for one in first)

@@ -83,10 +83,11 @@ def verify(
     scripts do, by path, that need not be looked at.
     """
     options.store.listen(progress.say)
+    options = options.for_course(course)
     extracted = extract_scripts(course, options)
     chosen, trials = _chosen(course, extracted.runnable, documents, shard)
     models, compiled = compile_models(course, options, progress)
-    memory = Memory(options.root, options.store)
+    memory = options.memory()
     scripts = functools.partial(run, chosen, options, progress, memory=memory, known=known)
     tried: tuple[TrialResult, ...] = ()
     found = [*extracted.diagnostics, *compiled]
@@ -110,7 +111,10 @@ def verify(
     found += check_runs(course, runs)
     found += _nothing(course, () if shard is not None else runs)
     found += figure_findings(course, runs, functools.partial(read_recorded, options.root))
-    results = Results(runs, verdicts, (), models, python_version(), engine_version(), tried)
+    place = options.place
+    python = python_version() if place is None else place.version
+    engine = engine_version() if place is None else place.engine
+    results = Results(runs, verdicts, (), models, python, engine, tried)
     scripts_ran = script_lines(chosen, runs, verdicts)
     labs = tuple(trial.line for trial in tried)
     return Verified(results, tuple(found), scripts_ran, labs)
@@ -129,7 +133,7 @@ def _again(
     scripts = [e for e in chosen if e.path in drifted & quick and not e.script.once]
     if not scripts:
         return {}
-    memory = Memory(options.root, options.store, fresh=True)
+    memory = options.memory(fresh=True)
     again = run(scripts, options, progress, "running again what differs", memory)
     return {one.path: one for one in again}
 

@@ -29,8 +29,8 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.runner import Finished, RunAll, RunStoppedError, ScriptServer, Started
+from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -196,7 +196,7 @@ class BackgroundRebuild:
             raise
         self._options.store.fresh = False  # what was made anew once holds from now on
         session.take_results(course, verified)
-        self._run_again(scripts, session.drifted(verified.results.runs))
+        self._run_again(course, scripts, session.drifted(verified.results.runs))
 
     def _run_all(self, scripts: Sequence[Extraction]) -> RunAll:
         """What runs scripts, and shows what each prints as soon as it has ended."""
@@ -210,16 +210,18 @@ class BackgroundRebuild:
             parallel: int,
             started: Started,
             finished: Finished,
+            place: OtherEnvironment | None,
         ) -> tuple[ScriptRun, ...]:
             def ended(run: ScriptRun) -> None:
                 finished(run)
                 session.take_run(begun[run.path], run)
 
-            runs = serve(root, todo, parallel=parallel, started=started, finished=ended)
+            there = functools.partial(serve, root, parallel=parallel, place=place)
+            runs = there(todo, started=started, finished=ended)
             # Whoever sees a new output need not wait for labs as well to accept it.
             drifted = session.drifted(runs)
             left = [job for job in todo if job.path in drifted]
-            session.take_second_runs(serve(root, left, parallel=parallel))
+            session.take_second_runs(there(left))
             return runs
 
         return run_all
@@ -240,13 +242,15 @@ class BackgroundRebuild:
 
         return functools.partial(self._server.run, unwanted=unwanted)
 
-    def _run_again(self, scripts: Sequence[Extraction], drifted: Collection[str]) -> None:
+    def _run_again(
+        self, course: Course, scripts: Sequence[Extraction], drifted: Collection[str]
+    ) -> None:
         """Run those that drifted once more, where what they did was remembered."""
-        session, options = self._session, self._options
+        session, options = self._session, self._options.for_course(course)
         unsure = [e for e in scripts if e.path in drifted and session.printed_again(e.path) is None]
         if unsure:
             self._busy("running scripts again")
-            memory = Memory(options.root, options.store, fresh=True)
+            memory = options.memory(fresh=True)
             served = replace(options, run_all=self._run_unless_edited(scripts))
             try:
                 again = run(unsure, served, self._progress, "running scripts again", memory)

@@ -45,6 +45,8 @@ DECISIVE = (
     "NVIDIA_DRIVER_CAPABILITIES",
 )
 """Of the environment of scripts: what decides how something is drawn or computed."""
+_PACKAGES = ("site-packages", "dist-packages")
+"""What folders with installed packages are called."""
 _VARIABLES = (*DECISIVE, "PYTHONPATH", "VIRTUAL_ENV")
 
 
@@ -122,12 +124,9 @@ def _state(root: str, further: Sequence[str], began: int | None = None) -> str:
         digest.update("\0".join(map(str, (*parts, ""))).encode("utf-8", "surrogateescape") + b"\n")
 
     add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
-    for folder in sys.path:  # each package has a folder there with its version in the name
-        if folder.endswith(("site-packages", "dist-packages")) and os.path.isdir(folder):
-            status = os.stat(folder)
-            add(folder, status.st_mtime_ns, status.st_ino)
+    installed = (folder for folder in sys.path if folder.endswith(_PACKAGES))
     course = (os.path.join(root, name) for name in FOLDERS)
-    for path in (*course, *_tool(), *further):
+    for path in (*installed, *course, *_tool(), *further):
         for parts in _rows(path, began):
             add(*parts)
     return digest.hexdigest()
@@ -148,6 +147,9 @@ def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
         status = os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
         yield path, "nothing"
+        return
+    if path.endswith(_PACKAGES):  # each has a folder there with its version in the name
+        yield path, status.st_mtime_ns, status.st_ino
         return
     if not stat.S_ISDIR(status.st_mode):
         yield path, *_numbers(status, began)

@@ -115,7 +115,7 @@ class Silence(Struct, frozen=True):
 
 
 class NamedPath(Struct, frozen=True):
-    """A feature of the course's own: a Python file of the project."""
+    """A file or folder that the map names."""
 
     path: str
     span: Span
@@ -164,6 +164,8 @@ class Course(Struct, frozen=True):
     """Folders that scripts import from before all others but their own."""
     environment: tuple[tuple[str, str], ...] = ()
     """Variables of the environment of scripts, sorted."""
+    python: NamedPath | None = None
+    """The interpreter of the scripts, where it is not the one that runs this tool."""
     id: str = ""
     """Names the course where its title may change; see `key`."""
     truth: float | None = None

@@ -8,7 +8,8 @@
   `notes`, and `dependencies` of that
 - `memory`: results that are kept with these (`run_record`), and found again; `model_memory` is the
   same for compiled models
-- `surroundings`, `packages`, `versions`: what results depend on, as it is now
+- `surroundings`, `packages`, `versions`: what results depend on, as it is now; `interpreter`: where
+  scripts run, if the map names an environment for them
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
 - `child`: processes that answer

@@ -33,7 +33,7 @@ from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import make_private_folder
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.surroundings import OtherEnvironment
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.versions import engine_version, python_version
 
 _FOLDER = "environments"
 _KEPT = 4
@@ -109,7 +109,15 @@ def environment(root: Path, engine: str, say: Callable[[str], None]) -> OtherEnv
         _remove_unused(folder, prefix)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
-    return OtherEnvironment(name, f"{prefix}/bin/python", str(prefix), str(_packages(prefix)))
+    return OtherEnvironment(
+        name,
+        f"{prefix}/bin/python",
+        str(prefix),
+        sys.base_prefix,
+        python_version(),
+        engine,
+        (str(_packages(prefix)), *site_folders()),
+    )
 
 
 def _packages(prefix: Path) -> Path:

@@ -46,7 +46,7 @@ from coursebuild.core.run.dependencies import (
     sought,
     state_changes,
 )
-from coursebuild.core.run.packages import Installed, site_folders
+from coursebuild.core.run.packages import Installed
 from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, record_of, to_bytes
 from coursebuild.core.run.surroundings import OtherEnvironment, conditions, places
 
@@ -64,13 +64,9 @@ class States:
     def __init__(self, root: Path, store: Memo, place: OtherEnvironment | None = None) -> None:
         self.root = root
         self._inside = f"{str(root).rstrip('/')}/"
-        self.places = places(root, os.environ, None if place is None else place.prefix)
-        self.around = conditions(os.environ)
-        folders = None
-        if place is not None:
-            self.around = tuple(sorted((*self.around, ("environment", place.name))))
-            folders = (place.packages, *site_folders())
-        self._installed = Installed(store, folders)
+        self.places = places(root, os.environ, place)
+        self.around = conditions(os.environ, place)
+        self._installed = Installed(store, None if place is None else place.packages)
         self._known: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -106,14 +102,14 @@ class Memory:
         root: the course folder.
         store: where it is kept.
         fresh: whether all is to be run again.
-        place: another interpreter that runs them. What is noted under a script's path tells of this
-            one, and stays as it is.
+        place: another interpreter that runs them. Where it is not the course's own, what is noted
+            under a script's path stays as it is.
     """
 
     def __init__(
         self, root: Path, store: Memo, *, fresh: bool = False, place: OtherEnvironment | None = None
     ) -> None:
-        self.elsewhere = place is not None
+        self.elsewhere = place is not None and place.name != ""
         self.store = store
         self.fresh = fresh or store.fresh
         """Whether all is to be run, whatever is remembered."""

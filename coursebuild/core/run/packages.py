@@ -76,13 +76,16 @@ class Installed:
         return digest.hexdigest()[:16]
 
 
-def distributions(store: Memo, modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
+def distributions(
+    store: Memo, modules: Iterable[str], folders: Sequence[str] | None = None
+) -> tuple[tuple[str, str, str], ...]:
     """(module, distribution, version) of each top-level module that an installed package provides.
 
     Sorted by module. The standard library, `mjcourse` and what is not installed are left out.
+    `folders` are those of another interpreter's packages.
     """
     wanted = sorted(set(modules))
-    provided = _provided(store, site_folders()) if wanted else {}
+    provided = _provided(store, folders or site_folders()) if wanted else {}
     found = []
     for module in wanted:
         name, _, version = provided.get(module, "").split(", ")[0].rpartition(" ")

@@ -24,6 +24,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
 
+from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import supervisor
@@ -65,6 +66,7 @@ def run_scripts(
     parallel: int,
     started: Started = _ignore,
     finished: Finished = _ignore,
+    place: OtherEnvironment | None = None,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts; those marked `norun` are not, and nothing is told of them.
 
@@ -74,15 +76,18 @@ def run_scripts(
         parallel: how many at a time, at least 1.
         started: is called in this thread; what it raises ends the run.
         finished: likewise.
+        place: another interpreter that is to run them.
 
     Returns:
         What each did, in the order of the jobs.
 
     Raises:
-        EffectError: there is no place for temporary files.
+        EffectError: there is no place for temporary files, or the interpreter is none.
     """
     with ScriptServer() as server:
-        return server.run(root, jobs, parallel=parallel, started=started, finished=finished)
+        return server.run(
+            root, jobs, parallel=parallel, started=started, finished=finished, place=place
+        )
 
 
 class ScriptServer:
@@ -93,11 +98,9 @@ class ScriptServer:
 
     Args:
         fork: let scripts be copies of their supervisor, where they can.
-        place: another interpreter that is to run them.
     """
 
-    def __init__(self, *, fork: bool = True, place: OtherEnvironment | None = None) -> None:
-        self._place = place
+    def __init__(self, *, fork: bool = True) -> None:
         self._fork = fork and sys.platform == "linux"
         self._idle: list[Worker] = []
         """Supervisors that wait for the next run."""
@@ -125,6 +128,7 @@ class ScriptServer:
         parallel: int,
         started: Started = _ignore,
         finished: Finished = _ignore,
+        place: OtherEnvironment | None = None,
         unwanted: Callable[[frozenset[str]], bool] | None = None,
     ) -> tuple[ScriptRun, ...]:
         """As `run_scripts`; one run at a time.
@@ -134,7 +138,7 @@ class ScriptServer:
         Raises:
             RunStoppedError: it said so.
         """
-        work = _Work(root.resolve(), jobs, started, finished, self._place)
+        work = _Work(root.resolve(), jobs, started, finished, place)
         if not work.waiting:
             return work.results()
         with temporary_folder() as work.scratch:
@@ -145,6 +149,8 @@ class ScriptServer:
         self, work: _Work, parallel: int, unwanted: Callable[[frozenset[str]], bool] | None
     ) -> None:
         busy: set[Worker] = set()
+        if work.place is not None:
+            work.library = _library_alone(work.scratch)
         log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
@@ -167,7 +173,7 @@ class ScriptServer:
                     log.unlink()
 
     def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
-        worker = self._worker(work.environment)
+        worker = self._worker(work.environment, work.place)
         busy.add(worker)
         selector.register(worker, selectors.EVENT_READ, worker)
         work.next(worker)
@@ -187,9 +193,9 @@ class ScriptServer:
         if work.waiting:
             self._start(busy, selector, work)
 
-    def _worker(self, environment: Mapping[str, str]) -> Worker:
+    def _worker(self, environment: Mapping[str, str], place: OtherEnvironment | None) -> Worker:
         """A supervisor that waits for a job: one that is left, or a new one."""
-        installed = _installed(self._place)
+        installed = _installed(place)
         if installed != self._installed:
             self.close()
             self._installed = installed
@@ -199,7 +205,7 @@ class ScriptServer:
             if worker.environment == environment and worker.is_there():
                 return worker
             worker.close()
-        python = sys.executable if self._place is None else self._place.python
+        python = sys.executable if place is None else place.python
         return Worker(environment, python, fork=self._fork)
 
 
@@ -220,6 +226,7 @@ class _Work:
         self.finished = finished
         self.environment = _environment(place) | dict(jobs[0].environment if jobs else ())
         self.library = library_folder()
+        self.place = place
         self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
             i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
@@ -252,6 +259,8 @@ class _Work:
                 if worker.rested:  # it may have been as good as gone before it was given the job
                     self.waiting.insert(0, index)
                     return False
+                if self.place is not None and worker.status() > 0:
+                    raise EffectError(f"{self.place.python} cannot run scripts")
                 self._finish(index, _lost(self.jobs[index].path, worker.status()))
             return False
         if worker.job is not None and (report := worker.take_report()) is not None:
@@ -300,7 +309,7 @@ def _environment(place: OtherEnvironment | None) -> dict[str, str]:
 def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
     """The folders with packages, and when something was installed there."""
     found: list[object] = []
-    for folder in (*site_folders(), *(() if place is None else (place.packages,))):
+    for folder in (*site_folders(), *(() if place is None else place.packages)):
         with contextlib.suppress(OSError):
             found.append((folder, Path(folder).stat().st_mtime_ns))
     return tuple(found)
@@ -347,3 +356,16 @@ def _lost(path: str, status: int) -> ScriptRun:
     name = signal.Signals(-status).name
     text = f"the process that supervises this script was ended by {name}\n"
     return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)
+
+
+def _library_alone(scratch: str) -> str:
+    """A folder with `mjcourse` for another interpreter; what else is installed here is not for it.
+
+    Raises:
+        EffectError: it cannot be made.
+    """
+    try:
+        Path(scratch, "mjcourse").symlink_to(Path(library_folder(), "mjcourse"))
+    except OSError as error:
+        raise EffectError(f"a link cannot be made: {reason(error)}") from None
+    return scratch

@@ -96,8 +96,7 @@ def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
         return script
     # While the tool lives the folder is its own: another supervisor may be about to use it.
     if supervisor.scratch and has_ended(tool):
-        with contextlib.suppress(OSError):  # others still use it
-            Path(supervisor.scratch).rmdir()
+        remove_folder(supervisor.scratch)
     os._exit(int(status or 0))
 
 

@@ -55,13 +55,20 @@ class OtherEnvironment(Struct, frozen=True):
     """An interpreter and what is installed for it, where scripts run that do not run here."""
 
     name: str
-    """Other places have other names: what is remembered of one holds in no other."""
+    """Of one that the course is only compared with: what is remembered of it holds in no other, and
+    is not what the course's scripts did last. Empty for the course's own."""
     python: str
     """The interpreter's absolute path."""
     prefix: str
     """The folder that holds all of it."""
-    packages: str
-    """The folder with the packages that are installed there."""
+    base: str
+    """The folder of the Python that it was made with."""
+    version: str
+    """Of Python, such as `3.11.7`."""
+    engine: str
+    """The version of MuJoCo."""
+    packages: tuple[str, ...]
+    """The folders with the packages that are installed there."""
 
     def environment(self, clean: Mapping[str, str]) -> dict[str, str]:
         """The environment of scripts there, of the one that they have here."""
@@ -100,13 +107,18 @@ def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
 # --- what a result depends on besides the script
 
 
-def conditions(outer: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+def conditions(
+    outer: Mapping[str, str], place: OtherEnvironment | None = None
+) -> tuple[tuple[str, str], ...]:
     """By name, sorted: what has to be the same for a result to be the same.
 
-    `outer` is the environment of the tool.
+    `outer` is the environment of the tool; `place` another interpreter than the one that runs this.
     """
     told = {f"environment variable {name}": outer[name] for name in DECISIVE if name in outer}
-    told["Python"] = f"{platform.python_implementation()} {platform.python_version()}"
+    version = platform.python_version() if place is None else place.version
+    told["Python"] = f"{platform.python_implementation()} {version}"
+    if place is not None and place.name:
+        told["environment"] = place.name
     told["platform"] = f"{sys.platform} {platform.machine()} {_c_library()}".strip()
     same = json.dumps(_FIXED, sort_keys=True).encode()
     told["the fixed environment of scripts"] = hashlib.sha256(same).hexdigest()[:12]
@@ -122,17 +134,17 @@ def _c_library() -> str:
 
 
 def places(
-    root: Path, outer: Mapping[str, str], prefix: str | None = None
+    root: Path, outer: Mapping[str, str], place: OtherEnvironment | None = None
 ) -> tuple[tuple[str, str], ...]:
     """Folders of this machine whose paths may stand in what a script writes, longest first.
 
-    `prefix` is that of another interpreter than the one that runs this.
+    `place` is another interpreter than the one that runs this.
     """
     found = {
         "course": str(root),
         "library": library_folder(),
-        "prefix": prefix or sys.prefix,
-        "base": sys.base_prefix,
+        "prefix": sys.prefix if place is None else place.prefix,
+        "base": sys.base_prefix if place is None else place.base,
         "home": outer.get("HOME", ""),
     }
     return tuple(sorted(found.items(), key=lambda item: (-len(item[1]), item[0])))

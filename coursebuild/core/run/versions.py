@@ -1,12 +1,14 @@
 """The versions of what runs the scripts, found without importing any of it.
 
-Entry points: `python_version`, `engine_version`, `package_version`.
+Entry points: `python_version`, `engine_version`, `package_version`; `version_in`, for the packages
+of another interpreter.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterable
 
 from coursebuild.core.files.errors import EffectError
 
@@ -30,15 +32,15 @@ def engine_version() -> str:
     return version
 
 
-def package_version(name: str) -> str:
-    """Of an installed distribution; `none` where there is none."""
-    return _version(name) or "none"
+def package_version(name: str, folders: Iterable[str] | None = None) -> str:
+    """Of a distribution that is installed, here or in these folders; `none` where there is none."""
+    return (_version(name) if folders is None else version_in(folders, name)) or "none"
 
 
-def _version(name: str) -> str | None:
-    """The version of a distribution, by the name of the folder that says what it is."""
+def version_in(folders: Iterable[str], name: str) -> str | None:
+    """The version of a distribution that is installed in one of these folders."""
     start = f"{name.replace('-', '_').lower()}-"
-    for folder in sys.path:
+    for folder in folders:
         try:
             found = [e for e in os.listdir(folder or ".") if e.lower().startswith(start)]  # noqa: PTH208
         except OSError:
@@ -46,6 +48,14 @@ def _version(name: str) -> str | None:
         for entry in sorted(found):
             if entry.endswith(".dist-info"):
                 return entry[len(start) : -len(".dist-info")]
+    return None
+
+
+def _version(name: str) -> str | None:
+    """The version of a distribution, by the name of the folder that says what it is."""
+    found = version_in(sys.path, name)
+    if found is not None:
+        return found
     import importlib.metadata  # which reads more, and takes longer than all else
 
     try:

@@ -71,6 +71,15 @@ FolderPath: TypeAlias = Annotated[
 ]
 
 
+InterpreterPath: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=r"^([\w.-]+/)+bin/python[0-9.]*$",
+        extra={"expects": "the Python of a virtual environment, as in `.venv/bin/python`"},
+    ),
+]
+
+
 def slug_of(text: str) -> str:
     """A name for files and addresses: lower-case words of ASCII joined by hyphens."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
@@ -126,6 +135,10 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     )
     filter: tuple[FilterTable, ...] = ()
     env: Annotated[dict[str, str], Meta(description="variables of the environment of scripts")] = {}
+    python: Annotated[
+        InterpreterPath | None,
+        Meta(description="what runs the scripts, relative to the course's folder"),
+    ] = None
     truth: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
         Meta(description="which share of the numbers in lessons must be proven"),

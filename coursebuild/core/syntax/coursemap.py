@@ -124,6 +124,9 @@ def _course(
         html=fields.security.html,
         limits=fields.limits,
         theme=theme(root.get("theme"), fields.theme),
+        python=NamedPath(verify.python, gate.place("python"))
+        if verify.python is not None and isinstance(gate, ObjectNode)
+        else None,
     )
 
 

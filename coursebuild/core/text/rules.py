@@ -49,6 +49,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "The course names another MuJoCo version than the one that is installed.",
     ),
+    ("script-python", "error", "The interpreter that the map names for scripts cannot run them."),
     (
         "silence-rule",
         "error",

@@ -17,6 +17,7 @@ import pytest
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.runner import ScriptServer, clean_environment
 from coursebuild.core.run.surroundings import OtherEnvironment, library_folder
+from coursebuild.core.run.versions import python_version
 from support.probe_scripts import FAILURES, PROBES
 from support.runners import job
 
@@ -108,7 +109,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> OtherEnvironment:
     prefix = tmp_path_factory.mktemp("place") / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", prefix], check=True)
     (packages,) = prefix.glob("lib/python*/site-packages")
-    return OtherEnvironment("a place", str(prefix / "bin/python"), str(prefix), str(packages))
+    python, base, version = str(prefix / "bin/python"), sys.base_prefix, python_version()
+    return OtherEnvironment("", python, str(prefix), base, version, "none", (str(packages),))
 
 
 def test_package_that_is_not_installed_is_told_by_the_script(
@@ -116,15 +118,15 @@ def test_package_that_is_not_installed_is_told_by_the_script(
 ) -> None:
     code = "try: import numpy\nexcept ModuleNotFoundError as error: print(error)\n"
     (root / "examples/x.py").write_text(code)
-    with ScriptServer(place=place) as server:
-        (run,) = server.run(root, [job()], parallel=1)
+    with ScriptServer() as server:
+        (run,) = server.run(root, [job()], parallel=1, place=place)
     assert run.stdout == "No module named 'numpy'\n"
 
 
 def test_package_that_cannot_be_imported_before_scripts_fails_in_them(
     place: OtherEnvironment, root: Path
 ) -> None:
-    module = Path(place.packages, "numpy.py")
+    module = Path(*place.packages, "numpy.py")
     thread = (
         "import threading\nthreading.Thread(target=threading.Event().wait, daemon=True).start()"
     )
@@ -132,8 +134,8 @@ def test_package_that_cannot_be_imported_before_scripts_fails_in_them(
     found = []
     for code in ("1 / 0", "raise SystemExit(3)", thread):
         module.write_text(code)
-        with ScriptServer(place=place) as server:
-            (run,) = server.run(root, [job()], parallel=1)
+        with ScriptServer() as server:
+            (run,) = server.run(root, [job()], parallel=1, place=place)
         found.append((run.stdout, run.status))
     module.unlink()
     assert found == [("begins\n", 1), ("begins\n", 3), ("begins\n", 0)]
@@ -141,11 +143,11 @@ def test_package_that_cannot_be_imported_before_scripts_fails_in_them(
 
 def test_other_version_of_a_package_is_imported_anew(place: OtherEnvironment, root: Path) -> None:
     (root / "examples/x.py").write_text("import numpy\nprint(numpy.__version__)")
-    module = Path(place.packages, "numpy.py")
-    with ScriptServer(place=place) as server:
+    module = Path(*place.packages, "numpy.py")
+    with ScriptServer() as server:
         for version in ("1", "22"):
             module.unlink(missing_ok=True)
             module.write_text(f"__version__ = '{version}'")
-            runs = [server.run(root, [job()], parallel=1)[0].stdout for _ in range(2)]
+            runs = [server.run(root, [job()], parallel=1, place=place)[0].stdout for _ in range(2)]
             assert runs == [f"{version}\n"] * 2
     module.unlink()

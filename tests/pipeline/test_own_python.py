@@ -1,0 +1,149 @@
+"""Scripts that run with the interpreter of a course's own environment, by `[verify] python`."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy
+import pytest
+
+from coursebuild.core.run.versions import engine_version, python_version
+from support.scratch_course import Folder, block
+
+pytestmark = pytest.mark.site
+
+Make = Callable[..., Folder]
+
+PYTHON = ".venv/bin/python"
+SCRIPT = """\
+import sys
+import mujoco, planet
+from mjcourse import spatial
+print(sys.prefix[-6:], planet.NAME, spatial.__name__)
+try:
+    import msgspec
+except ModuleNotFoundError as error:
+    print(error)
+"""
+PRINTED = "/.venv Mars mjcourse.spatial\nNo module named 'msgspec'"
+
+
+@pytest.fixture
+def course(make: Make) -> Folder:
+    """A course with an environment that has MuJoCo, what that needs, and a package `planet`."""
+    folder = make("## One\n\n" + block("a.py", SCRIPT, PRINTED))
+    folder.replace("content/course.toml", "[course]\n", '[course]\nengine = "0.0.0"\n')
+    folder.replace("content/course.toml", "0.0.0", engine_version())
+    map = folder.text("content/course.toml")
+    folder.write("content/course.toml", f'{map}\n[verify]\npython = "{PYTHON}"\n')
+    environment(folder)
+    return folder
+
+
+def environment(folder: Folder) -> Path:
+    """Make it; gives the folder of its packages."""
+    prefix = folder.root / ".venv"
+    subprocess.run([sys.executable, "-m", "venv", "--clear", "--without-pip", prefix], check=True)
+    (packages,) = prefix.glob("lib/python*/site-packages")
+    for name in ("mujoco", "numpy", "typing_extensions"):
+        for path in Path(numpy.__file__).parents[1].glob(f"{name}*"):
+            (packages / path.name).symlink_to(path)
+    install(packages, "1.0", "Mars")
+    return packages
+
+
+def install(packages: Path, version: str, name: str) -> None:
+    for old in packages.glob("planet-*"):
+        shutil.rmtree(old)
+    info = packages / f"planet-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: planet\nVersion: {version}\n")
+    (info / "top_level.txt").write_text("planet\n")
+    (packages / "planet.py").write_text(f"NAME = {name!r}\n")
+
+
+def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course: Folder) -> None:
+    """And run again when something is installed there; of here they find `mjcourse` only."""
+    (packages,) = (course.root / ".venv").glob("lib/python*/site-packages")
+    done = course.run("check")
+    assert done.status == 0, done.out + done.err
+    assert "1 script" in done.out
+    again = course.run("check")
+    assert again.status == 0
+    assert "nothing has changed since the last check" in again.out
+    install(packages, "1.1", "Venus")
+    drifted = course.run("check")
+    assert drifted.status == 1
+    assert "Venus" in drifted.out
+    assert course.run("update").status == 0
+    assert "/.venv Venus mjcourse.spatial" in course.text(course.lesson())
+    explained = course.run("explain", "examples/a.py").out
+    assert "planet 1.1" in explained
+    assert "remembered" in explained
+
+
+def test_a_build_says_which_versions_ran_the_scripts(course: Folder) -> None:
+    assert course.run("build").status == 0
+    page = course.text("public/lessons/1.1-one.html")
+    assert f"MuJoCo {engine_version()}" in page
+    assert f"Python {python_version()}" in page
+
+
+WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
+    "missing": (
+        lambda prefix: (prefix / "bin/python").unlink(),
+        "error[script-python]: there is no interpreter `.venv/bin/python`",
+    ),
+    "not an environment": (
+        lambda prefix: (prefix / "pyvenv.cfg").unlink(),
+        "error[script-python]: `.venv/bin/python` is not of a virtual environment",
+    ),
+    "old": (
+        lambda prefix: (prefix / "pyvenv.cfg").write_text("version_info = 3.9.1.final.0\n"),
+        "error[script-python]: `.venv/bin/python` is of Python 3.9.1.final.0",
+    ),
+    "without MuJoCo": (
+        lambda prefix: next(prefix.glob("lib/*/*/mujoco-*")).unlink(),
+        "error[script-python]: MuJoCo is not installed for `.venv/bin/python`",
+    ),
+    "another MuJoCo": (
+        lambda prefix: next(prefix.glob("lib/*/*/mujoco-*")).rename(
+            next(prefix.glob("lib/*/site-packages")) / "mujoco-3.1.0.dist-info"
+        ),
+        f"error[engine-version]: the course is written for MuJoCo {engine_version()}, and 3.1.0 "
+        "is installed for `.venv/bin/python`",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_an_environment_in_which_scripts_cannot_run_is_told_in_the_map(
+    course: Folder, case: str
+) -> None:
+    spoil, said = WRONG[case]
+    spoil(course.root / ".venv")
+    done = course.main("check")
+    assert done.status == 1
+    assert done.out.startswith(f"{said}"), done.out
+    assert "--> content/course.toml:" in done.out
+    assert done.out.count("error[") == 1
+
+
+def test_a_program_that_is_no_python_ends_the_command_with_one_sentence(course: Folder) -> None:
+    python = course.root / PYTHON
+    python.unlink()
+    python.write_text("#!/bin/sh\nexit 3\n")
+    python.chmod(0o755)
+    done = course.main("check")
+    assert done.status == 1
+    assert f"{python} cannot run scripts" in done.err
+
+
+def test_another_engine_is_tried_by_another_environment(course: Folder) -> None:
+    done = course.main("check", "--against", "3.1.0")
+    assert done.status == 2
+    assert "scripts of this course run with .venv/bin/python" in done.err
