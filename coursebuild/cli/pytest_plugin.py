@@ -52,7 +52,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("coursebuild", _HELP, type="bool", default=False)
 
 
-def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> CourseFile | None:
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FileTests | None:
     """The tests of a file that belongs to a course."""
     config = parent.config
     if not (config.getoption("coursebuild") or config.getini("coursebuild")):
@@ -66,7 +66,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> CourseFile
     path = file_path.resolve().relative_to(root).as_posix()
     if path not in courses[root].tests:
         return None
-    file: CourseFile = CourseFile.from_parent(parent, path=file_path)
+    file: FileTests = FileTests.from_parent(parent, path=file_path)
     file.course, file.source = courses[root], path
     return file
 
@@ -158,7 +158,7 @@ def _parts(document: Document, trials: Mapping[int, str]) -> Iterator[tuple[str,
             yield name, (block.span.line, block.span.end_line)
 
 
-class CourseFile(pytest.File):
+class FileTests(pytest.File):
     """A lesson, a page, a model or the map."""
 
     course: CourseTests

@@ -184,10 +184,10 @@ def test_a_page_weighs_what_it_loads(course: Folder) -> None:
     told = course.main("diff", "HEAD", *sites).out
     assert told.endswith(
         "| page | before | now | change |\n| --- | --- | --- | --- |\n"
-        "| index.html | 1.6 kB | 3.6 kB | +126.0% |\n"
-        "| new.html | 0.0 kB | 0.0 kB | new |\n"
-        "| old.html | 1.0 kB | 0.0 kB | removed |\n"
         "| the whole site | 3.5 kB | 4.5 kB | +28.7% |\n"
+        "| index.html | 1.6 kB | 3.6 kB | +126.0% |\n"
+        "| old.html | 1.0 kB | 0.0 kB | removed |\n"
+        "| new.html | 0.0 kB | 0.0 kB | new |\n"
     ), told
     (course.root / "public/index.html").unlink()
     told = course.main("diff", "HEAD", *sites).out

@@ -16,7 +16,7 @@ from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.errors import EffectError, UsageError, reason
-from coursebuild.features.diff.report import State, report
+from coursebuild.features.diff.report import CourseState, report
 from coursebuild.features.diff.weight import weight_section
 from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.load import load_course
@@ -49,8 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     return write(text, CLEAN)
 
 
-def _state(root: Path) -> State:
-    return State(load_course(root), functools.partial(read_recorded, root))
+def _state(root: Path) -> CourseState:
+    return CourseState(load_course(root), functools.partial(read_recorded, root))
 
 
 @contextlib.contextmanager

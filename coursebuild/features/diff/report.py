@@ -1,6 +1,6 @@
 """Two states of a course beside each other, as Markdown.
 
-Entry points: `State`, `report(base, old, new)`; `section`, a part of such a report.
+Entry points: `CourseState`, `report(base, old, new)`; `section`, a part of such a report.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ K = TypeVar("K")
 V = TypeVar("V")
 
 
-class State(Struct, frozen=True):
+class CourseState(Struct, frozen=True):
     """A course, and what reads its files."""
 
     course: Course
     read: ReadFile
 
 
-class Script(Struct, frozen=True):
+class ScriptState(Struct, frozen=True):
     """A script, and what is recorded of it."""
 
     owner: str
@@ -53,7 +53,7 @@ class Script(Struct, frozen=True):
     """How those are compared that do not say it."""
 
 
-class Lab(Struct, frozen=True):
+class LabState(Struct, frozen=True):
     """A lab, or whatever else is tried."""
 
     text: str
@@ -63,7 +63,7 @@ class Lab(Struct, frozen=True):
     """The texts of its models, by name."""
 
 
-def report(base: str, old: State, new: State) -> str:
+def report(base: str, old: CourseState, new: CourseState) -> str:
     """What became of a course since `base`."""
     before, now = (
         {id: one.source.text for id, one in owners(state.course)} for state in (old, new)
@@ -96,7 +96,9 @@ def section(title: str, meaning: str, header: Row, rows: Sequence[Row]) -> str:
     if not rows:
         return f"### {title}\n\nNo change.\n"
     table = (header, ["---"] * len(header), *rows[:_ROWS])
-    lines = [" | ".join(cell.replace("|", "\\|") for cell in row) for row in table]
+    lines = [
+        " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in row) for row in table
+    ]
     lines += [f"and {len(rows) - _ROWS} more"] if len(rows) > _ROWS else []
     return f"### {title}\n\n{meaning}\n\n" + "".join(f"| {line} |\n" for line in lines)
 
@@ -119,7 +121,7 @@ def _changes(
 # --- outputs
 
 
-def _scripts(course: Course) -> dict[str, Script]:
+def _scripts(course: Course) -> dict[str, ScriptState]:
     recorded: dict[str | None, list[Recording]] = {}
     for document in course.documents:
         for block in document_blocks(document):
@@ -128,12 +130,14 @@ def _scripts(course: Course) -> dict[str, Script]:
                 text = body or Excerpt.of_span(block.body_span)
                 recorded.setdefault(block.script, []).append(replace(block, body=text))
     return {
-        one.path: Script(one.owner, one.text, tuple(recorded.get(one.path, ())), course.comparison)
+        one.path: ScriptState(
+            one.owner, one.text, tuple(recorded.get(one.path, ())), course.comparison
+        )
         for one in extract(course).value
     }
 
 
-def _outputs(before: Mapping[str, Script], now: Mapping[str, Script]) -> str:
+def _outputs(before: Mapping[str, ScriptState], now: Mapping[str, ScriptState]) -> str:
     changes = dict(_changes(before, now, _recorded))
     rows = [(f"`{path}`", (now.get(path) or before[path]).owner, changes[path]) for path in changes]
     meaning = "What scripts print, as it is recorded. Whether they print it is what `check` says."
@@ -148,7 +152,7 @@ def _outputs(before: Mapping[str, Script], now: Mapping[str, Script]) -> str:
     return "\n".join(parts)
 
 
-def _recorded(before: Script, now: Script) -> str:
+def _recorded(before: ScriptState, now: ScriptState) -> str:
     """How a script and what is recorded of it differ, in words."""
     said = ["code edited"] if before.code != now.code else []
     for old, new in zip_longest(before.outputs, now.outputs):
@@ -173,7 +177,7 @@ def _text(recording: Recording | None) -> str:
 # --- figures and labs
 
 
-def _figures(state: State) -> dict[str, tuple[str, bytes]]:
+def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
     """Paths and bytes of recorded figures and their data, by path."""
     paths = (figure.path for one in state.course.documents for figure in recorded_figures(one))
     return {path: (path, data) for path in paths if (data := state.read(path)) is not None}
@@ -185,10 +189,10 @@ def _redrawn(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
     return difference(*before, now[1]) or "less than can be seen"
 
 
-def _labs(course: Course) -> dict[tuple[str, str], Lab]:
+def _labs(course: Course) -> dict[tuple[str, str], LabState]:
     """Labs in texts, by the id of the lesson or page and the title, else the name."""
     texts = {model.name: model.source.text for model in course.models}
-    found: dict[tuple[str, str], Lab] = {}
+    found: dict[tuple[str, str], LabState] = {}
     for _, trial in feature_trials(course).values():
         text = trial.block.span.text
         if trial.block.span.path.startswith("models/"):  # of a model that no text shows
@@ -196,7 +200,7 @@ def _labs(course: Course) -> dict[tuple[str, str], Lab]:
         data = _json(text.partition("\n")[2].rpartition("\n")[0])
         key = trial.owner, str(data.get("title") or trial.name)
         models = {name: texts.get(name, "") for name in trial.block.models()}
-        found[(trial.owner, trial.name) if key in found else key] = Lab(text, data, models)
+        found[(trial.owner, trial.name) if key in found else key] = LabState(text, data, models)
     return found
 
 
@@ -209,7 +213,7 @@ def _json(text: str) -> dict[str, object]:
     return found if isinstance(found, dict) else {}
 
 
-def _fields(before: Lab, now: Lab) -> str:
+def _fields(before: LabState, now: LabState) -> str:
     """Which fields of a lab differ, with their values where these are short, and which models."""
     said = []
     for name in dict.fromkeys((*before.data, *now.data)):

@@ -22,9 +22,9 @@ def weight_section(old: Path, new: Path) -> str:
         if not (folder / "index.html").is_file():
             return f"### Page weight\n\nNot compared: there is no site in `{folder.name}`.\n"
     before, now = _weights(old), _weights(new)
+    sizes = {name: (before.get(name, 0), now.get(name, 0)) for name in {**before, **now}}
     rows = []
-    for name in sorted({*before, *now}):
-        a, b = before.get(name, 0), now.get(name, 0)
+    for name, (a, b) in sorted(sizes.items(), key=lambda one: _rank(*one)):
         if abs(b - a) >= _SHARE * max(a, b) or (name == _WHOLE and a != b):
             change = f"{b / a - 1:+.1%}" if a and b else "new" if b else "removed"
             rows.append((name, f"{a / 1000:.1f} kB", f"{b / 1000:.1f} kB", change))
@@ -35,6 +35,11 @@ def weight_section(old: Path, new: Path) -> str:
         ("page", "before", "now", "change"),
         rows,
     )
+
+
+def _rank(name: str, sizes: tuple[int, int]) -> tuple[bool, int]:
+    """The site first, then what changed most."""
+    return name != _WHOLE, -abs(sizes[1] - sizes[0])
 
 
 def _weights(site: Path) -> dict[str, int]:
