@@ -30,7 +30,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site serve quick test test-slow test-oldest lint format types dist lock npm system clean distclean
+.PHONY: help site serve quick test test-slow test-oldest lint format types dist vscode lock npm system clean distclean
 
 help:
 	@echo 'make site       make the environment, install, build the course into public/'
@@ -41,6 +41,7 @@ help:
 	@echo 'make test-oldest  run the quick tests with the oldest packages that the tool may be used with'
 	@echo 'make lint       check style and formatting; make format mends what can be mended'
 	@echo 'make types      check types'
+	@echo 'make vscode     try and make the extension for Visual Studio Code, in editors/vscode/dist/'
 	@echo 'make dist       the wheel and the source distribution, in dist/'
 	@echo 'make lock       lock what pyproject.toml newly asks for; UPGRADE=--upgrade: all, in newest versions'
 	@echo 'make clean      remove what was built; make distclean also what was installed'
@@ -89,6 +90,10 @@ format: $(VENV)/.dev
 
 types: $(VENV)/.dev
 	$(BIN)/mypy
+
+vscode:
+	cd editors/vscode && PATH="$$PATH:$$(../../$(BIN)/python ../../site/bundle.py node)" && \
+	  npm ci --ignore-scripts && npm test && npm run package
 
 dist: $(VENV)/.dev
 	rm -rf dist

@@ -14,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "site" / "tests").glob("*.test.mjs"))
+FILES.append(ROOT / "editors" / "vscode" / "tests" / "course.test.mjs")
 ENGINE = [path for path in FILES if "from './helpers.mjs'" in path.read_text("utf-8")]
 """Files whose tests start a lab engine."""
 PLAIN = [path for path in FILES if path not in ENGINE]

@@ -1,0 +1,42 @@
+// What is found out about a course without the editor: where its command is, which page shows a file.
+
+const fs = require('node:fs');
+const path = require('node:path');
+
+/** The nearest folder of a course, from a file or folder upwards; none: undefined. */
+function courseOf(place, exists = fs.existsSync) {
+  for (let folder = place; ; folder = path.dirname(folder)) {
+    if (exists(path.join(folder, 'content', 'course.toml'))) return folder;
+    if (folder === path.dirname(folder)) return undefined;
+  }
+}
+
+/** The command of a course; undefined where there is none. A setting counts, wherever it leads. */
+function commandOf(setting, folder, { env = process.env, platform = process.platform, exists = fs.existsSync } = {}) {
+  const { join, isAbsolute, delimiter } = platform === 'win32' ? path.win32 : path.posix;
+  const [bin, name] = platform === 'win32' ? ['Scripts', 'coursebuild.exe'] : ['bin', 'coursebuild'];
+  if (setting) {
+    if (!/[\\/]/.test(setting)) return setting;
+    return isAbsolute(setting) ? setting : join(folder, setting);
+  }
+  const known = (env.PATH ?? '').split(delimiter).filter(Boolean);
+  return [join(folder, '.venv', bin), ...known].map((one) => join(one, name)).find(exists);
+}
+
+/** The address of the page that shows a file of the course, below that of the site. */
+function pageOf(file, map) {
+  const lesson = /^content\/lessons\/([^/]+)\.md$/.exec(file);
+  if (lesson) return `lessons/${encodeURIComponent(lesson[1])}.html`;
+  for (const table of map.split(/^\s*\[\[?/m).filter((text) => text.startsWith('page]]'))) {
+    const value = (key) => new RegExp(`^\\s*${key}\\s*=\\s*["']([^"']*)["']`, 'm').exec(table)?.[1];
+    if (value('file') === file) return value('id') === 'home' ? '' : `${value('id')}.html`;
+  }
+  return '';
+}
+
+/** The address that the preview says it has; undefined where a text says none. */
+function addressIn(text) {
+  return /serving (http:\/\/\S+?\/)/.exec(text)?.[1];
+}
+
+module.exports = { courseOf, commandOf, pageOf, addressIn };

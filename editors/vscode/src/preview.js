@@ -1,0 +1,59 @@
+// The preview of a course in a panel beside the editor: `coursebuild serve`, at the page of the open file.
+
+const { spawn } = require('node:child_process');
+const fs = require('node:fs');
+const path = require('node:path');
+const vscode = require('vscode');
+const { addressIn, courseOf, pageOf } = require('./course');
+
+// Who may show the preview in a frame: the panel, and the window around it.
+const EMBED = ['--embed', 'vscode-webview:', '--embed', 'vscode-file:'];
+
+class Preview {
+  /** `ended` hears when the panel is closed or the preview ends. */
+  constructor(folder, command, output, ended) {
+    this.folder = folder;
+    this.panel = vscode.window.createWebviewPanel(
+      'coursebuild.preview',
+      'Preview',
+      { viewColumn: vscode.ViewColumn.Beside, preserveFocus: true },
+      { enableScripts: true, retainContextWhenHidden: true },
+    );
+    this.process = spawn(command, ['-C', folder, 'serve', '--port', '0', ...EMBED]);
+    this.panel.onDidDispose(() => this.process.kill('SIGINT'));
+    this.process.on('error', (error) => output.appendLine(String(error)));
+    this.process.on('close', (code) => {
+      if (code !== null && code !== 0 && code !== 130) {
+        vscode.window.showErrorMessage('The preview has ended.', 'Show Why').then((said) => said && output.show());
+      }
+      this.panel.dispose();
+      ended();
+    });
+    let said = '';
+    const hear = (data) => {
+      output.append(String(data));
+      said += this.address ? '' : data;
+      this.address ??= addressIn(said);
+      this.show(vscode.window.activeTextEditor);
+    };
+    this.process.stdout.on('data', hear);
+    this.process.stderr.on('data', hear);
+  }
+
+  /** Show the page of the file in an editor, where it is another than before. */
+  async show(editor) {
+    const file = editor?.document.uri.fsPath;
+    if (!this.address || (file && (!file.endsWith('.md') || courseOf(file) !== this.folder)) || (!file && this.page)) return;
+    const map = fs.readFileSync(path.join(this.folder, 'content', 'course.toml'), 'utf8');
+    const page = this.address + (file ? pageOf(path.relative(this.folder, file).replaceAll(path.sep, '/'), map) : '');
+    if (page === this.page) return;
+    this.page = page;
+    const address = String(await vscode.env.asExternalUri(vscode.Uri.parse(page)));
+    this.panel.webview.html = `<!doctype html>
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; frame-src http: https:">
+<style>html, body, iframe { width: 100%; height: 100%; margin: 0; padding: 0; border: 0; display: block }</style>
+<iframe title="Preview" src="${address.replaceAll('&', '&amp;').replaceAll('"', '&quot;')}" allow="clipboard-write; fullscreen"></iframe>`;
+  }
+}
+
+module.exports = { Preview };
