@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -166,6 +167,34 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
         assert "error[task-name]: two tasks are called A & B\n" in course.main("check").out
     course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\n```\n")
     assert course.main("check").out.startswith("error[task-name]: this task has no name\n")
+
+
+def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
+    """Each step takes the place of what has its name in the feature as it is made."""
+    assert course.main("new", "feature", "mermaid").status == 0
+    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
+    steps = re.findall(r"^```python fragment\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    walked = [node for step in steps for node in ast.parse(step).body]
+    names = {defined(node) for node in walked if defined(node)} | {"check"}
+    first, *made = ast.parse(course.text("features/mermaid.py")).body[1:]
+    nodes = [*(node for node in made if defined(node) not in names), *walked]
+    nodes.sort(key=lambda node: defined(node) != "")  # imports stand at the top
+    course.write("features/mermaid.py", ast.unparse(ast.Module([first, *nodes], [])))
+    diagram = '```mermaid alt="One & two"\nflowchart LR\n  one --> two\n```\n'
+    course.write("content/lessons/1.1-one.md", f"## Hello\n\n{diagram}")
+    done = course.main("build")
+    assert done.status == 0, done.out
+    assert re.search(r'<img src="data:image/svg[^"]+" alt="One &amp; two">', course.text(PAGE))
+    assert "```mermaid\nflowchart LR\n" in course.text(PAGE.replace(".html", ".md"))
+    for old, new, rule in ((' alt="One & two"', "", "alt"), ("flowchart", "flow", "syntax")):
+        course.write("content/lessons/1.1-one.md", diagram.replace(old, new))
+        assert f"error[mermaid-{rule}]: " in course.main("check").out
+
+
+def defined(node: ast.stmt) -> str:
+    """The name that a statement defines; empty for imports."""
+    target = node.targets[0] if isinstance(node, ast.Assign) else node
+    return str(getattr(target, "name", getattr(target, "id", "")))
 
 
 # --- pages

@@ -1,7 +1,7 @@
 """What takes an author from nothing to a course, and through its changes: commands.
 
 - `init`: a small complete course, from the files in `course/`
-- `new`: a lesson, with its entry in the map (`course_map`), or a model
+- `new`: a lesson or a feature, with its entry in the map (`course_map`), a model, a template
 - `rename`: a lesson gets another id, wherever the course names it (`references`)
 - `fmt`: lessons formatted (`format`, with `json_layout` and `text_layout`)
 - `doctor`: what of all that courses need works here
@@ -11,7 +11,7 @@ from coursebuild.core.features import Command, Feature
 
 _SUMMARIES = {
     "init": "make a small complete course to begin with",
-    "new": "add a lesson or a model",
+    "new": "add a lesson, a model, a template or a feature",
     "rename": "give a lesson another id, wherever the course names it",
     "fmt": "format lessons and pages",
     "doctor": "say what works on this machine, and what to do where it does not",

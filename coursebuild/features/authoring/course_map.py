@@ -1,6 +1,6 @@
-"""The course map with a lesson added or renamed, and all else as its author wrote it.
+"""The course map with a lesson added or renamed, or a feature, and all else as its author wrote it.
 
-Entry points: `with_lesson`, `with_lesson_renamed`.
+Entry points: `with_lesson`, `with_lesson_renamed`, `with_feature`.
 
 An entry is put in, or cut out and put in, as a whole, with the comments directly above it, and with
 the line ends and the indentation of the map. What comes of it is parsed and refused where it is no
@@ -16,7 +16,8 @@ from coursebuild.core.files.errors import UsageError
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.syntax.toml_text import quoted
+from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode
+from coursebuild.core.syntax.toml_text import parse_toml, quoted
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
 from coursebuild.core.text.source import Source
 
@@ -65,6 +66,35 @@ def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[E
         if without is not None:
             text = _inserted(without, new, entry)
     return _checked(course, text, new)
+
+
+def with_feature(course: Course, path: str) -> str:
+    """The map with a further file of `features`.
+
+    Raises:
+        UsageError: the map cannot have it.
+    """
+    source = course.map
+    table = getattr(parse_toml(source).value, "get", lambda name: None)("course")
+    if not isinstance(table, ObjectNode):
+        raise UsageError(f"{source.path} cannot be read")
+    array = table.get("features")
+    if isinstance(array, ArrayNode) and array.items:
+        edit = Edit(array.items[-1].span, f"{array.items[-1].raw}, {quoted(path)}")
+    elif array is not None:
+        edit = Edit(array.span, f"[{quoted(path)}]")
+    else:
+        title = table.place("title")
+        line = f"{_line_end(source.text)}features = [{quoted(path)}]"
+        end = _end_of_line(source.text, title.end)
+        edit = Edit(source.span(end, end), line)
+    text = apply_edits(source.text, [edit])
+    changed = parse_course_map(Source(source.path, text)).value
+    if changed is None or path not in [feature.path for feature in changed.features]:
+        raise UsageError(
+            f"{source.path} cannot have a feature: add `{path}` to `features` yourself"
+        )
+    return text
 
 
 def _check_free(course: Course, id: str) -> None:

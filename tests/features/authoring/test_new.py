@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -94,6 +96,8 @@ REFUSED = [
     ("lesson 1.7 there", "there is a file content/lessons/1.7-there.md already"),
     ("model ../x", "`../x` is no name of a model: use letters, digits, `_` and `-`"),
     ("model there", "there is a file models/there.xml already"),
+    ("feature quiz", "there is a feature or a fence `quiz` already"),
+    ("feature Big-1", "`Big-1` is no name of a feature: use lower-case letters"),
     ("template lessn.html", "there is no template `lessn.html`; did you mean `lesson.html`?"),
     ("template ../base.html", "there is no template `../base.html`; did you mean `base.html`?"),
 ]
@@ -143,6 +147,23 @@ def test_new_template_is_the_one_of_the_tool_and_known_for_it(make: Callable[...
     assert folder.main("new", "template", "blocks/code.html", "--print").out == f"{first}\n{rest}"
     done = folder.main("check")
     assert (done.status, "warning" in done.out) == (0, False), done.out
+
+
+@pytest.mark.parametrize("script", [(), ("--script",)])
+def test_tests_of_a_new_feature_pass_as_made(
+    make: Callable[..., Folder], script: tuple[str, ...]
+) -> None:
+    folder = make(FIRST)
+    for name in ("advice", "hint"):
+        done = folder.main("new", "feature", name, *script)
+        assert done.out == f"changed {MAP}\nwrote features/{name}.py\nwrote tests/test_{name}.py\n"
+    assert 'features = ["features/advice.py", "features/hint.py"]\n' in folder.text(MAP)
+    assert ("PagePart" in folder.text("features/hint.py")) == bool(script)
+    assert folder.main("check").status == 0
+    tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    ran = subprocess.run(tests, cwd=folder.root, env=environment, capture_output=True, text=True)
+    assert "6 passed" in ran.stdout, ran.stdout
 
 
 def test_read_only_folder_is_told(tmp_path: Path, make: Callable[..., Folder]) -> None:

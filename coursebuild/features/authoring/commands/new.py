@@ -1,8 +1,9 @@
-"""`coursebuild new`: add a lesson, a model, or a template of one's own."""
+"""`coursebuild new`: add a lesson, a model, a template or a feature of one's own."""
 
 from __future__ import annotations
 
 import argparse
+import keyword
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,10 +13,11 @@ from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.model.theme import TEMPLATES
+from coursebuild.core.registry import CORE_FENCES, features, fence_names
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.features.authoring.commands import apply_changes
-from coursebuild.features.authoring.course_map import with_lesson
+from coursebuild.features.authoring.course_map import with_feature, with_lesson
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.theme import copied_template, template_names
 
@@ -24,6 +26,7 @@ examples:
   coursebuild new lesson 1.4 "Large swings"
   coursebuild new model pendulum
   coursebuild new template base.html
+  coursebuild new feature timeline
 """
 _LESSON = "## First section\n\nText.\n"
 _MODEL = """\
@@ -37,6 +40,9 @@ _MODEL = """\
   </worldbody>
 </mujoco>
 """
+_FEATURE = Path(__file__).parents[1] / "feature"
+_SCRIPT = re.compile(r"^# with --script\n(.*?)(?:^# without\n(.*?))?^# end\n", re.M | re.S)
+"""What a feature with a script has, and what it has without one."""
 _NAME = re.compile(r"\w[\w-]*(?:/\w[\w-]*)*", re.ASCII)
 
 
@@ -55,6 +61,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     template.add_argument("name", metavar="NAME", help="as in base.html or blocks/callout.html")
     template.add_argument("--print", action="store_true", help="print it, and write no file")
     template.set_defaults(add=_new_template)
+    feature = kinds.add_parser("feature", help="a kind of fence with its tests, named by the map")
+    feature.add_argument("name", metavar="NAME", help="of its fence, in lower-case letters")
+    feature.add_argument("--script", action="store_true", help="with a script of its pages")
+    feature.set_defaults(add=_new_feature)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -93,3 +103,28 @@ def _new_template(root: Path, arguments: argparse.Namespace) -> list[FileChange]
         near = did_you_mean(name, template_names())
         raise UsageError(f"there is no template `{name}`" + (f"; {near}" if near else ""))
     return [FileChange(f"{TEMPLATES}{name}", None, text.encode())]
+
+
+def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
+    course, name = load_course(root), arguments.name
+    if not re.fullmatch("[a-z][a-z0-9]*", name) or keyword.iskeyword(name):
+        raise UsageError(f"`{name}` is no name of a feature: use lower-case letters")
+    if name in {*CORE_FENCES, *fence_names(), *(feature.name for feature in features())}:
+        raise UsageError(f"there is a feature or a fence `{name}` already")
+    path = f"features/{name}.py"
+    made = {path: "feature.txt", f"tests/test_{name}.py": "test.txt"}
+    return [
+        FileChange(course.map.path, course.map.text.encode(), with_feature(course, path).encode()),
+        *(FileChange(where, None, _code(file, arguments)) for where, file in made.items()),
+    ]
+
+
+def _code(file: str, arguments: argparse.Namespace) -> bytes:
+    """A file of `feature/`, under another name, with what is for a script or without it."""
+    text = (_FEATURE / file).read_text(encoding="utf-8")
+    chosen = 1 if arguments.script else 2
+    text = _SCRIPT.sub(lambda part: part[chosen] or "", text)
+    for old in ("example", "Example"):
+        new = arguments.name if old.islower() else arguments.name.capitalize()
+        text = text.replace(old, new)
+    return text.encode()
