@@ -5,6 +5,8 @@ from __future__ import annotations
 import gc
 import json
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 
 from coursebuild import __version__
 from coursebuild.cli.commands import known_commands
-from support.scratch_course import FIRST, GOOD, SECOND, Done, Folder, block, without_seconds
+from support.scratch_course import FIRST, GOOD, ROOT, SECOND, Done, Folder, block, without_seconds
 
 pytestmark = pytest.mark.site
 
@@ -156,6 +158,15 @@ def test_help_version_and_schemas_are_printed_anywhere(tmp_path: Path) -> None:
 
 
 # --- where the course is
+
+
+def test_on_windows_one_sentence_says_where_it_runs() -> None:
+    code = (
+        "import sys; sys.platform = 'win32'; from coursebuild.cli import main; sys.exit(main([]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    said = "coursebuild runs on Linux and macOS; on Windows, install it in WSL\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
 
 
 def test_a_course_is_found_from_anywhere(make: Make, tmp_path: Path) -> None:
