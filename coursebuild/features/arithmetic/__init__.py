@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
@@ -20,8 +21,8 @@ from coursebuild.core.model import (
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.core.text.units import find_unit
-from coursebuild.features.arithmetic.chains import check_arithmetic
+from coursebuild.core.text.units import Dimension, find_unit
+from coursebuild.features.arithmetic.chains import FormulaFinding, check_arithmetic
 from coursebuild.features.arithmetic.expressions import NotUnderstood
 from coursebuild.features.arithmetic.identities import check_identity
 from coursebuild.features.arithmetic.tex import read_expression
@@ -87,9 +88,17 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
         found = {name: find_unit(min(all)) for name, all in units.items() if len(all) == 1}
         dimensions = {name: unit.dimension for name, unit in found.items() if unit is not None}
         for tex in own.identities:
-            for one in check_identity(tex.text, dimensions):
+            for one in _identity_findings(tex.text, frozenset(dimensions.items())):
                 message = one.message if one.kind == "wrong" else f"not understood: {one.message}"
                 yield diagnose("formula-identity", tex.span(one.start, one.end), message)
+
+
+@functools.lru_cache(maxsize=256)
+def _identity_findings(
+    tex: str, dimensions: frozenset[tuple[str, Dimension]]
+) -> tuple[FormulaFinding, ...]:
+    """As `check_identity`, which takes longer than all else while a lesson is being written."""
+    return tuple(check_identity(tex, dict(dimensions)))
 
 
 def _summary_of(document: Document) -> FormulaSummary | None:
