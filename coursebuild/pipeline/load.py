@@ -84,9 +84,9 @@ class Parser:
         return check_course(course)
 
 
-def load(root: Path, parser: Parser | None = None) -> Loaded:
-    """Read and parse everything below `root`."""
-    loader = _Loader(root, Parser() if parser is None else parser)
+def load(root: Path, parser: Parser | None = None, open_texts: Mapping[str, str] = {}) -> Loaded:
+    """Read and parse everything below `root`; `open_texts` as in `read_course`."""
+    loader = _Loader(root, Parser() if parser is None else parser, open_texts)
     course = loader.course(loader.declared())
     return Loaded(course, tuple(loader.found))
 
@@ -106,9 +106,10 @@ def load_course(root: Path) -> Course:
 class _Loader:
     """The state of one loading: what was read, and what was found wrong."""
 
-    def __init__(self, root: Path, parser: Parser) -> None:
-        read = read_course(root)
+    def __init__(self, root: Path, parser: Parser, open_texts: Mapping[str, str]) -> None:
+        read = read_course(root, open_texts)
         self.root = root
+        self.open_texts = open_texts
         self.parser = parser
         self.files = read.value
         self.found = list(read.diagnostics)
@@ -288,7 +289,7 @@ class _Loader:
         paths = (page.path for page in pages)
         away = [path for path in paths if path not in self.files.unreadable]
         away = [p for p in away if p not in self.sources and (self.root / p).exists()]
-        read = read_sources(self.root, away)
+        read = read_sources(self.root, away, self.open_texts)
         self.found += read.diagnostics
         sources = self._within(limit, read.value)
         if sources:

@@ -147,6 +147,15 @@ def prepare_to_read(sample: SourceText) -> None:
         start()
 
 
+def kept_formulas(store: Memo, path: str) -> dict[Formula, str]:
+    """MathML of the formulas that the text at a path had when it was last read."""
+    return store.get(_MATHML, _formulas_key(path), lambda data: decode(data, dict)) or {}
+
+
+def _formulas_key(path: str) -> str:
+    return key_of(typesetter_digest(), path)
+
+
 class PageReader:
     """Reads and draws, one thing at a time, whichever thread asks."""
 
@@ -218,17 +227,14 @@ class PageReader:
         """MathML; that of formulas which the text at this path had before is in the store."""
         if not formulas:
             return {}
-        key = key_of(typesetter_digest(), path)
-        known: dict[Formula, str] = (
-            self._store.get(_MATHML, key, lambda data: decode(data, dict)) or {}
-        )
+        known = kept_formulas(self._store, path)
         new = [formula for formula in formulas if formula not in known]
         if not new:
             return {formula: known[formula] for formula in formulas}
         made = {**known, **dict(zip(new, self._started().typeset(new), strict=True))}
         found = {formula: made[formula] for formula in formulas}
         lasting = {formula: one for formula, one in found.items() if isinstance(one, str)}
-        self._store.put(_MATHML, key, encode(lasting))
+        self._store.put(_MATHML, _formulas_key(path), encode(lasting))
         return found
 
     def _started(self) -> MathEngine:

@@ -176,7 +176,7 @@ def _outputs(session: Session, course: Course, document: Document) -> Iterator[d
 
 def _drift(session: Session, course: Course, verdict: Verdict, run: ScriptRun) -> dict[str, Any]:
     rows = diff_rows(verdict.recording, verdict, course.filters, run.stdout)
-    offered = _update(session, course, verdict, run)
+    offered = new_output(session, course, verdict, run)
     told: dict[str, Any] = {"rows": [_row(row) for row in rows], "offer": None, "refused": ""}
     if isinstance(offered, Edit):
         told["offer"] = Offer.of(offered).id
@@ -189,7 +189,7 @@ def _row(row: DiffRow) -> list[Any]:
     return [row.mark, [[piece.text, piece.changed] for piece in row.pieces]]
 
 
-def _update(
+def new_output(
     session: Session, course: Course, verdict: Verdict, run: ScriptRun
 ) -> Edit | Diagnostic | None:
     """What `coursebuild update` would write; nothing as long as the script was run only once."""
@@ -295,7 +295,7 @@ def _offers(session: Session, path: str) -> Iterator[Offer]:
     for recording in (b for b in document_blocks(document) if isinstance(b, Recording)):
         verdict, run = library.verdict(recording), library.runs.get(recording.script or "")
         if verdict is not None and verdict.status == "drift" and run is not None:
-            edit = _update(session, course, verdict, run)
+            edit = new_output(session, course, verdict, run)
             if isinstance(edit, Edit):
                 yield Offer.of(edit)
     for _, offer in _drawn(session, document):

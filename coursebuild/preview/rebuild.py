@@ -124,7 +124,8 @@ class BackgroundRebuild:
         self._seen = session.edits
         session.read()
         with session.changed:
-            self._seen, course = session.edits, session.course
+            self._seen = session.edits
+        course = session.saved_course()
         if course is not None:
             self._busy("running scripts and labs")
             self._verify(course)

@@ -13,7 +13,7 @@ Entry point: `Session`.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Generic, TypeVar
 
 from msgspec.structs import replace
@@ -71,8 +71,12 @@ class PerDocument(Generic[T]):
 class Session:
     """See the module."""
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: Options, *, site: bool = True) -> None:
+        """`site`: whether pages are drawn."""
         self.root = options.root
+        self.open_texts: Mapping[str, str] = {}
+        """The texts of files that are open in an editor, which need not be saved, by path; another
+        mapping with each change."""
         self.changed = threading.Condition(threading.RLock())
         self.version = 0
         """Grows with everything that an open page may show."""
@@ -89,6 +93,8 @@ class Session:
         self.course: Course | None = None
         self.library: Library | None = None
         """What is known of the course, for drawing; `None` before a map could be read."""
+        self.verified: Course | None = None
+        """The course that was run last."""
         self.found_by_running: tuple[Diagnostic, ...] = ()
         self.all_due = True
         """Whether more changed than documents, so that any script may do something else now."""
@@ -112,6 +118,7 @@ class Session:
         """Of scripts that ran twice: what was run, and what each run printed."""
         self._trials = PublishedTrials()
         self.files = Files(options, self._assets, self._documents, self._is_sound)
+        self._site = site
 
     def start(self, options: Options, progress: Progress) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
@@ -128,8 +135,13 @@ class Session:
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Everything that is known to be wrong."""
         with self.changed:
-            static = (d for found in self._static.values() for d in found)
-            return (*static, *self.found_by_running, *self._failed)
+            return (*self.found_by_reading, *self.found_by_running, *self._failed)
+
+    @property
+    def found_by_reading(self) -> tuple[Diagnostic, ...]:
+        """What reading and checking found."""
+        with self.changed:
+            return tuple(d for found in self._static.values() for d in found)
 
     def blocking(self, path: str) -> list[Diagnostic]:
         """What keeps the page at a site path as it was: mistakes in its text or in the map."""
@@ -162,25 +174,34 @@ class Session:
             self.busy = self.busy or "checking"
             self.tell()
 
+    def _tell_of(self, *, saved: bool) -> None:
+        if saved:
+            self.touch()
+        else:
+            self.tell()
+
     # --- the course
 
-    def edit(self, paths: Collection[str]) -> bool | None:
+    def edit(self, paths: Collection[str], *, saved: bool = True) -> bool | None:
         """Take saves of documents; whether anything is another now.
 
-        `None` where only reading everything tells.
+        `None` where only reading everything tells. `saved`: if not, they are being typed, and
+        nothing runs yet.
         """
         with self._reading, self.changed:
             course, fresh = self.course, self._saved(paths)
             if fresh is None or course is None:
                 return None
             if not fresh:
+                if saved and not self.open_texts.keys().isdisjoint(paths):
+                    self.touch()  # its scripts may run
                 return False
             self._show(_with_owners(course, [owner for owner, _ in fresh]))
             for owner, found in fresh:
                 assert owner.document is not None
                 self._static[owner.path] = (*found, *self._check(owner.document))
-            self.touch()
-            for owner, _ in fresh:
+            self._tell_of(saved=saved)
+            for owner, _ in fresh if self._site else ():
                 self.find(self._site_paths[owner.path])
             return True
 
@@ -191,7 +212,8 @@ class Session:
         known = {owner.path: owner for owner in owners(self.course)}
         fresh: list[tuple[Owner, tuple[Diagnostic, ...]]] = []
         for path in sorted(paths):
-            owner, read = known.get(path), read_sources(self.root, [path])
+            owner = known.get(path)
+            read = read_sources(self.root, [path], self.open_texts)
             if owner is None or owner.document is None or not read.value:
                 return None
             (source,) = read.value
@@ -215,20 +237,35 @@ class Session:
             self.touch()
         self.read()
 
-    def read(self, documents: Documents | None = None) -> bool:
-        """Read the whole course; whether anything is another than it was thought to be."""
+    def read(self, documents: Documents | None = None, *, saved: bool = True) -> bool:
+        """Read the whole course; whether anything is another than it was thought to be.
+
+        `saved`: see `edit`.
+        """
         documents = documents or self._documents
         while True:
             edits = self.edits
             with self._reading:
-                loaded = load(self.root, documents)
+                loaded = load(self.root, documents, self.open_texts)
                 course = loaded.course
                 reports = None if course is None else shown_reports(self.root, course)
                 with self.changed:
                     if edits != self.edits:
                         continue
                     found = loaded.diagnostics + (reports.diagnostics if reports else ())
-                    return self._take_course(loaded, found, reports.value if reports else None)
+                    fresh = self._take_course(loaded, found, reports.value if reports else None)
+                    if fresh:
+                        self._tell_of(saved=saved)
+                    return fresh
+
+    def saved_course(self) -> Course | None:
+        """The course as it is on the disk, of which scripts run."""
+        texts = self.open_texts
+        with self._reading:
+            saved = read_sources(self.root, sorted(texts)).value
+            if all(source.text == texts[source.path] for source in saved):
+                return self.course
+            return load(self.root, self._documents).course
 
     def _take_course(
         self, loaded: Loaded, diagnostics: Iterable[Diagnostic], reports: Reports | None
@@ -244,8 +281,6 @@ class Session:
             same = same and reports == self._reports and _is_same(self.course, loaded.course)
             self._reports = reports or Reports()
             self._show(loaded.course)
-        if not same:
-            self.touch()
         return not same
 
     def _show(self, course: Course) -> None:
@@ -272,7 +307,8 @@ class Session:
             **{entry.path: urls.lesson_path(entry) for entry in course.lessons},
             **{page.path: urls.page_path(page) for page in course.pages},
         }
-        self.files.show(library)
+        if self._site:
+            self.files.show(library)
 
     # --- what background work found
 
@@ -282,7 +318,7 @@ class Session:
         if results.trials != self._results.trials:
             trials = publish_trials(results, self._assets)
         with self.changed:
-            self.found_by_running = verified.diagnostics
+            self.verified, self.found_by_running = course, verified.diagnostics
             self._results, self._trials = results, trials
             self._ran = {extraction.path: extraction for extraction in extract(course).value}
             if self.course is not None:
@@ -332,6 +368,8 @@ class Session:
 
     def make_site(self, pause: Callable[[], None]) -> None:
         """Put all files of the site together, and serve them; `pause` is called between pages."""
+        if not self._site:
+            return
         with self.changed:
             library = self.library
             wrong = {path for path, found in self._static.items() if has_errors(found)}

@@ -52,7 +52,7 @@ from coursebuild.core.model import (
     resolve,
     walk_inlines,
 )
-from coursebuild.core.model.equations import equation_ids
+from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
@@ -101,40 +101,42 @@ def link_targets(course: Course) -> LinkTargets:
     )
 
 
-def anchors(document: Document) -> frozenset[str]:
-    """The ids that a link may name in a document.
+def anchors(document: Document) -> Mapping[str, Span]:
+    """The ids that a link may name in a document, and where they lead.
 
     Headings, quizzes, listings, outputs, formulas, terms, and ids written in raw HTML; of lines,
     see `_is_line`. Each lookup after the first finds what was kept with the document.
     """
-    known: frozenset[str] | None = document.__dict__.get("anchors")
+    known: dict[str, Span] | None = document.__dict__.get("anchors")
     if known is None:
-        known = document.__dict__["anchors"] = frozenset(_anchors(document))
+        known = document.__dict__["anchors"] = dict(_anchors(document))
     return known
 
 
-def _anchors(document: Document) -> set[str]:
+def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
     outputs: dict[str, int] = {}
-    whole = document.summaries is None
-    found = {*equation_ids(document)} if whole else {e.id for e in document.equations}
+    # A summary does not say where formulas stand.
+    yield from ((formula.id, document.source.span(0, 0)) for formula in document.equations)
+    if document.summaries is None:
+        for displayed in filter(lambda formula: formula.id, display_formulas(document)):
+            yield displayed.id, document.source.span(displayed.start, displayed.start)
     for block in document_blocks(document):
         if isinstance(block, Heading):
-            found.add(block.anchor)
+            yield block.anchor, block.span
         elif isinstance(block, FeatureBlock):
-            found.update(block.anchors())
+            yield from ((id, block.span) for id in block.anchors())
         elif isinstance(block, Script):
-            found.add(listing_anchor(block.path))
+            yield listing_anchor(block.path), block.span
         elif isinstance(block, Recording) and block.script is not None:
             outputs[block.script] = outputs.get(block.script, 0) + 1
-            found.add(output_anchor(block.script, outputs[block.script]))
+            yield output_anchor(block.script, outputs[block.script]), block.span
         elif isinstance(block, HtmlBlock):
-            found.update(_HTML_ID.findall(block.html))
+            yield from ((id, block.span) for id in _HTML_ID.findall(block.html))
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, RawInline):
-                found.update(_HTML_ID.findall(inline.html))
+                yield from ((id, inline.span) for id in _HTML_ID.findall(inline.html))
             elif isinstance(inline, Term):
-                found.add(inline.anchor)
-    return found
+                yield inline.anchor, inline.span
 
 
 def _is_line(anchor: str, document: Document) -> bool:

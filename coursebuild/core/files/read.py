@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from msgspec import Struct
@@ -76,10 +76,13 @@ def find_root(chosen: Path | None, start: Path) -> Path:
     )
 
 
-def read_course(root: Path) -> Parsed[CourseFiles]:
-    """Read the map, the lessons, the pages and the models of a course."""
+def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[CourseFiles]:
+    """Read the map, the lessons, the pages and the models of a course.
+
+    `open_texts` are those of files that are open in an editor, which need not be saved, by path.
+    """
     root = root.resolve()
-    reader = _Reader(root)
+    reader = _Reader(root, open_texts)
     files = [*reader.walk("content"), *reader.walk("models")]
     lessons = [f for f in files if f.startswith("content/lessons/") and f.endswith(".md")]
     pages = [f for f in files if f.startswith("content/pages/") and f.endswith(".md")]
@@ -118,9 +121,11 @@ def read_bytes(root: Path, path: str) -> bytes:
         raise EffectError(f"{path} cannot be read: {reason(error)}") from None
 
 
-def read_sources(root: Path, paths: list[str]) -> Parsed[tuple[Source, ...]]:
+def read_sources(
+    root: Path, paths: list[str], open_texts: Mapping[str, str] = {}
+) -> Parsed[tuple[Source, ...]]:
     """Further text files of the project, such as pages that lie outside of `content/`."""
-    reader = _Reader(root.resolve())
+    reader = _Reader(root.resolve(), open_texts)
     return Parsed(reader.sources(paths), tuple(reader.diagnostics))
 
 
@@ -134,8 +139,9 @@ def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
 class _Reader:
     """Reads files of one course and keeps what went wrong."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, open_texts: Mapping[str, str]) -> None:
         self.root = root
+        self.open_texts = open_texts
         self.diagnostics: list[Diagnostic] = []
         self.unreadable: list[str] = []
         self.plain: set[str] = set()
@@ -224,6 +230,9 @@ class _Reader:
         found = []
         for path in paths:
             if path in self.unreadable:
+                continue
+            if path in self.open_texts:
+                found.append(Source(path, self.open_texts[path]))
                 continue
             try:
                 data = self._plainly_read(path) or read_bytes(self.root, path)

@@ -1,6 +1,6 @@
 """The formulas of a document that stand on lines of their own, and the ids by which they are found.
 
-Entry points: `display_formulas(document)`; `equation_ids(document)`.
+Entry point: `display_formulas(document)`.
 
 A formula has the id that its author gives it, or one made of its TeX: that stays the same whatever
 is written around it. One in a heading, a quiz or a lab has none, since these are shown elsewhere
@@ -63,11 +63,6 @@ def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
             taken.add(name)
         found.append(DisplayFormula(formula.span.start, formula.tex.text, label, name))
     return tuple(found)
-
-
-def equation_ids(document: Document) -> tuple[str, ...]:
-    """All ids of formulas."""
-    return tuple(formula.id for formula in display_formulas(document) if formula.id)
 
 
 def _displayed(block: Block) -> list[MathBlock | Math]:
