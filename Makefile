@@ -75,8 +75,8 @@ OF_THIS_ENGINE := tests/core/text/test_format_mistakes.py tests/mjcourse/test_ag
 
 test-oldest: $(VENV)/.dev npm
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(OLDEST)
-	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml -o $(OLDEST)/packages.txt
-	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable .
+	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml --extra lsp -o $(OLDEST)/packages.txt
+	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[lsp]'
 	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(OLDEST)/bin/python -m pytest $(QUICK) \
 	  $(addprefix --deselect ,$(OF_THIS_ENGINE))
 
@@ -102,7 +102,7 @@ dist: $(VENV)/.dev
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml -o requirements.txt
 	$(LOCK) --group build -c requirements.txt -o requirements-build.txt
-	$(LOCK) pyproject.toml --extra cache --group dev -c requirements.txt -c requirements-build.txt \
+	$(LOCK) pyproject.toml --extra cache --extra lsp --group dev -c requirements.txt -c requirements-build.txt \
 	  -o requirements-dev.txt
 
 clean:

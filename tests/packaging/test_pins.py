@@ -30,7 +30,8 @@ def versions(root: Path, name: str) -> dict[str, str]:
 def declared(pyproject: dict) -> list[str]:
     """What the package asks for, and what work on it does."""
     project, groups = pyproject["project"], pyproject["dependency-groups"]
-    lines = [*project["dependencies"], *project["optional-dependencies"]["cache"]]
+    extras = project["optional-dependencies"].values()
+    lines = [*project["dependencies"], *(line for extra in extras for line in extra)]
     return lines + [line for group in groups.values() for line in group if isinstance(line, str)]
 
 

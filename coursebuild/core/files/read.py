@@ -139,7 +139,7 @@ def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
 class _Reader:
     """Reads files of one course and keeps what went wrong."""
 
-    def __init__(self, root: Path, open_texts: Mapping[str, str]) -> None:
+    def __init__(self, root: Path, open_texts: Mapping[str, str] = {}) -> None:
         self.root = root
         self.open_texts = open_texts
         self.diagnostics: list[Diagnostic] = []

@@ -1,6 +1,6 @@
 """From nodes to declared structs, with every mistake at its place.
 
-Entry point: `decode(node, type, name, words)` → `Decoding`.
+Entry points: `decode(node, type, name, words)` → `Decoding`; `description` of a field.
 
 1. One walk over the nodes, led by what `msgspec.inspect` says of the type, reports everything that
    is wrong in one go: unknown and missing fields, wrong types, impossible values. (Repeated fields
@@ -227,7 +227,7 @@ class _Decoder:
         missing = [field for field in type.fields if field.required and field.name not in values]
         for lacking in missing:
             if lacking.name not in meant:  # a misspelt field is one mistake
-                about = _description(lacking)
+                about = description(lacking)
                 help = about and f"`{lacking.name}`: {about}"
                 self.report("field-missing", node.mark, f"`{lacking.name}` is missing", help)
         if missing or _FAILED in values.values():
@@ -293,7 +293,8 @@ class _Decoder:
         return self.report("field-missing", node.mark, f"`{tag}` is missing", help)
 
 
-def _description(field: inspect.Field) -> str:
+def description(field: inspect.Field) -> str:
+    """What a field is, as its declaration says."""
     extra = field.type.extra_json_schema if isinstance(field.type, inspect.Metadata) else None
     return str((extra or {}).get("description", ""))
 

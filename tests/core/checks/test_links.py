@@ -106,9 +106,14 @@ def test_each_thing_of_a_document_that_has_an_anchor_is_known_by_it() -> None:
         + '\n$$\nx\n$$ {#eq:one}\n\n<div id="raw">\n</div>\n\nText <b id=in>b</b>'
         + " and [mass]{term}.\n"
     )
-    assert anchors(document("content/lessons/1.1-x.md", text)) == {
+    known = anchors(document("content/lessons/1.1-x.md", text))
+    assert known.keys() == {
         *("a", "a_b.py", "a_b.out", "a_b.out-2", "q1", "q1.one", "eq:one", "raw", "in", "term:mass")
     }
+    assert [known[id].text for id in ("a", "in", "term:mass")] == [
+        *("## A B {#a}", "<b id=in>", "[mass]{term}")
+    ]
+    assert known["eq:one"].start == text.index("$$")
 
 
 @pytest.mark.parametrize(

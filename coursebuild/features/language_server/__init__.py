@@ -1,0 +1,18 @@
+"""`coursebuild lsp`: what an editor shows and offers while a course is written.
+
+It needs the package pygls, of the extra `lsp`.
+"""
+
+from coursebuild.core.features import Command, Feature
+
+FEATURE = Feature(
+    name="language_server",
+    needs=("authoring", "glossary", "symbols"),
+    commands=(
+        Command(
+            name="lsp",
+            summary="serve an editor: diagnostics, completion and more while one types",
+            module=f"{__name__}.commands.lsp",
+        ),
+    ),
+)

@@ -1,0 +1,83 @@
+"""Fields of `data` and `model`, and functions of the engine, as MuJoCo's package describes them.
+
+Entry points: `members`, what stands behind a dot; `described_name`, what is said of a name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.text.source import Span
+
+_MADE = re.compile(r"(\w+)\s*=\s*mujoco\.Mj(Data|Model)\b")
+_ROOTS = {"data": "mjData", "model": "mjModel"}
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
+
+
+def members(path: tuple[str, ...], code: str) -> Mapping[str, Any]:
+    """The declarations behind `data.`, `model.opt.` or `mujoco.` in some code, by name.
+
+    A variable is of the type that the code makes it of, or that its name says.
+    """
+    import mujoco
+    from mujoco.introspect.functions import FUNCTIONS
+    from mujoco.introspect.structs import STRUCTS
+
+    if path == ("mujoco",):
+        return {name: one for name, one in FUNCTIONS.items() if hasattr(mujoco, name)}
+    roots = _ROOTS | {name: f"mj{kind}" for name, kind in _MADE.findall(code)}
+    declared: Any = STRUCTS.get(roots.get(path[0], ""))
+    for name in path[1:]:
+        inner = getattr(_fields(declared).get(name), "type", None)
+        declared = inner if hasattr(inner, "fields") else STRUCTS.get(getattr(inner, "name", ""))
+    # Some are of the library in C only.
+    known = getattr(mujoco, f"Mj{getattr(declared, 'name', '')[2:]}", None)
+    fields = _fields(declared).items()
+    return {name: one for name, one in fields if known is None or hasattr(known, name)}
+
+
+def _fields(declared: Any) -> Mapping[str, Any]:
+    fields = () if declared is None else declared.fields
+    return {field.name: field for field in fields if hasattr(field, "name")}
+
+
+def described_name(
+    code: Span, offset: int, facts: ModelFacts | None = None
+) -> tuple[Span, str] | None:
+    """The name with dots at an offset of some code, up to there, and what the engine says of it.
+
+    `facts` are those of the model at hand, whose sizes become numbers.
+    """
+    found = next(
+        (m for m in _NAME.finditer(code.source.text, code.start, code.end) if m.end() > offset),
+        None,
+    )
+    if found is None or found.start() > offset:
+        return None
+    end = found[0].find(".", offset - found.start())
+    name = found[0] if end < 0 else found[0][:end]
+    path = tuple(name.split("."))
+    declared = members(path[:-1], code.text).get(path[-1]) if len(path) > 1 else None
+    if declared is None:
+        return None
+    span = Span(code.source, found.start(), found.start() + len(name))
+    said = f"```c\n{declared}\n```\n{declared.doc}"
+    extent = getattr(declared, "array_extent", None)
+    return span, f"{said}\n\n{_shape(extent, facts)}" if extent else said
+
+
+def _shape(extent: Iterable[str | int], facts: ModelFacts | None) -> str:
+    sizes: dict[str | int, int] = {}
+    if facts is not None:
+        sizes = {"nq": facts.nq, "nv": facts.nv, "nu": facts.nu, "nbody": facts.bodies + 1}
+        sizes |= {"ngeom": facts.geoms, "njnt": facts.joints, "nkey": len(facts.keyframes)}
+    shape, known = (_tuple(size) for size in (extent, (sizes.get(one, one) for one in extent)))
+    return f"shape `{shape}`" + (f", here `{known}`" if known != shape else "")
+
+
+def _tuple(sizes: Iterable[str | int]) -> str:
+    texts = list(map(str, sizes))
+    return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"

@@ -1,0 +1,261 @@
+"""What something in a text stands for, and where that is said.
+
+Entry point: `look_up`.
+
+1. In a document it is the smallest thing at the place that stands for something: a link, a term, a
+   bound number, a formula, a kind of callout, a model or a name of the engine in code.
+2. In JSON and TOML it is a key, of which its declaration says what it is, or the id of a lesson.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from urllib.parse import unquote
+
+from msgspec import Struct
+
+from coursebuild.core import model
+from coursebuild.core.checks.links import anchors
+from coursebuild.core.model.equations import display_formulas
+from coursebuild.core.model.results import Formula, ModelFacts
+from coursebuild.core.pages.library import Library, Owner, models_named
+from coursebuild.core.pages.plainly import without_links
+from coursebuild.core.scripts.bindings import Printed
+from coursebuild.core.scripts.bound_numbers import Shown
+from coursebuild.core.syntax.decode import description
+from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.source import Source, Span
+from coursebuild.features.glossary.sentences import sentence_of
+from coursebuild.features.language_server.commands.engine import described_name
+from coursebuild.features.language_server.commands.fields import field_place
+from coursebuild.features.language_server.commands.texts import Texts
+from coursebuild.features.symbols.mathml import only_symbol, symbols
+
+_QUOTED = re.compile(r"""(["'])([^"'\s]+)\1""")
+
+
+class Definition(Struct, frozen=True):
+    """What something stands for."""
+
+    span: Span
+    """That which stands for it."""
+    text: str
+    """What it is, as Markdown."""
+    place: Span | None = None
+    """Where that is said."""
+
+
+def look_up(texts: Texts, source: Source, offset: int) -> Definition | None:
+    """What stands at an offset of a text, if it stands for anything."""
+    library, document = texts.library, texts.document(source)
+    if library is None:
+        return None
+    found = None
+    if document is not None:
+        lookup = _Lookup(texts, library, document)
+        inlines = (i for i in model.document_inlines(document) if _covers(i.span, offset))
+        blocks = (b for b in model.document_blocks(document) if _covers(b.span, offset))
+        nodes = reversed([*blocks, *inlines])
+        found = next(filter(None, (lookup.of_node(node, offset) for node in nodes)), None)
+    return found or _of_field(library, source, offset)
+
+
+def _covers(span: Span, offset: int) -> bool:
+    return span.start <= offset < span.end
+
+
+def _of_field(library: Library, source: Source, offset: int) -> Definition | None:
+    place = field_place(source, offset)
+    if place is None or place.field is None or not place.text:
+        return None
+    key, lesson = place.key, library.lessons.get(place.text)
+    if lesson is not None and key in ("id", "prerequisites"):
+        at = lesson.span if lesson.document is None else lesson.document.source.span(0, 0)
+        return Definition(place.span, f"**Lesson {lesson.id}: {lesson.title}**", at)
+    if key == "rule" and place.text in RULES:
+        return Definition(place.span, RULES[place.text].summary)
+    said = "" if key else description(place.field)
+    return Definition(place.span, f"`{place.text}`: {said}") if said else None
+
+
+class _Lookup:
+    """Of things in one document."""
+
+    def __init__(self, texts: Texts, library: Library, document: model.Document) -> None:
+        self.texts, self.library, self.document = texts, library, document
+
+    def of_node(self, node: model.Block | model.Inline, offset: int) -> Definition | None:
+        """What a node stands for, or what stands at the offset in it."""
+        match node:
+            case model.Link():
+                target = model.resolve(node.target, self.library.course, node.span.path)
+                return self.definition(node.span, *self.target(target))
+            case model.Term():
+                return self.definition(node.span, *self.target(model.TermTarget(node.id)))
+            case model.NumberBinding():
+                return self.binding(node)
+            case model.Math() | model.MathBlock():
+                return self.formula(node, offset)
+            case model.Callout() if _covers(node.kind_span, offset):
+                label = self.library.callout_label(node.kind)
+                promise = self.library.callout_promise(node.kind)
+                return Definition(node.kind_span, f"**{label}**\n\n{promise}")
+            case model.Script() | model.PlainCode() | model.FeatureBlock() | model.CodeSpan():
+                return self.code(node, offset)
+            case _:
+                return None
+
+    @staticmethod
+    def definition(span: Span, text: str, place: Span | None) -> Definition | None:
+        return Definition(span, text, place) if text else None
+
+    # --- what links lead to
+
+    def target(self, target: model.Target) -> tuple[str, Span | None]:
+        """What a link leads to, and where that is; no text where there is no such thing."""
+        library = self.library
+        match target:
+            case model.LessonTarget(id=id, anchor=anchor) if id in library.lessons:
+                lesson = library.lessons[id]
+                learnt = "\n".join(f"- {one}" for one in lesson.objectives)
+                title = f"**Lesson {id}: {lesson.title}** ({lesson.status.value})"
+                return self.owner(lesson, anchor, title, lesson.summary, learnt)
+            case model.PageTarget(id=id, anchor=anchor) if id in library.pages:
+                return self.owner(library.pages[id], anchor, f"**{library.pages[id].title}**")
+            case model.LevelTarget(id=id) if id in library.levels:
+                level = library.levels[id]
+                return f"**Level {id}: {level.title}**\n\n{level.summary}", level.span
+            case model.ModelTarget(name=name):
+                return self.of_model(name)
+            case model.ExampleTarget(path=path) if path in library.scripts:
+                script, owner = library.scripts[path]
+                return f"`{path}`, a script of {owner.id}: {owner.title}", script.path_span
+            case model.TermTarget(id=id) if id in library.terms:
+                return self.term(id, library.terms[id])
+            case model.UrlTarget(url=url) if url.startswith("#"):
+                return self.anchor(self.document, url[1:])
+            case model.UrlTarget(url=url):
+                path = model.local_file(url, self.document.source.path)
+                known = path in library.course.files
+                return (f"`{path}`", Source(path, "").span()) if known else ("", None)
+            case _:
+                return "", None
+
+    def owner(self, owner: Owner, anchor: str | None, *lines: str) -> tuple[str, Span | None]:
+        document = self.document_of(owner)
+        text, place = "", owner.span
+        if document is not None:
+            text, found = self.anchor(document, anchor or "")
+            place = found or document.source.span(0, 0)
+        return _paragraphs(*lines, text), place
+
+    def document_of(self, owner: Owner) -> model.Document | None:
+        """Another document as it is now, whole."""
+        source = self.texts.source(owner.path)
+        return None if source is None else self.texts.document(source)
+
+    def anchor(self, document: model.Document, anchor: str) -> tuple[str, Span | None]:
+        """What an id of a page is: a formula, or the line at its place."""
+        name = unquote(anchor)
+        place = anchors(document).get(name)
+        tex = next((f.tex for f in display_formulas(document) if name and f.id == name), None)
+        if place is None or tex is None:
+            return ("" if place is None else place.first_line().text.lstrip("# ")), place
+        return f"```tex\n{tex.strip()}\n```", place
+
+    def of_model(self, name: str) -> tuple[str, Span | None]:
+        found = next((one for one in self.library.course.models if one.name == name), None)
+        if found is None:
+            return "", None
+        facts = self.facts((name,))
+        held = facts and (
+            f"{facts.bodies} bodies, {facts.geoms} geoms; nq = {facts.nq}, nv = {facts.nv}, "
+            f"nu = {facts.nu}; {facts.integrator}, timestep {facts.timestep:g} s"
+        )
+        path = found.source.path
+        return _paragraphs(f"**{path}**", found.about, held or ""), found.source.span(0, 0)
+
+    def facts(self, models: Iterable[str]) -> ModelFacts | None:
+        """Those of the first of some models that compiles."""
+        known = (self.library.models.get(name) for name in models)
+        return next((one.facts for one in known if one is not None and one.facts is not None), None)
+
+    def term(self, id: str, owner: Owner) -> tuple[str, Span | None]:
+        """The sentence that defines a term."""
+        document = self.document_of(owner)
+        blocks = () if document is None else model.document_blocks(document)
+        for paragraph in [block for block in blocks if isinstance(block, model.Paragraph)]:
+            for term in model.walk_inlines(paragraph.children):
+                if isinstance(term, model.Term) and term.id == id:
+                    sentence = without_links(sentence_of(paragraph.children, term))
+                    said = (i.text if isinstance(i, model.Text) else i.span.text for i in sentence)
+                    return _paragraphs(f"**{term.name}**", "".join(said).strip()), term.span
+        return "", None
+
+    # --- formulas, numbers, code
+
+    def formula(self, formula: model.Math | model.MathBlock, offset: int) -> Definition | None:
+        """The symbols in a formula whose meaning the text declares."""
+        known = self.texts.formulas(self.document.source.path)
+
+        def mathml(one: model.Math | model.MathBlock) -> str:
+            display = isinstance(one, model.MathBlock) or one.display
+            return known.get(Formula(one.tex.text, display), "")
+
+        declared = {
+            only_symbol(mathml(one)): (one, one.meaning)
+            for one in model.document_inlines(self.document)
+            if isinstance(one, model.Math) and one.meaning is not None
+        }
+        found = [declared[symbol] for symbol in symbols(mathml(formula)) if symbol in declared]
+        said = [
+            f"- `{one.tex.text}`: {meaning.text}{meaning.unit and f', {meaning.unit}'}"
+            for one, meaning in found
+        ]
+        at = [one for one, _ in found if _stands_at(one.tex.text, formula.span, offset)]
+        first = next(iter([*at, *(one for one, _ in found)]), None)
+        return None if first is None else Definition(formula.span, "\n".join(said), first.span)
+
+    def binding(self, binding: model.NumberBinding) -> Definition | None:
+        """The printed line that bears a number out."""
+        results, shown = self.library.results, Shown.of(binding.text)
+        printed = Printed(results.verdicts, results.runs, self.library.scripts)
+        for verdict in printed.recorded(binding) if shown.numbers else ():
+            for window in shown.windows(printed.lines(verdict)):
+                if shown.shows(window) and window.line.locate is not None:
+                    place = window.line.locate(window.numbers[0].start, window.numbers[-1].end)
+                    said = f"`{verdict.recording.script}` printed\n```text\n{window.line.text}\n```"
+                    return Definition(binding.span, said, place)
+        return None
+
+    def code(
+        self,
+        node: model.Script | model.PlainCode | model.FeatureBlock | model.CodeSpan,
+        offset: int,
+    ) -> Definition | None:
+        """A model in quotes, or a name of the engine."""
+        named: Iterable[str] = ()
+        if isinstance(node, model.Script):
+            named = models_named(node)
+        elif isinstance(node, model.FeatureBlock):
+            named = node.models()
+        text = node.span.source.text
+        for quoted in _QUOTED.finditer(text, node.span.start, node.span.end):
+            if quoted.start() <= offset < quoted.end():
+                name = quoted[2].removeprefix("models/").removesuffix(".xml")
+                said, place = self.of_model(name)
+                if said:
+                    return Definition(Span(node.span.source, *quoted.span(2)), said, place)
+        described = described_name(node.span, offset, self.facts(sorted(named)))
+        return None if described is None else Definition(*described)
+
+
+def _stands_at(tex: str, span: Span, offset: int) -> bool:
+    """Whether some TeX stands at an offset of a formula."""
+    found = re.finditer(re.escape(tex), span.text)
+    return any(one.start() <= offset - span.start < one.end() for one in found)
+
+
+def _paragraphs(*texts: str) -> str:
+    return "\n\n".join(filter(None, texts))

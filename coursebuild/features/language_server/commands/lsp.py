@@ -1,0 +1,102 @@
+"""`coursebuild lsp`: a language server on standard input and output, until its client goes.
+
+1. The course is read before anything is answered, and then followed as the preview does it: a
+   thread takes saves (`preview.saves`), the main thread runs scripts and labs (`preview.rebuild`).
+2. A thread answers the client, one reads what is typed, one publishes diagnostics.
+3. Authors' files are only read: it is the client that edits them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import threading
+import traceback
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, BinaryIO, NoReturn
+
+from coursebuild.cli.arguments import add_cache, options_of
+from coursebuild.cli.output import CLEAN
+from coursebuild.core.files.errors import UsageError
+from coursebuild.pipeline.progress import Progress
+from coursebuild.preview.rebuild import BackgroundRebuild
+from coursebuild.preview.saves import follow
+from coursebuild.preview.session import Session
+from coursebuild.preview.watcher import FolderWatcher
+from coursebuild.report import Style
+
+if TYPE_CHECKING:
+    from coursebuild.features.language_server.commands.server import Server
+
+EXAMPLES = """\
+examples:
+  coursebuild lsp -C ~/course            what an editor is told to start
+"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """What can be said."""
+    add_cache(parser)
+    parser.add_argument(
+        "--stdio", action="store_true", help="as many editors say; it does so anyway"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until the client goes."""
+    if find_spec("pygls") is None:
+        raise UsageError("the language server needs pygls: `pip install 'coursebuild[lsp]'`")
+    from coursebuild.features.language_server.commands.server import Server
+
+    options = options_of(arguments)
+    stdin, stdout = _take_streams()
+    session, watcher = Session(options, site=False), FolderWatcher(options.root)
+    rebuild = BackgroundRebuild(session, options, Progress(quiet=True), Style())
+    server = Server(session, options.store)
+    try:
+        session.start(options, Progress(quiet=True))
+        watcher.start()
+        watcher.wait()
+        _begin(lambda: follow(session, watcher, lambda paths, seconds: None))
+        _begin(server.take_typing)
+        _begin(server.publish)
+        threading.Thread(target=_answer, args=(server, stdin, stdout), daemon=True).start()
+        _persist(rebuild.follow)
+    except KeyboardInterrupt:  # as `_answer` ends this
+        return CLEAN
+    finally:
+        watcher.stop()
+        rebuild.close()
+        session.close()
+        options.store.close()
+
+
+def _take_streams() -> tuple[BinaryIO, BinaryIO]:
+    """The streams of the client, which nothing else in this process reads or writes from now on."""
+    streams = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
+    return streams
+
+
+def _answer(server: Server, stdin: BinaryIO, stdout: BinaryIO) -> None:
+    """Answer the client until it goes, and end whatever the main thread does."""
+    server.client.start_io(stdin, stdout)
+    main = threading.main_thread().ident
+    assert main is not None
+    signal.pthread_kill(main, signal.SIGTERM)
+
+
+def _begin(work: Callable[[], None]) -> None:
+    threading.Thread(target=_persist, args=(work,), daemon=True).start()
+
+
+def _persist(work: Callable[[], None]) -> NoReturn:
+    """Do lasting work; after a bug, which the editor's log shows, it goes on."""
+    while True:
+        try:
+            work()
+        except Exception:
+            traceback.print_exc()

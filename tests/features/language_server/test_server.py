@@ -1,0 +1,357 @@
+"""What an editor is told and offered: one server, asked over pipes by pygls' client."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from lsprotocol import types
+from pygls.exceptions import JsonRpcException
+
+from support.editor import Editor
+from support.scratch_course import Folder, block, wait_until_alone
+
+pytestmark = pytest.mark.site
+
+ONE, TWO, MAP = "content/lessons/1.1-one.md", "content/lessons/1.2-two.md", "content/course.toml"
+FALL = """## Fall 🪂
+
+The [moment of inertia]{term} weighs mass by its distance. Turning is $\\omega${symbol="angular
+velocity" unit="rad/s"}, in $\\tfrac12 I \\omega^2$ too.
+
+$$E = m g h$$ {#eq:energy}
+
+```python file=examples/fall.py
+import mujoco
+from mjcourse import model_path
+
+model = mujoco.MjModel.from_xml_path(str(model_path("ball")))
+data = mujoco.MjData(model)
+mujoco.mj_step(model, data)
+print(f"after {model.opt.timestep} s at {data.qpos[2]:.3f} m")
+```
+
+Output:
+
+```text
+after 0.002 s at 1.000 m
+```
+
+So it is at `1.000`{out} m.
+
+> [!warning] Careful
+> It falls.
+
+```lab simlab
+{"model": "ball",
+ "title": "A ball",
+ "readouts": [{"label": "height", "expr": "data.qpos[2]"}]}
+```
+"""
+LINKS = """## Links
+
+See [the ball](model:ball), [what turns](term:moment-of-inertia), [falling](lesson:1.1#fall),
+[energy](lesson:1.1#eq:energy), [the script](examples/fall.py), Lesson 1.1 and [here](#links).
+"""
+BALL = """<!-- A ball in the air. -->
+<mujoco>
+  <worldbody>
+    <body pos="0 0 1"><freejoint/><geom size="0.1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.fixture(scope="module")
+def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[Editor]:
+    folder = Folder((tmp_path_factory.mktemp("course") / "a cöurse").resolve())
+    folder.write("models/ball.xml", BALL)
+    folder.fill([FALL, LINKS], stores)
+    editor = Editor(folder)
+    for path in (ONE, TWO, MAP):
+        editor.write(path, folder.text(path))
+    while "nq = 7" not in editor.hover_text(TWO, "model:ba|ll"):
+        pass  # until everything has run once
+    yield editor
+    assert editor.close() == 0
+    wait_until_alone(folder)
+
+
+@pytest.fixture(autouse=True)
+def unchanged(editor: Editor) -> Iterator[None]:
+    """Each test finds the course as it was, and the server has written into none of its files."""
+    known = {path: editor.folder.text(path) for path in (ONE, TWO, MAP)}
+    yield
+    for path, text in known.items():
+        editor.write(path, text)
+        editor.save(path)
+    for path in known:
+        editor.until(path)
+
+
+# --- diagnostics
+
+
+def test_mistakes_are_told_as_they_are_typed_and_nothing_is_saved(editor: Editor) -> None:
+    editor.write(TWO, LINKS.replace("\n", "\r\n") + "\r\n🙂 𝄞 Lesson 9.9 is not there.\r\n")
+    (told,) = editor.until(TWO, "link-lesson")
+    place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
+    assert told.range == types.Range(place, types.Position(5, 16))
+    assert told.severity == types.DiagnosticSeverity.Error
+    assert told.message.startswith("lesson 9.9 is mentioned, and the course map does not have it")
+    assert told.code_description and told.code_description.href.endswith("rules.html#link-lesson")
+    editor.write(TWO, LINKS)
+    editor.until(TWO)
+    assert editor.folder.text(TWO) == LINKS
+
+
+def test_a_mistake_says_where_else_it_is(editor: Editor) -> None:
+    editor.write(TWO, LINKS + "\nA [moment of inertia]{term} again.\n")
+    (told,) = editor.until(TWO, "term-repeated")
+    (note,) = told.related_information or ()
+    assert (editor.places.path(note.location.uri), note.location.range.start.line) == (ONE, 2)
+
+
+def test_what_a_script_printed_is_compared_as_one_types(editor: Editor) -> None:
+    editor.until(ONE)
+    typed = FALL.replace("at 1.000 m\n```", "at 1.700 m\n```").replace("`1.000`", "`1.3`")
+    typed = f"New lines above.\n\n{typed}"
+    editor.write(ONE, typed)
+    drift, bound = editor.until(ONE, "output-drift", "binding-mismatch")
+    assert "this run printed 1.000" in drift.message
+    assert (drift.range.start.line, bound.range.start.line) == (22, 25)
+
+
+def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
+    typed = FALL.replace("print(", 'print("a ball", ')
+    editor.write(ONE, typed)
+    editor.until(ONE)  # what it prints now is not known yet
+    editor.save(ONE)
+    editor.until(ONE, "output-drift")
+    editor.write(ONE, "A line more.\n\n" + typed)
+    (told,) = editor.until(ONE, "output-drift")
+    assert told.range.start.line == 20
+    accept = "Accept what `examples/fall.py` prints"
+    action = None
+    while action is None:  # offered once the script has run a second time
+        action = editor.actions(ONE, "at 1.|000 m").get(accept)
+    assert action.kind == types.CodeActionKind.QuickFix and action.diagnostics
+    (new,) = editor.edited(action.edit.changes).values()
+    assert new == ("A line more.\n\n" + typed).replace("\nafter", "\na ball after")
+    editor.write(ONE, new)
+    editor.until(ONE)
+
+
+def test_a_map_that_is_being_written_is_told_and_the_rest_stays(editor: Editor) -> None:
+    text = editor.texts[MAP]
+    editor.write(MAP, text + "\n[[silence]]\nrule = \n")
+    (told,) = editor.until(MAP, "map-syntax")
+    assert told.range.start.line == text.count("\n") + 2
+    assert editor.hover_text(TWO, "lesson:1.|1#fall").startswith("**Lesson 1.1: ")
+
+
+ODD = ("", "\0", "\ud83d", "```lab simlab\n{", "> [!", "$$", "[x](lesson:", "| a\n|-", "é" * 9999)
+
+
+def test_any_text_is_read(editor: Editor) -> None:
+    for text in ODD:
+        for path in (ONE, MAP, "models/ball.xml"):
+            editor.write(path, text)
+            for ask in (editor.hover_text, editor.proposals, editor.actions):
+                ask(path, "|" + text)
+    editor.leave("models/ball.xml")
+    nowhere = types.TextDocumentIdentifier("untitled:Untitled-1")
+    assert editor.request("hover", types.HoverParams(nowhere, types.Position(5, 5))) is None
+
+
+def test_a_model_that_goes_is_missed(editor: Editor) -> None:
+    editor.until(TWO)
+    (editor.folder.root / "models/ball.xml").unlink()
+    editor.until(TWO, "link-model")
+    editor.folder.write("models/ball.xml", BALL)
+    editor.until(TWO)
+
+
+# --- what things are
+
+HOVERS = [
+    (ONE, "$\\om|ega${symbol", "- `\\omega`: angular velocity, rad/s"),
+    (ONE, "I \\om|ega^2", "- `\\omega`: angular velocity, rad/s"),
+    (ONE, "data.qp|os[2]:", "mjtNum * qpos"),
+    (ONE, "model.opt.time|step", "timestep"),
+    (ONE, "mujoco.mj_st|ep(", "Advance simulation"),
+    (ONE, '"expr": "data.qp|os', "position"),
+    (ONE, "`1.0|00`{out}", "after 0.002 s at 1.000 m"),
+    (ONE, "[!warn|ing]", "Something here goes wrong easily, or costs dearly."),
+    (ONE, '"tit|le"', "`title`: "),
+    (ONE, 'model_path("ba|ll")', "A ball in the air."),
+    (TWO, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),
+    (
+        TWO,
+        "term:mom|ent",
+        "\n\nThe moment of inertia weighs mass by its distance.",
+    ),
+    (TWO, "lesson:1.1#fa|ll", "**Lesson 1.1: "),
+    (TWO, "lesson:1.1#eq:en|ergy", "```tex\nE = m g h\n```"),
+    (TWO, "examples/fa|ll.py", "`examples/fall.py`, a script of 1.1"),
+    (MAP, "stat|us =", ""),
+]
+
+
+@pytest.mark.parametrize(("path", "needle", "said"), HOVERS)
+def test_what_something_is(editor: Editor, path: str, needle: str, said: str) -> None:
+    editor.until(path)
+    assert said in editor.hover_text(path, needle)
+
+
+def test_shapes_are_those_of_the_model_at_hand(editor: Editor) -> None:
+    editor.until(ONE)
+    assert "shape `(nq,)`, here `(7,)`" in editor.hover_text(ONE, "data.qp|os[2]:")
+
+
+@pytest.mark.parametrize(
+    ("path", "needle", "place"),
+    [
+        (ONE, "I \\om|ega^2", f"{ONE}:3"),
+        (ONE, "`1.0|00`{out}", f"{ONE}:21"),
+        (TWO, "model:ba|ll", "models/ball.xml:1"),
+        (TWO, "term:mom|ent", f"{ONE}:3"),
+        (TWO, "lesson:1.1#fa|ll", f"{ONE}:1"),
+        (TWO, "lesson:1.1#eq:en|ergy", f"{ONE}:6"),
+        (TWO, "examples/fa|ll.py", f"{ONE}:8"),
+        (TWO, "Lesson 1.|1 and", f"{ONE}:1"),
+        (TWO, "(#li|nks)", f"{TWO}:1"),
+        (MAP, 'id = "1.|2"', f"{TWO}:1"),
+    ],
+)
+def test_where_something_is_said(editor: Editor, path: str, needle: str, place: str) -> None:
+    assert editor.defined_at(path, needle) == place
+
+
+# --- what may be written
+
+
+@pytest.mark.parametrize(
+    ("path", "written", "label", "new"),
+    [
+        (TWO, "[x](lesson:|", "1.1", "1.1"),
+        (TWO, "As Lesson 1|", "1.2", "1.2"),
+        (TWO, "[x](model:b|", "ball", "ball"),
+        (TWO, "[x](term:|", "moment-of-inertia", "moment-of-inertia"),
+        (TWO, "[x](lesson:1.1#|", "eq:energy", "eq:energy"),
+        (TWO, "`1`{out=|", "examples/fall.py", "examples/fall.py"),
+        (TWO, "> [!w|", "warning", "warning"),
+        (TWO, "```|", "quiz", "quiz"),
+        (TWO, "```python\nmodel.opt.|\n```", "timestep", "timestep"),
+        (TWO, '```lab simlab\n{"camera": {"|}}\n```', "azimuth", '"azimuth"'),
+        (TWO, '```quiz\n{"questions": [{"kind": "|"}]}\n```', "mcq", '"mcq"'),
+        (TWO, '```quiz\n{"questions": [{"kind": "numeric", |}]}\n```', "tol", '"tol"'),
+        (MAP, "\n[[silence]]\nrule = |", "heading-skip", '"heading-skip"'),
+        (MAP, "\n[[level]]\n|", "title", "title"),
+        (MAP, '\n[[level.lesson]]\nprerequisites = ["1.1", "|', "1.2", '"1.2"'),
+        (MAP, "\n[[level.lesson]]\nstatus = |", "draft", '"draft"'),
+    ],
+)
+def test_what_may_be_written(editor: Editor, path: str, written: str, label: str, new: str) -> None:
+    editor.write(path, editor.texts[path] + "\n" + written.replace("|", "", 1))
+    item = editor.proposals(path, written)[label]
+    assert isinstance(item.text_edit, types.TextEdit)
+    (text,) = editor.edited({editor.places.uri(path): [item.text_edit]}).values()
+    before, after = written.split("|", 1)
+    stem = re.split(r'[\s:#=.!`("\[{]', before)[-1]
+    start = before.removesuffix('"' + stem) if new.startswith('"') else before.removesuffix(stem)
+    assert text.endswith(start + new + after.removeprefix('"'))
+
+
+def test_keys_of_another_kind_of_question_are_not_proposed(editor: Editor) -> None:
+    editor.write(TWO, '```quiz\n{"questions": [{"kind": "numeric", "q": "?", }]}\n```\n')
+    proposed = editor.proposals(TWO, '"q": "?", |')
+    assert "tol" in proposed
+    assert not {"options", "q", "kind"} & proposed.keys()
+
+
+# --- what is offered
+
+
+def test_a_number_that_was_printed_can_be_bound(editor: Editor) -> None:
+    said = "It fell for 0.002 s, not 5 s, to `1.000` m."
+    text = FALL.replace("> [!warning]", f"{said}\n\n> [!warning]")
+    editor.write(ONE, text)
+    (bind,) = editor.actions(ONE, "for 0.0|02 s, not").values()
+    assert bind.title == "Bind `0.002` to what `examples/fall.py` prints"
+    assert editor.edited(bind.edit.changes)[ONE] == text.replace(
+        "r 0.002 s, not", "r `0.002`{out} s, not"
+    )
+    (bind,) = editor.actions(ONE, "to `1.0|00` m.").values()
+    assert editor.edited(bind.edit.changes)[ONE] == text.replace("`1.000` m.", "`1.000`{out} m.")
+    assert not editor.actions(ONE, "not |5 s")
+    assert not editor.actions(ONE, "at 1.|000 m\n```")
+
+
+def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
+    text = FALL.replace("at `1.000`{out} m", "at `1.200 m`{out}")
+    editor.write(ONE, text)
+    editor.until(ONE, "binding-mismatch")
+    (fix,) = editor.actions(ONE, "`1.2|00 m`").values()
+    assert (fix.title, fix.kind) == ("Write `1.000 m`", types.CodeActionKind.QuickFix)
+    assert editor.edited(fix.edit.changes)[ONE] == text.replace("1.200", "1.000")
+
+
+def test_a_lesson_gets_another_id_everywhere(editor: Editor) -> None:
+    place = editor.named(TWO), editor.place(TWO, "lesson:1.|1#fall")
+    found = editor.request("prepare_rename", types.PrepareRenameParams(*place))
+    assert found.end.character - found.start.character == len("1.1")
+    done = editor.request("rename", types.RenameParams(*place, new_name="1.5"))
+    *edits, moved = done.document_changes
+    assert editor.places.path(moved.new_uri) == "content/lessons/1.5-one.md"
+    new = editor.edited({edit.text_document.uri: edit.edits for edit in edits})
+    assert new[TWO] == LINKS.replace("1.1", "1.5")
+    assert 'id = "1.5"' in new[MAP]
+    assert 'id = "1.1"' not in new[MAP]
+    with pytest.raises(JsonRpcException, match=r"there is a lesson 1\.2 already"):
+        editor.request("rename", types.RenameParams(*place, new_name="1.2"))
+    heading = editor.named(TWO), editor.place(TWO, "## L|inks")
+    assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None
+
+
+def test_headings_and_what_can_be_folded(editor: Editor) -> None:
+    editor.write(TWO, "## A\n\n### B `c`\n\n> [!tip]\n> Fold\n\n## D\n\n```text\nx\n```\n")
+    named = editor.named(TWO)
+    symbols = editor.request("document_symbol", types.DocumentSymbolParams(named))
+    assert [(s.name, [i.name for i in s.children]) for s in symbols] == [("A", ["B c"]), ("D", [])]
+    folds = editor.request("folding_range", types.FoldingRangeParams(named))
+    lines = sorted((one.start_line, one.end_line) for one in folds)
+    assert lines == [(0, 5), (2, 5), (4, 5), (7, 11), (9, 11)]
+
+
+def test_a_text_is_formatted(editor: Editor) -> None:
+    asked = editor.named(TWO), types.FormattingOptions(4, True)
+    editor.write(TWO, "## A\n\n| a | b |\n|-|-|\n| 100 | 2 |\n")
+    (edit,) = editor.request("formatting", types.DocumentFormattingParams(*asked))
+    new = "## A\n\n| a   | b   |\n| --- | --- |\n| 100 | 2   |\n"
+    assert editor.edited({editor.places.uri(TWO): [edit]}) == {TWO: new}
+    editor.write(TWO, new)
+    assert not editor.request("formatting", types.DocumentFormattingParams(*asked))
+
+
+# --- the command
+
+
+def test_the_server_ends_with_its_client(tmp_path: Path, stores: Path) -> None:
+    folder = Folder((tmp_path / "course").resolve())
+    script = "import time\ntime.sleep(600)\n"
+    folder.fill(["## Wait\n\n" + block("long.py", script)], stores)
+    assert Editor(folder).close() == 0
+    wait_until_alone(folder)
+
+
+def test_without_pygls_the_command_says_what_to_install(tmp_path: Path, stores: Path) -> None:
+    folder = Folder(tmp_path / "course")
+    folder.fill(["## One\n"], stores)
+    code = "import sys; sys.modules['pygls'] = None; from coursebuild.cli import main; main()"
+    process = folder.start("lsp", code=code, stderr=subprocess.PIPE)
+    said = b"coursebuild: the language server needs pygls: `pip install 'coursebuild[lsp]'`\n"
+    assert (process.communicate()[1], process.returncode) == (said, 2)
