@@ -3,9 +3,8 @@
 pytest finds this plug-in by itself. Without the option, or `coursebuild = true` in pytest's
 configuration, it does nothing.
 
-1. To collect tests, a course is read; nothing of it runs.
-2. When the first test of a course runs, `coursebuild check` checks the lessons of all chosen tests.
-3. A diagnostic belongs to the test in whose text it stands, else to its page or model, else to the
+1. When the first test of a course runs, `coursebuild check` checks the lessons of all chosen tests.
+2. A diagnostic belongs to the test in whose text it stands, else to its page or model, else to the
    map.
 """
 
@@ -148,10 +147,8 @@ def _parts(document: Document, trials: Mapping[int, str]) -> Iterator[tuple[str,
 
     for block in document_blocks(document):
         name: str | None = None
-        if isinstance(block, Script):
-            name = block.path
-        elif isinstance(block, Recording):
-            name = block.script
+        if isinstance(block, Script | Recording):
+            name = block.path if isinstance(block, Script) else block.script
         elif isinstance(block, FeatureBlock):
             name = trials.get(id(block)) or (block.progress_keys() or (None,))[0]
         if name is not None:
