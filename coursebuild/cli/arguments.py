@@ -48,7 +48,7 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cache",
         metavar="PLACE",
-        help="share results at a folder or an URL such as s3://… (default: $COURSEBUILD_CACHE)",
+        help="share results at a folder or a URL such as s3://… (default: $COURSEBUILD_CACHE)",
     )
     parser.add_argument(
         "--no-cache",
@@ -73,7 +73,7 @@ def add_running(parser: argparse.ArgumentParser) -> None:
         "-j",
         type=_jobs,
         metavar="N",
-        help="scripts at a time (default: one a core)",
+        help="scripts at a time (default: one per core)",
     )
     add_cache(parser)
 
@@ -97,16 +97,12 @@ def add_lessons(parser: argparse.ArgumentParser) -> None:
 def add_long(parser: argparse.ArgumentParser) -> None:
     """What is done with scripts of which the course keeps a run."""
     parser.add_argument(
-        "--long", action="store_true", help="run scripts too that are recorded once"
+        "--long", action="store_true", help="also run scripts that are recorded once"
     )
 
 
 def add_format(parser: argparse.ArgumentParser, *formats: str) -> None:
     """The formats of what is printed."""
-    said = "(default: %(default)s)"
     parser.add_argument(
-        "--format",
-        choices=formats,
-        default="text",
-        help=f"how to print what was found {said}" if len(formats) > 2 else said,
+        "--format", choices=formats, default="text", help="how to print it (default: %(default)s)"
     )

@@ -1,4 +1,4 @@
-"""`coursebuild completion`: print what completes commands in a shell.
+"""`coursebuild completion`: print the completion script of a shell.
 
 What it prints asks this command in turn, with the words of the line behind `--`, what the last one
 may become. Where nothing is known the shell completes names of files.

@@ -30,8 +30,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--host",
         default="127.0.0.1",
-        help="address to listen on (default: %(default)s, this machine only); on another one only "
-        "browsers are answered that open the link with the token which is printed",
+        help="address to listen on (default: %(default)s, this machine only); any other one "
+        "answers only browsers that open the printed link, with its token",
     )
     parser.add_argument("--open", action="store_true", help="open it in a browser")
     parser.add_argument(

@@ -57,7 +57,7 @@ CORE_COMMANDS = {
     "export": "verify everything and write the course as one file",
     "explain": "say what a rule means, or why something would run again",
     "schema": "print a JSON Schema for an editor",
-    "completion": "print what completes commands in a shell",
+    "completion": "print the completion script of a shell",
 }
 """The commands of every course, each in the module `coursebuild.cli.NAME`, and what they do."""
 

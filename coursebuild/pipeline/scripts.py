@@ -70,7 +70,7 @@ def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
 
 _LEFT = {
     Obstacle.EDITED: "{path} was edited by hand since it was extracted, so it is left as it is",
-    Obstacle.FOREIGN: "{path} holds something else than this block, which was not extracted there",
+    Obstacle.FOREIGN: "{path} does not hold this block, and was not extracted",
     Obstacle.ORPHAN: "{path} was edited by hand, and no lesson has this script any more",
     Obstacle.LINK: "{path} is, or lies behind, a link, and nothing is written through links",
     Obstacle.FOLDER: "{path} cannot be written: a folder and a file would have the same name",

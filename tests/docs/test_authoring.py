@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,16 +22,15 @@ from xml.etree import ElementTree
 import pytest
 
 from coursebuild.cli import main
-from coursebuild.cli.commands import known_commands
 from coursebuild.core.model.vocabulary import CALLOUTS
-from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.core.text.rules import RULES
-from support.markdown_files import DOCS, PAGES, Fence, code_spans, fences, write_files
+from support.markdown_files import PAGES, Fence, code_spans, fences, write_files
 from support.scratch_course import Folder
 
 pytestmark = pytest.mark.engine
 
-FENCES = [fence for path in PAGES for fence in fences(path)]
+GUIDE = [path for path in PAGES if path.stem != "tutorial"]  # which has a course of its own
+FENCES = [fence for path in GUIDE for fence in fences(path)]
 SPANS = [span for path in PAGES for span in code_spans(path)]
 CODE = [*SPANS, *(fence.text for fence in FENCES)]
 LESSONS = [fence for fence in FENCES if fence.is_("lesson")]
@@ -222,42 +220,43 @@ def quoted(name: str) -> bool:
     return any(word.search(code) for code in CODE)
 
 
-def fields(schema: object) -> Iterator[str]:
-    """Every name of a field in a schema."""
-    if isinstance(schema, dict):
-        yield from schema.get("properties", {})
-        for part in schema.values():
-            yield from fields(part)
-    elif isinstance(schema, list):
-        for part in schema:
-            yield from fields(part)
-
-
-@pytest.mark.parametrize("name", ["course", "lab", "quiz"])
-def test_every_field_is_named(name: str) -> None:
-    missing = {field for field in fields(json.loads(json_schema(name))) if not quoted(field)}
-    assert missing == set()
-
-
 def test_every_callout_kind_is_named() -> None:
     assert [kind.name for kind in CALLOUTS if not quoted(kind.name)] == []
 
 
-def test_every_key_of_a_fence_is_named(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+PAGE_OF_KIND = {
+    "python": "scripts", "io": "scripts", "text": "outputs", "mjcf": "models", "bench": "models",
+    "lab": "labs", "lab mjcf": "labs", "quiz": "quizzes",
+}  # fmt: skip
+
+
+def test_every_key_of_a_fence_is_on_its_page(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The tool itself lists the keys of a kind, when it is given one that is far from all."""
     bodies = {"io": "INPUT: a\nPROCESS: b\nOUTPUT: c", "quiz": "{}", "lab": "{}"}
-    kinds = ("python", "text", "io", "mjcf", "bench", "quiz", "lab")
-    parts = (f"```{kind} zzzzzzzz=1\n{bodies.get(kind, '')}\n```\n" for kind in kinds)
+    parts = (f"```{kind} zzzzzzzz=1\n{bodies.get(kind, '')}\n```\n" for kind in PAGE_OF_KIND)
     with_second_lesson(course, "## A\n\n" + "\n".join(parts))
     found = check(course, capsys)["diagnostics"]
     wrong = [d for d in found if d["rule"] == "fence-key-unknown"]
-    assert len(wrong) == len(kinds)
-    unnamed = []
-    for one in wrong:
-        keys = re.findall(r"`([^`]+)`", one["help"] or "")
-        assert keys or "takes no keys" in one["message"]
-        unnamed += [key for key in keys if not quoted(key)]
-    assert unnamed == []
+    keys: dict[str, set[str]] = {page: set() for page in PAGE_OF_KIND.values()}
+    for page, one in zip(PAGE_OF_KIND.values(), wrong, strict=True):
+        named = set(re.findall(r"`([^`]+)`", one["help"] or ""))
+        assert named or "takes no keys" in one["message"]
+        keys[page] |= named
+    for page, named in keys.items():
+        (path,) = (path for path in GUIDE if path.stem == page and "reference" in path.parts)
+        spans = " ".join([*code_spans(path), *(fence.text for fence in fences(path))])
+        assert {key for key in named if not re.search(rf"(?<![\w-]){key}(?![\w-])", spans)} == set()
+        assert keys_in_tables(path) <= named
+
+
+def keys_in_tables(path: Path) -> set[str]:
+    """The keys in the first column of the tables of keys on a page."""
+    text = path.read_text(encoding="utf-8")
+    tables = re.findall(r"^\| (?:key|on the fence) \|.*\n\|.*\n((?:\|.*\n)+)", text, re.MULTILINE)
+    cells = (row.split("|")[1] for table in tables for row in table.splitlines())
+    return {key for cell in cells for key in re.findall(r"`(\w+)", cell)}
 
 
 def test_every_rule_on_the_page_exists() -> None:
@@ -266,13 +265,3 @@ def test_every_rule_on_the_page_exists() -> None:
     rules = {name for name in names if name.split("-")[0] in first_words}
     assert len(rules) > 10
     assert sorted(rules - RULES.keys()) == []
-
-
-def test_every_command_and_option_is_named() -> None:
-    unnamed = [command for command in known_commands() if not quoted(command)]
-    for command in ("help", *known_commands()):
-        done = Folder(DOCS).main(command, "--help")
-        assert done.status == 0
-        options = set(re.findall(r"(?<![\w-])--[a-z-]+", done.out))
-        unnamed += [(command, option) for option in sorted(options) if not quoted(option)]
-    assert unnamed == []

@@ -12,7 +12,16 @@ import pytest
 
 from coursebuild.pipeline.load import load
 from support.built_sites import BuiltCourses
-from support.markdown_files import DOCS, PAGES, ROOT, code_spans, fences, links, write_files
+from support.markdown_files import (
+    DOCS,
+    PAGES,
+    ROOT,
+    anchors,
+    code_spans,
+    fences,
+    links,
+    write_files,
+)
 from support.scratch_course import Folder
 
 README = ROOT / "README.md"
@@ -106,13 +115,17 @@ def test_every_command_exists() -> None:
 # -------------------------------------------------------------------------------------- links
 
 
-@pytest.mark.parametrize("path", [README, ROOT / "benchmarks/README.md"], ids=str)
-def test_links_of_files_that_are_no_pages(path: Path) -> None:
-    for url in links(path):
-        if not re.match(r"https?://", url):
-            target, _, anchor = unquote(url).partition("#")
-            assert not anchor, "headings have no anchors outside of a built page"
-            assert (path.parent / target).is_file(), url
+def test_links_lead_where_the_repository_is_read() -> None:
+    others = [*ROOT.glob("plugins/*/README.md"), ROOT / "benchmarks/README.md"]
+    lost = []
+    for path in [README, *DOCS.rglob("*.md"), *others]:
+        for url in links(path):
+            name, _, anchor = unquote(url).partition("#")
+            target = path.parent / name if name else path
+            if not re.match(r"https?://", url):
+                there = target.is_file() and (not anchor or anchor in anchors(target))
+                lost += [] if there else [(path.relative_to(ROOT).as_posix(), url)]
+    assert lost == []
 
 
 def test_every_document_is_a_page_without_mistakes() -> None:

@@ -71,7 +71,7 @@ def test_an_edited_file_is_never_overwritten(make: Make) -> None:
     folder.write(folder.lesson(), TWO)
     folder.write("examples/a.py", "something of mine\n")
     done = folder.main("extract")
-    assert (done.status, "examples/a.py holds something else than this block" in done.out) == (
+    assert (done.status, "examples/a.py does not hold this block" in done.out) == (
         1,
         True,
     )

@@ -28,7 +28,7 @@ def at(text: str, part: str) -> tuple[Source, int, int]:
 def test_frame_label_help_and_notes() -> None:
     source, a, b = at("one\n" * 209 + "  Euler  kinetic energy  +6.641 %\nlast line\n", "+6.641")
     note = Note("classes: numeric 1\nsecond line")
-    place = Note("leans on it", source.span(0, 3))
+    place = Note("depends on it", source.span(0, 3))
     diagnostic = diagnose(
         "output-drift",
         source.span(a, b),
@@ -45,7 +45,7 @@ def test_frame_label_help_and_notes() -> None:
         "    |                          ^^^^^^ this run printed +6.702\n"
         "    = note: classes: numeric 1\n"
         "            second line\n"
-        "    = note: content/lessons/4.2-x.md:1:1: leans on it\n"
+        "    = note: content/lessons/4.2-x.md:1:1: depends on it\n"
         "    = help: run `coursebuild update 4.2`"
     )
 

@@ -1,14 +1,16 @@
 """Reading the documents of the repository: fences with their info strings, and links.
 
-Entry points: `PAGES`; `fences`, `code_spans` and `links` of a path; `write_files(root, fences)`.
+Entry points: `PAGES`; `fences`, `code_spans`, `links` and `anchors` of a path; `write_files`.
 markdown-it reads them, with none of coursebuild's rules, so that the tests do not rely on what they
 test.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from markdown_it import MarkdownIt
@@ -74,6 +76,14 @@ def links(path: Path) -> Iterator[str]:
                 yield str(child.attrs["href"])
             elif child.type == "image":
                 yield str(child.attrs["src"])
+
+
+def anchors(path: Path) -> set[str]:
+    """The anchors of a document's headings where the repository is read, by GitHub's rule."""
+    tokens = _tokens(path)
+    titles = (b.content for a, b in pairwise(tokens) if a.type == "heading_open")
+    plain = (re.sub(r"`|\]\([^)]*\)", "", title).strip().lower() for title in titles)
+    return {re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title)) for title in plain}
 
 
 def write_files(root: Path, found: Iterable[Fence]) -> None:

@@ -45,7 +45,7 @@ CALLOUTS: tuple[CalloutKind, ...] = (
     ),
     CalloutKind("note", "Note", "A remark beside the main line."),
     CalloutKind("tip", "Tip", "A way to save time or trouble."),
-    CalloutKind("important", "Important", "What the rest of the lesson leans on."),
+    CalloutKind("important", "Important", "What the rest of the lesson depends on."),
     CalloutKind("caution", "Caution", "A step that cannot be taken back, or may damage something."),
 )
 """In the order in which a page that explains them lists them."""

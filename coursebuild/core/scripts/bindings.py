@@ -1,8 +1,8 @@
 """Numbers in prose that must be what a script printed: `` `+6.6 %`{out} ``.
 
-Entry points: `check_bindings` (a document), `leaning_on` (who leans on what has changed).
+Entry points: `check_bindings` (a document), `leaning_on` (who depends on what has changed).
 
-1. A binding leans on the nearest recorded output above it, or on the script that `{out=…}` names:
+1. A binding depends on the nearest recorded output above it, or on the script that `{out=…}` names:
    on its recorded outputs anywhere in the course, else on what it printed in this run.
 2. The numbers of a binding must be numbers of one printed line, one after the other, each rounded
    to the digits shown: within half a unit of the last place shown. Integers must be equal.
@@ -61,7 +61,7 @@ HeldLines: TypeAlias = dict[BindingPlace, tuple[str, ...]]
 
 
 class Leaning(Struct, frozen=True):
-    """A binding, and the change of a recorded value that it leans on."""
+    """A binding, and the change of a recorded value that it depends on."""
 
     binding: NumberBinding
     change: Change
@@ -92,7 +92,7 @@ class Printed:
         """The paths of all scripts."""
 
     def recorded(self, binding: NumberBinding) -> list[Verdict]:
-        """The recorded outputs that a binding leans on."""
+        """The recorded outputs that a binding depends on."""
         if binding.script is not None:
             return self._by_script.get(binding.script, [])
         found = self._by_document.get(binding.span.path, [])
@@ -155,7 +155,7 @@ def check_bindings(
 def _leans_on(
     binding: NumberBinding, printed: Printed
 ) -> tuple[str | None, ScriptRun | None, list[Verdict]]:
-    """The path and the run of the script that a binding leans on, and its recorded outputs."""
+    """The path and the run of the script that a binding depends on, and its recorded outputs."""
     verdicts = printed.recorded(binding)
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
     return path, printed.runs.get(path or ""), verdicts

@@ -43,7 +43,7 @@ def script_findings(
     again: Mapping[str, ScriptRun] | None = None,
     broken: Collection[str] = (),
 ) -> tuple[Diagnostic, ...]:
-    """The diagnostics of the scripts that were run, and of all that leans on them.
+    """The diagnostics of the scripts that were run, and of all that depends on them.
 
     `extractions` are those that were run, maybe not all of the course; `everything` is what
     `extract` gives for it, where that is known. `held`: see `check_bindings`. `again`: second runs,
@@ -108,7 +108,7 @@ def drift_diagnostic(verdict: Verdict, owner: str, leaning: Sequence[Leaning] = 
     """A recorded output that differs from this run; `owner` is the id of the lesson or page.
 
     The first differing place is pointed at; notes name the next ones, and every bound number in the
-    prose that leans on a value that changed.
+    prose that depends on a value that changed.
     """
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
     if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
@@ -215,7 +215,7 @@ def _quoted_number(text: str) -> str:
 def _leans(leans: Leaning) -> str:
     """What a change means for a bound number of the prose."""
     change = leans.change
-    lead = f"`{leans.binding.text}` leans on "
+    lead = f"`{leans.binding.text}` depends on "
     recorded, ran = scan(change.recorded), scan(change.ran)
     if len(recorded) != 1 or len(ran) != 1 or change.kind is DriftKind.MISSING:
         return lead + "a line that changed"

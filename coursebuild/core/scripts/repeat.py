@@ -64,7 +64,7 @@ def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> 
     return diagnose(
         "script-unrepeatable",
         extraction.script.span.first_line(),
-        f"`{extraction.path}` does something else than it did before, with nothing changed "
+        f"`{extraction.path}` behaves differently than before, with nothing changed "
         "that is known to count",
         help="make it do the same each time (a fixed seed, no clock, files that it opens itself), "
         "or put `volatile` on its output",

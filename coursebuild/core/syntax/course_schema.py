@@ -89,20 +89,31 @@ def slug_of(text: str) -> str:
 class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What the course is."""
 
-    title: Text
+    title: Annotated[Text, Meta(description="plain text")]
     id: Annotated[
         Slug | None,
         Meta(description="what readers' progress is kept under; without it, the title"),
     ] = None
-    summary: Annotated[str, Meta(description="one or two sentences, for the home page")] = ""
+    summary: Annotated[
+        str, Meta(description="one or two sentences, for the home page and search engines")
+    ] = ""
     language: Annotated[
-        Language, Meta(description="the language of the lessons, as in `en` or `pt-BR`")
+        Language,
+        Meta(description="the language of the lessons and the interface, as in `en` or `pt-BR`"),
     ] = "en"
-    base_url: Annotated[Url | None, Meta(description="where the site will stand")] = None
-    repository: Annotated[Url | None, Meta(description="where its sources are")] = None
-    licence: Annotated[str, Meta(description="its name, as in `CC-BY-4.0`")] = ""
+    base_url: Annotated[
+        Url | None,
+        Meta(description="where the site will stand: for the sitemap and the 404 page"),
+    ] = None
+    repository: Annotated[
+        Url | None, Meta(description="where its sources are: pages get a link to edit their file")
+    ] = None
+    licence: Annotated[
+        str, Meta(description="its name, as in `CC-BY-4.0`, shown in the footer")
+    ] = ""
     engine: Annotated[
-        Version | None, Meta(description="the version of MuJoCo that the course is written for")
+        Version | None,
+        Meta(description="the version of MuJoCo that the course needs; another one is an error"),
     ] = None
     features: Annotated[
         tuple[FeaturePath, ...],
@@ -110,7 +121,9 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ()
     packages: Annotated[
         tuple[FolderPath, ...],
-        Meta(description="folders that scripts import from, before installed packages"),
+        Meta(
+            description="folders that scripts import from, before installed packages, as in `src`"
+        ),
     ] = ()
 
 
@@ -126,22 +139,24 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     compare: Annotated[
         Literal["exact", "digits", "rtol"] | None,
-        Meta(description="the same text, the same digits, or numbers within rtol and atol"),
+        Meta(description="the same text, the same digits, or within rtol and atol; else exact"),
     ] = None
-    rtol: Annotated[NotNegative | None, Meta(description="relative to the recorded number")] = None
-    atol: Annotated[NotNegative | None, Meta(description="absolute")] = None
+    rtol: Annotated[
+        NotNegative | None, Meta(description="tolerance relative to the recorded number")
+    ] = None
+    atol: Annotated[NotNegative | None, Meta(description="absolute tolerance")] = None
     ellipsis: Annotated[bool, Meta(description="`...` in a recorded output matches anything")] = (
         False
     )
     filter: tuple[FilterTable, ...] = ()
-    env: Annotated[dict[str, str], Meta(description="variables of the environment of scripts")] = {}
+    env: Annotated[dict[str, str], Meta(description="environment variables of scripts")] = {}
     python: Annotated[
         InterpreterPath | None,
         Meta(description="what runs the scripts, relative to the course's folder"),
     ] = None
     truth: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
-        Meta(description="which share of the numbers in lessons must be proven"),
+        Meta(description="the share of the numbers in lessons that must be proven, from 0 to 1"),
     ] = None
 
 
@@ -165,8 +180,10 @@ class SilenceTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A warning that is not shown."""
 
     rule: Annotated[Text, Meta(description="the name of a warning")]
-    reason: Annotated[str, Meta(description="why; required")] = ""
-    path: Annotated[Text | None, Meta(description="only in files like this (glob)")] = None
+    reason: Annotated[str, Meta(description="why")] = ""
+    path: Annotated[
+        Text | None, Meta(description="only in these files; `*` and `?` stand for anything")
+    ] = None
 
 
 class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -174,8 +191,11 @@ class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     id: Annotated[LessonId, Meta(description="its level's id, a dot and its own part")]
     slug: Annotated[Slug, Meta(description="with the id, the name of its file and page")]
-    title: Text
-    status: Literal["complete", "draft", "planned"]
+    title: Annotated[Text, Meta(description="plain text")]
+    status: Annotated[
+        Literal["complete", "draft", "planned"],
+        Meta(description="a planned lesson has no file yet"),
+    ]
     summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
     aliases: Annotated[
         tuple[Text, ...], Meta(description="other names, by which the search finds it")
@@ -184,10 +204,11 @@ class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
         tuple[Text, ...], Meta(description="what a learner can do afterwards")
     ] = ()
     prerequisites: Annotated[
-        tuple[Text, ...], Meta(description="ids of lessons to read first")
+        tuple[Text, ...], Meta(description="ids of lessons to read first; circles are errors")
     ] = ()
     minutes: Annotated[
-        Annotated[int, Meta(ge=1, le=100_000)] | None, Meta(description="to read and work through")
+        Annotated[int, Meta(ge=1, le=100_000)] | None,
+        Meta(description="the time to read it and work through it"),
     ] = None
 
 
@@ -204,7 +225,7 @@ class LevelTable(Struct, frozen=True, forbid_unknown_fields=True):
         | Annotated[int, Meta(ge=0)],
         Meta(description="letters and digits, as in `4` or `A`"),
     ]
-    title: Text
+    title: Annotated[Text, Meta(description="plain text")]
     summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
     lesson: tuple[LessonTable, ...] = ()
 
@@ -213,9 +234,9 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A page that is no lesson."""
 
     id: Annotated[Slug, Meta(description="the page's name in links and in its address")]
-    title: Text
-    file: Annotated[Text, Meta(description="its Markdown, relative to the project")]
-    menu: Annotated[bool, Meta(description="whether it stands in the menu of every page")] = True
+    title: Annotated[Text, Meta(description="plain text")]
+    file: Annotated[Text, Meta(description="its Markdown file, anywhere in the project")]
+    menu: Annotated[bool, Meta(description="whether it is in the menu of every page")] = True
 
 
 class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):

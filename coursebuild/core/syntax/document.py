@@ -68,7 +68,7 @@ def _without_front_matter(text: Excerpt, session: ParsingState) -> Excerpt:
         return text
     what = "lesson" if session.lesson else "page"
     message = f"a {what} has no front matter"
-    help = "its title and all else about it stand in content/course.toml; begin with the text"
+    help = "its title and everything else about it are in content/course.toml; begin with the text"
     session.report(diagnose("front-matter", text.span(0, 3), message, help=help))
     return text.slice(found.end())
 

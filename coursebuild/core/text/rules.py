@@ -47,7 +47,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "engine-version",
         "error",
-        "The course names another MuJoCo version than the one that is installed.",
+        "The course needs another version of MuJoCo than the installed one.",
     ),
     ("script-python", "error", "The interpreter that the map names for scripts cannot run them."),
     (
@@ -77,7 +77,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("field-missing", "error", "A required field is not there."),
     ("field-repeated", "error", "A field is given twice."),
     ("field-type", "error", "A value is of the wrong type."),
-    ("field-value", "error", "A value is of the right type and cannot be right."),
+    ("field-value", "error", "A value has the right type but cannot be right."),
     # Markdown
     (
         "front-matter",
@@ -103,11 +103,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("fence-key-unknown", "error", "A fence has a key that its kind does not know."),
     ("fence-key-repeated", "error", "A fence has the same key twice."),
     ("fence-key-value", "error", "A key of a fence has an impossible value."),
-    ("fence-kind-near", "warning", "The kind of a code block looks like a misspelt kind of ours."),
+    ("fence-kind-near", "warning", "The kind of a code block looks like a misspelt one."),
     (
         "fence-unread",
         "warning",
-        "A code block of a kind that nothing reads holds a JSON object, as blocks of ours do.",
+        "A code block of a kind that nothing reads holds a JSON object.",
     ),
     ("feature-broken", "error", "A feature of the course's own cannot be loaded."),
     ("feature-missing", "error", "A fence needs a feature that is not installed."),
@@ -122,11 +122,11 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("equation-label", "error", "The label of a formula cannot be read, or stands where none may."),
     # terms and symbols
     ("term-attribute", "error", "The attribute by which a text defines a term cannot be read."),
-    ("term-place", "error", "A term is defined elsewhere than in a paragraph of the text."),
+    ("term-place", "error", "A term is defined outside a paragraph of the text."),
     ("term-repeated", "error", "Two places of the course define the same term."),
     ("symbol-attribute", "error", "What a symbol stands for cannot be read."),
-    ("symbol-formula", "error", "Something is declared as a symbol that is not a single one."),
-    ("unit-unknown", "error", "The unit of a quiz's answer or of a symbol is none that there is."),
+    ("symbol-formula", "error", "What is declared as a symbol is not a single symbol."),
+    ("unit-unknown", "error", "The unit of a quiz's answer or of a symbol does not exist."),
     ("symbol-repeated", "warning", "A text says twice what a symbol stands for."),
     (
         "table-cells",
@@ -137,7 +137,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("footnote-unused", "warning", "A footnote is written and never referred to."),
     ("footnote-repeated", "error", "A footnote is written twice."),
     ("figure-unshown", "error", "A script draws a figure that no paragraph below it shows."),
-    ("figure-missing", "error", "A script does not draw the figure that it is to draw."),
+    ("figure-missing", "error", "A script does not draw the figure that it names."),
     ("figure-unreadable", "error", "What a script drew cannot be shown."),
     ("figure-drift", "error", "A recorded figure differs from what its script draws now."),
     (
@@ -174,7 +174,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     ("link-anchor", "error", "A link names an anchor that its page does not have."),
     ("link-scheme", "error", "A link uses a scheme that a page must not have."),
     ("link-broken", "error", "An internal link of a built page leads nowhere."),
-    ("binding-orphan", "error", "A bound number has no recorded output to lean on."),
+    ("binding-orphan", "error", "A bound number has no recorded output to be checked against."),
     (
         "binding-mismatch",
         "error",
@@ -206,7 +206,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "recording-keys",
         "error",
-        "Keys of comparison contradict each other, or stand on a block that is no recorded output.",
+        "Keys of comparison contradict each other, or stand on a block that records nothing.",
     ),
     ("example-edited", "error", "An extracted file was changed by hand."),
     ("script-failed", "error", "A script exited with an error."),
@@ -217,7 +217,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "script-unrepeatable",
         "warning",
-        "A script run again does something else, with nothing changed that is known to count.",
+        "A script behaves differently than before, although nothing known to matter has changed.",
     ),
     ("script-silent", "error", "An output is recorded and the script printed nothing."),
     (
@@ -229,13 +229,13 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "script-penetration",
         "warning",
-        "Bodies of a script's simulation lie deep in each other, of which MuJoCo does not warn.",
+        "Bodies of a script's simulation lie deep in each other, which MuJoCo does not warn of.",
     ),
     ("script-shallow", "error", "A script says `deep`, and no bodies lay deep in each other."),
     (
         "recorded-run",
         "error",
-        "The course keeps no run of a script that is recorded once, or one of another state.",
+        "The course has no run of a script that is recorded once, or an outdated one.",
     ),
     ("output-drift", "error", "A recorded output differs from what the script prints."),
     (
@@ -248,7 +248,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "Two runs of a script print different lines, so that there is nothing to record.",
     ),
-    ("output-not-updatable", "error", "A recorded output cannot be brought up to date by itself."),
+    ("output-not-updatable", "error", "A recorded output cannot be updated automatically."),
     # models and MJCF
     ("model-error", "error", "A model in models/ does not compile."),
     ("toml-syntax", "error", "A file of scenarios, models/NAME.toml, is not valid TOML."),
@@ -260,7 +260,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "report-stale",
         "warning",
-        "A recorded report in content/reports/ is not of the course as it is, so no page shows it.",
+        "A recorded report in content/reports/ no longer fits the course, so no page shows it.",
     ),
     ("bench-model", "error", "A shown report names a model that is not in models/."),
     (
@@ -272,10 +272,10 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "bench-unrecorded",
         "warning",
-        "A report is to be shown, and nothing was recorded of its model.",
+        "A report is shown of a model for which nothing was recorded.",
     ),
     ("mjcf-error", "error", "An MJCF block does not compile."),
-    ("mjcf-compiles", "error", "An MJCF block that must not compile does."),
+    ("mjcf-compiles", "error", "An MJCF block compiles although it must not."),
     ("mjcf-message", "error", "An MJCF block fails with another message than the lesson says."),
     # labs
     ("lab-kind", "error", "A lab is of an unknown kind."),
@@ -283,27 +283,27 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
     (
         "lab-name",
         "error",
-        "A lab or its code names something that does not exist, as a keyframe, a control or "
+        "A lab or its code names something that does not exist, such as a keyframe, a control or "
         "`data.qps`.",
     ),
     (
         "lab-code",
         "error",
-        "A piece of a lab's code is no JavaScript.",
+        "A piece of a lab's code is not JavaScript.",
     ),
     ("lab-throws", "error", "A piece of a lab's code ends with an exception."),
-    ("lab-value", "error", "An expression of a lab gives no number, or none that is finite."),
+    ("lab-value", "error", "An expression of a lab does not give a finite number."),
     ("lab-warning", "error", "MuJoCo raised a warning while a lab was tried."),
     ("lab-diverged", "error", "The simulation of a lab diverges."),
     (
         "lab-penetration",
         "warning",
-        "Bodies of a lab lie deep in each other, of which MuJoCo does not warn.",
+        "Bodies of a lab lie deep in each other, which MuJoCo does not warn of.",
     ),
     ("lab-shallow", "error", "A lab says `deep`, and no bodies lay deep in each other."),
     ("lab-expect", "error", "A claim of a lab does not hold."),
     ("lab-goal", "error", "A lab's goal is reached by doing nothing, or not by its log."),
-    ("lab-parity", "error", "A lab runs otherwise in the browser's engine than natively."),
+    ("lab-parity", "error", "A lab runs differently in the browser's engine and natively."),
     ("lab-far", "warning", "What moves is small in the picture of a lab."),
     ("lab-reset", "warning", "A reset does not lead a lab back to where it started."),
     (

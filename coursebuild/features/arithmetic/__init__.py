@@ -121,7 +121,7 @@ FEATURE = Feature(
     unproven=unproven,
     rules=(
         Rule("formula-arithmetic", "error", "A number in a formula is not what comes out."),
-        Rule("formula-identity", "error", "A formula that is to be checked is not sure to hold."),
+        Rule("formula-identity", "error", "A formula that says `check` does not hold, or may not."),
         Rule("formula-unread", "warning", "Arithmetic in a formula is not understood."),
     ),
 )

@@ -14,7 +14,7 @@ _SUMMARIES = {
     "new": "add a lesson, a model, a template or a feature",
     "rename": "give a lesson another id, wherever the course names it",
     "fmt": "format lessons and pages",
-    "doctor": "say what works on this machine, and what to do where it does not",
+    "doctor": "say what works on this machine, and how to mend what does not",
 }
 FEATURE = Feature(
     name="authoring",

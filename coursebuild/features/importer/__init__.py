@@ -19,7 +19,7 @@ FEATURE = Feature(
     commands=(
         Command(
             name="import",
-            summary="make a course of one that was written for another tool",
+            summary="make a course from one that was written for another tool",
             module="coursebuild.features.importer.commands",
         ),
     ),

@@ -130,17 +130,17 @@ Control: TypeAlias = Slider | Select | Button
 
 
 class Readout(Struct, frozen=True, forbid_unknown_fields=True):
-    """A number or text shown while the simulation runs."""
+    """Numbers and texts shown while the simulation runs."""
 
-    label: Text
+    label: Annotated[Text, Meta(description="plain text")]
     expr: Annotated[Text, Meta(description="an expression that gives a number or a string")]
     digits: Annotated[Digits, Meta(description="decimal places of a number")] = 3
 
 
 class TraceFields(Struct, frozen=True, forbid_unknown_fields=True):
-    """A line of a plot."""
+    """The lines of a plot."""
 
-    label: Text
+    label: Annotated[Text, Meta(description="plain text")]
     expr: Annotated[Text, Meta(description="an expression that gives a number")]
     dash: Annotated[
         bool | Annotated[tuple[NotNegative, ...], Meta(min_length=1)],
@@ -152,21 +152,21 @@ class TraceFields(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RefLine(Struct, frozen=True, forbid_unknown_fields=True):
-    """A horizontal line across a plot."""
+    """Horizontal lines across a plot."""
 
-    y: float
-    label: str = ""
+    y: Annotated[float, Meta(description="its height")]
+    label: Annotated[str, Meta(description="plain text")] = ""
 
 
 class Plot(Struct, frozen=True, forbid_unknown_fields=True):
-    """A plot against simulated time."""
+    """Plots against simulated time."""
 
-    traces: Annotated[tuple[TraceFields, ...], Meta(min_length=1)]
-    ylabel: str = ""
-    xlabel: str = ""
+    traces: Annotated[tuple[TraceFields, ...], Meta(min_length=1, description="its lines")]
+    ylabel: Annotated[str, Meta(description="of the vertical axis")] = ""
+    xlabel: Annotated[str, Meta(description="of the horizontal axis")] = ""
     window: Annotated[Positive | None, Meta(description="seconds shown; else all")] = None
-    ymin: float | None = None
-    ymax: float | None = None
+    ymin: Annotated[float | None, Meta(description="the least value shown")] = None
+    ymax: Annotated[float | None, Meta(description="the greatest value shown")] = None
     height: Annotated[Annotated[int, Meta(ge=40, le=2000)] | None, Meta(description="in px")] = None
     refLines: tuple[RefLine, ...] = ()  # noqa: N815  # the author's spelling
 
@@ -189,8 +189,8 @@ class Expect(Struct, frozen=True, forbid_unknown_fields=True):
             "or a list of these, done in order"
         ),
     ] = None
-    min: float | None = None
-    max: float | None = None
+    min: Annotated[float | None, Meta(description="`expr` is not below")] = None
+    max: Annotated[float | None, Meta(description="`expr` is not above")] = None
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -272,7 +272,7 @@ class SimLab(Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
     setup: Annotated[str, Meta(description="statements run after load and every reset")] = ""
     controller: Annotated[str, Meta(description="statements run before every step")] = ""
-    controls: tuple[Control, ...] = ()
+    controls: Annotated[tuple[Control, ...], Meta(description="sliders, selects and buttons")] = ()
     readouts: tuple[Readout, ...] = ()
     plots: tuple[Plot, ...] = ()
     trail: Annotated[Text | None, Meta(description="a site whose path is drawn")] = None

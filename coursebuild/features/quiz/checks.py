@@ -47,7 +47,7 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
                     "quiz-id-repeated",
                     quiz.id_span,
                     f"the quiz id `{quiz.id}` is used twice",
-                    help="a learner's progress hangs on the id; give each quiz its own",
+                    help="a learner's progress is kept under the id; give each quiz its own",
                     notes=[Note("the first one is here", first[quiz.id].id_span)],
                 )
             yield from _output_questions(quiz, norun)

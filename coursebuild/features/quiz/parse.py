@@ -129,7 +129,7 @@ def _kind(node: ObjectNode) -> str:
 def _check_ids(nodes: tuple[ObjectNode, ...]) -> Iterator[Diagnostic]:
     given = [node.get("id") for node in nodes]
     named = [(id.value, id.span) for id in given if isinstance(id, StringNode)]
-    help = "a learner's answer hangs on it; give each question its own, or none"
+    help = "a learner's answer is kept under it; give each question its own, or none"
     message = "the question id `{}` is used twice in this quiz"
     yield from repeated(named, "question-id-repeated", message, help=help)
 

@@ -90,7 +90,7 @@ class Numeric(Common, frozen=True, kw_only=True, tag_field="kind", tag="numeric"
         NotNegative | None,
         Meta(description="absolute tolerance; without it 2 % of the answer"),
     ] = None
-    unit: Annotated[str, Meta(description="shown beside the field")] = ""
+    unit: Annotated[str, Meta(description="shown beside the field, as in `kg m^2`")] = ""
 
 
 class Open(Common, frozen=True, kw_only=True, tag_field="kind", tag="open"):
@@ -125,7 +125,7 @@ class QuizFile(Struct, frozen=True, forbid_unknown_fields=True):
         str,
         Meta(
             pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$",
-            description="unique in the course, and stable: a learner's progress hangs on it",
+            description="unique in the course, and stable: a learner's progress is kept under it",
             extra={"expects": "letters, digits, `.`, `_` and `-`, with a letter or digit first"},
         ),
     ]

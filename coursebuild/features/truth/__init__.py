@@ -66,6 +66,6 @@ FEATURE = Feature(
     rules=(
         Rule("number-unproven", "warning", "A number that nothing in the course proves."),
         Rule("truth-share", "error", "Fewer numbers are proven than the course map asks for."),
-        Rule("truth-text", "error", "A fence `truth` has a text, which nothing reads."),
+        Rule("truth-text", "error", "A `truth` fence holds a text, which nothing reads."),
     ),
 )

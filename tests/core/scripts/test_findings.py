@@ -40,7 +40,7 @@ def test_drift_brings_the_bindings_that_lean_on_it() -> None:
     runs = (ran("E 1.7\n"), ran("7\n", path="examples/b.py"))
     (found,) = script_findings(here, extract(here).value, runs, verify(here, runs))
     assert found.help == "if the change is intended, run `coursebuild update 4.2`"
-    assert found.notes[-1].message == "`1.5` leans on 1.5, which this run printed as 1.7"
+    assert found.notes[-1].message == "`1.5` depends on 1.5, which this run printed as 1.7"
 
 
 def test_where_only_some_scripts_ran_the_others_are_known() -> None:

@@ -1,4 +1,4 @@
-"""`coursebuild doctor`: say what works on this machine, and what to do where it does not.
+"""`coursebuild doctor`: say what works on this machine, and how to mend what does not.
 
 What can end a process, as a driver of a graphics card can, is tried in one of its own.
 """

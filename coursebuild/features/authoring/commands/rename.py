@@ -39,7 +39,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("old", metavar="LESSON", help="id, slug or file of the lesson")
     parser.add_argument("new", metavar="ID", help="the id that it gets")
     parser.add_argument(
-        "--leave", action="store_true", help="leave as they are the places that may mean it"
+        "--leave", action="store_true", help="leave places that may mean it as they are"
     )
 
 

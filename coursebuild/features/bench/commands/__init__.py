@@ -29,12 +29,12 @@ def add_recorded(parser: argparse.ArgumentParser) -> None:
     """What is done with reports in the course's folder."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
-        "--record", action="store_true", help="write what was measured into content/reports/"
+        "--record", action="store_true", help="write what was measured to content/reports/"
     )
     group.add_argument(
         "--check",
         action="store_true",
-        help="measure again, and fail where a figure is not as recorded; times never are compared",
+        help="measure again, and fail if a figure has changed; times are never compared",
     )
 
 

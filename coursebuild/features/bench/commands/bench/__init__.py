@@ -35,7 +35,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plot",
         metavar="FILE.svg",
-        help="draw error against cost; of several scenarios each into a file of its own",
+        help="draw error against cost, in one file for each scenario",
     )
     add_recorded(parser)
     add_cache(parser)

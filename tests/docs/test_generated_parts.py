@@ -1,0 +1,60 @@
+"""Parts of the pages in docs/ that are made from the code are as the code is, and none is missing.
+
+`pytest tests/docs/test_generated_parts.py --rewrite-fixtures` writes them anew.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from coursebuild.cli.commands import known_commands
+from coursebuild.core.syntax.schemas import json_schema
+from support.generated_parts import headings, renewed
+from support.markdown_files import PAGES
+
+LONG = 6
+"""Sections from which on a page begins with its contents."""
+TOLD_OTHERWISE = {"CourseFile", "ModelFile", "Overlays"}
+"""Structures whose fields are the sections of a page, or the values of a field."""
+TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
+
+
+def generated(kind: str) -> set[str]:
+    """What the generated parts of one kind are of."""
+    part = re.compile(rf"<!-- generated: {kind}(.*) -->")
+    return {found.strip() for text in TEXTS.values() for found in part.findall(text)}
+
+
+def test_generated_parts_are_in_step(request: pytest.FixtureRequest) -> None:
+    stale = {path: now for path, text in TEXTS.items() if (now := renewed(text)) != text}
+    if request.config.getoption("--rewrite-fixtures"):
+        for path, now in stale.items():
+            path.write_text(now, encoding="utf-8")
+    else:
+        assert sorted(stale) == [], "run pytest tests/docs --rewrite-fixtures"
+
+
+def test_every_field_has_its_table() -> None:
+    told = {" ".join(words.split()[:2]) for words in generated("fields")}
+    for schema in ("course", "model", "lab", "quiz"):
+        names = set(json.loads(json_schema(schema))["$defs"]) - TOLD_OTHERWISE
+        missing = {name for name in names if not {f"{schema} {name}", f"lab {name}"} & told}
+        assert missing == set(), schema
+
+
+def test_every_command_has_its_section() -> None:
+    assert generated("command ") == set(known_commands())
+
+
+def test_long_pages_begin_with_their_contents() -> None:
+    long = {path for path, text in TEXTS.items() if len(headings(text, 2)) >= LONG}
+    contents = re.compile("<!-- generated: (contents|commands) -->")
+    without = {path for path in long if not contents.search(TEXTS[path])}
+    assert without == set()
+
+
+def test_every_page_begins_with_its_title() -> None:
+    assert [path for path, text in TEXTS.items() if not re.match(r"# \w", text)] == []

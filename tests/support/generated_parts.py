@@ -1,0 +1,186 @@
+"""Parts of the pages in docs/ that are made from the code.
+
+Entry point: `renewed(text)`. Such a part stands between `<!-- generated: WORDS -->` and
+`<!-- end -->`. The words are those of `_MAKERS`:
+
+- `contents`: links to the page's sections;
+- `fields lab SimLab`: the fields of a structure in the schema `lab`; `beyond` or `within` and the
+  name of another one leave out those that it has, or has not;
+- `commands`, and `command check`: all of them, and what one takes; `options`: those of several.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
+from typing import Any
+
+from coursebuild.cli.commands import known_commands, parser_of
+from coursebuild.core.syntax.headings import slug
+from coursebuild.core.syntax.schemas import json_schema
+
+_PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_FENCE = re.compile(r"^(`{3,})[^`\n]*\n.*?^\1`*$", re.MULTILINE | re.DOTALL)
+
+
+def renewed(text: str) -> str:
+    """A page with its generated parts as they should be."""
+
+    def part(found: re.Match[str]) -> str:
+        name, *words = found[2].split()
+        return f"{found[1]}\n{_MAKERS[name](text, *words)}\n\n{found[3]}"
+
+    return _PART.sub(part, text)
+
+
+def headings(text: str, level: int) -> list[str]:
+    """The texts of a page's headings."""
+    return re.findall(rf"^#{{{level}}} (.+)$", _FENCE.sub("", text), re.MULTILINE)
+
+
+def _contents(text: str) -> str:
+    return "\n".join(f"- [{title}](#{slug(title)})" for title in headings(text, 2))
+
+
+def _table(head: str, rows: Iterable[tuple[str, ...]]) -> str:
+    escaped = ([cell.replace("|", r"\|") for cell in row] for row in rows)
+    lines = (f"| {' | '.join(row)} |" for row in escaped)
+    rule = "|" + " --- |" * (head.count("|") + 1)
+    return "\n".join((f"| {head} |", rule, *lines))
+
+
+# --------------------------------------------------------------------------------------- fields
+
+
+def _fields(text: str, schema: str, name: str, how: str = "beyond", other: str = "") -> str:
+    definitions = json.loads(json_schema(schema))["$defs"]
+    known = definitions[name]
+    others = definitions[other]["properties"] if other else {}
+    rows = []
+    for field, declared in known["properties"].items():
+        if (field in others) != (how == "within") or (others and field == "kind"):
+            continue
+        about = declared.get("description") or _about(declared, definitions)
+        required = ", required" * (field in known.get("required", ()))
+        rows.append((f"`{field}`{required}", _value(declared), about))
+    return _table("field | value | meaning", rows)
+
+
+def _about(declared: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """What is said of the structure that a field holds."""
+    found = re.search(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(declared))
+    about = definitions[found[1]]["description"].partition("\n")[0] if found else ""
+    return about[:1].lower() + about[1:].rstrip(".")
+
+
+def _value(declared: dict[str, Any]) -> str:
+    value = _kind(declared)
+    default = declared.get("default")
+    if default not in (None, "", [], {}, False):
+        value += f"; `{json.dumps(default)}` without it"
+    return value
+
+
+def _kind(declared: dict[str, Any]) -> str:
+    if "anyOf" in declared:
+        kinds = [_kind(one) for one in declared["anyOf"] if one.get("type") != "null"]
+        return " or ".join(dict.fromkeys(kinds))
+    if "enum" in declared:
+        return ", ".join(f"`{json.dumps(one)}`" for one in declared["enum"])
+    match declared.get("type"):
+        case "array":
+            inner = declared.get("items", {})
+            return f"list of {_kind(inner)}" if inner else "list"
+        case "string":
+            return "Markdown" if "contentMediaType" in declared else "text"
+        case "boolean":
+            return "`true` or `false`"
+        case "integer" | "number" as kind:
+            return ("whole " * (kind == "integer")) + "number" + _bounds(declared)
+    return "table"
+
+
+def _bounds(declared: dict[str, Any]) -> str:
+    low, high = declared.get("minimum"), declared.get("maximum")
+    if "exclusiveMinimum" in declared:
+        return f" above {declared['exclusiveMinimum']:g}"
+    if low is not None and high is not None:
+        return f", {low} to {high}"
+    return f" from {low}" if low is not None else ""
+
+
+# ------------------------------------------------------------------------------------- commands
+
+
+def _commands(text: str) -> str:
+    rows = ((f"[`{one.name}`](#{one.name})", one.summary) for one in known_commands().values())
+    return _table("command | what it does", rows)
+
+
+def _actions(name: str) -> Iterator[argparse.Action]:
+    parser = parser_of(known_commands()[name])
+    return (action for action in parser._actions if action.dest not in ("help", "root"))
+
+
+def _shared() -> dict[tuple[str, str], list[str]]:
+    """Options that at least three commands take, with the commands."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for name in known_commands():
+        for action in _actions(name):
+            if action.option_strings:
+                found.setdefault(_row(action), []).append(name)
+    return {row: names for row, names in found.items() if len(names) > 2}
+
+
+def _row(action: argparse.Action) -> tuple[str, str]:
+    value = action.metavar or "|".join(map(str, action.choices or ()))
+    if not action.option_strings:
+        names = [f"`{action.metavar or action.dest}`"]
+    else:
+        names = [f"`{name}{' ' * bool(value)}{value}`" for name in action.option_strings]
+    return ", ".join(names), (action.help or "") % {"default": action.default}
+
+
+def _options(text: str) -> str:
+    rows = (
+        (name, ", ".join(f"`{command}`" for command in commands), about)
+        for (name, about), commands in _shared().items()
+    )
+    return _table("option | of | meaning", rows)
+
+
+def _command(text: str, name: str) -> str:
+    command = known_commands()[name]
+    parser = parser_of(command)
+    rows = [row for action in _actions(name) if (row := _row(action)) not in _shared()]
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            rows = [*chain.from_iterable(_kinds(action))]
+    parts = [f"{command.summary[:1].upper()}{command.summary[1:]}."]
+    if rows:
+        parts.append(_table("argument | meaning", rows))
+    if parser.epilog:
+        examples = parser.epilog.partition("\n")[2].rstrip("\n")
+        lines = "\n".join(line[2:] for line in examples.splitlines())
+        parts.append(f"```console\n{lines}\n```")
+    return "\n\n".join(parts)
+
+
+def _kinds(action: Any) -> Iterator[list[tuple[str, str]]]:
+    helps = {choice.dest: choice.help for choice in action._choices_actions}
+    for name, parser in action.choices.items():
+        yield [(f"`{name}`", helps[name])]
+        rows = [_row(one) for one in parser._actions if one.dest not in ("help", "root")]
+        yield [(f"`{name}` {argument}", about) for argument, about in rows]
+
+
+_MAKERS: dict[str, Callable[..., str]] = {
+    "contents": _contents,
+    "fields": _fields,
+    "commands": _commands,
+    "command": _command,
+    "options": _options,
+}
