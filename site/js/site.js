@@ -12,6 +12,7 @@ import { markScrolling } from './page/scroll.js'
 import { leaveQuizzes, mountQuizzes } from './page/quizzes.js'
 import { addSearch } from './page/search.js'
 import { addThemeSwitch } from './page/theme.js'
+import { unfoldLinked } from './page/unfold.js'
 import { readWords } from './page/words.js'
 import { showProgress } from './progress/index.js'
 import { settleAnswers } from './progress/settle.js'
@@ -41,6 +42,7 @@ let leaveNotes = placeNotes(document)
 openForPrint(window)
 keepOffline(window, words)
 followLines(window)
+unfoldLinked(window)
 
 // In a preview, parts of the page are replaced while it is open.
 document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }) => {

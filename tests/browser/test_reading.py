@@ -141,6 +141,18 @@ def test_a_long_line_is_shown_from_its_beginning(open_page: OpenPage) -> None:
     becomes(page, lambda: box.evaluate(shown), [True, 0])
 
 
+def test_a_link_opens_the_section_that_it_leads_into(
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
+) -> None:
+    page = browsers["plain"].new_page(viewport={"width": 1440, "height": 900})
+    page.goto(sites["full"].url("lessons/1.1-text.html") + "#prose")
+    inside = page.locator("#inside")
+    expect(inside).not_to_be_visible()
+    page.locator(".toc").get_by_role("link", name="Links lead in here").click()
+    expect(inside).to_be_in_viewport()
+    page.close()
+
+
 def test_a_line_is_reached_without_scripts(open_page: OpenPage) -> None:
     page = open_page(at="#sub/wide.L60", java_script_enabled=False)
     line = page.locator("[id='sub/wide.L60']")

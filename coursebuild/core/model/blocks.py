@@ -30,6 +30,11 @@ class Heading(Struct, frozen=True):
     """Whether the anchor was given by `{#id}`."""
     classes: tuple[str, ...] = ()
 
+    @property
+    def goes_further(self) -> bool:
+        """Whether its section is beside the main path, for who wants to know more."""
+        return "further" in self.classes
+
 
 class Paragraph(Struct, frozen=True):
     """A paragraph; `tight` when it stands in a tight list, where it gets no element of its own."""
@@ -320,6 +325,10 @@ class FeatureBlock(Struct, frozen=True):
     def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
         """What a reader's progress is kept for: an id, unique in the course, and keys under it."""
         return None
+
+    def tasks(self) -> int:
+        """How many things it gives a reader to do."""
+        return 0
 
 
 Block: TypeAlias = (

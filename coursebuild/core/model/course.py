@@ -45,6 +45,9 @@ class Lesson(Struct, frozen=True):
     prerequisites: tuple[str, ...]
     prerequisite_spans: tuple[Span, ...]
     minutes: int | None
+    """Of its main path."""
+    further: int | None
+    """Minutes of the sections that go further."""
     level: str
     document: Document | None
 
@@ -101,6 +104,14 @@ class CalloutKind(Struct, frozen=True):
     name: str
     label: str
     promise: str = ""
+
+
+class Pace(Struct, frozen=True, forbid_unknown_fields=True):
+    """How fast a learner is: the minutes of lessons are checked against it."""
+
+    words: Annotated[float, Meta(gt=0, description="words of text in a minute")]
+    lines: Annotated[float, Meta(gt=0, description="lines of code or output in a minute")]
+    task: Annotated[float, Meta(ge=0, description="minutes for a question, or to try a lab")]
 
 
 class Silence(Struct, frozen=True):
@@ -171,6 +182,7 @@ class Course(Struct, frozen=True):
     truth: float | None = None
     """Which share of the numbers in the text must be proven."""
     truth_span: Span | None = None
+    pace: Pace | None = None
     width: int = 0
     """Columns of a line of text as `fmt` wraps it; 0: it leaves the author's lines."""
     html: Literal["none", "safe", "trusted"] = "safe"

@@ -84,6 +84,26 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
             yield from walk_blocks(child_blocks(block))
 
 
+def main_and_further(
+    blocks: tuple[Block, ...],
+) -> Iterator[tuple[bool, tuple[Block, ...]]]:
+    """A text cut where a section that goes further begins or ends; such a part is true.
+
+    It begins with the section's heading and ends before the next one that is not below it.
+    """
+    start, level = 0, 0
+    for i, block in enumerate(blocks):
+        if not isinstance(block, Heading):
+            continue
+        ends = level and block.level <= level
+        if ends or (block.goes_further and not level):
+            if i > start:
+                yield bool(level), blocks[start:i]
+            start, level = i, block.level if block.goes_further else 0
+    if blocks[start:]:
+        yield bool(level), blocks[start:]
+
+
 def document_blocks(document: Document) -> Iterator[Block]:
     """Every block of a document, its footnotes last."""
     known: list[Block] | None = document.__dict__.get("walked")

@@ -5,8 +5,11 @@ Entry points: `article`, `contents`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from markupsafe import Markup
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.model import (
     Block,
@@ -18,6 +21,7 @@ from coursebuild.core.model import (
     Recording,
     Script,
     Table,
+    main_and_further,
 )
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.plainly import without_links
@@ -29,22 +33,33 @@ class ContentsEntry(Struct, frozen=True):
 
     anchor: str
     title: Markup
+    further: bool = False
     children: tuple[ContentsEntry, ...] = ()
 
 
 def article(page: PageContext, document: Document) -> Markup:
-    """The text of a document. A docked block stands beside the paragraphs around it."""
+    """The text of a document. A docked block stands beside the paragraphs around it.
+
+    A section that goes further is folded under its heading.
+    """
     parts: list[Markup] = []
-    for group in _groups(document.blocks):
+    for further, blocks in main_and_further(document.blocks):
+        heading = page.blocks(blocks[:1]) if further else None
+        text = Markup("\n").join(_text(page, blocks[1:] if further else blocks))
+        parts.append(
+            page.template("partials/further.html", heading=heading, text=text) if further else text
+        )
+    return Markup("\n").join((*parts, page.footnotes()))
+
+
+def _text(page: PageContext, blocks: tuple[Block, ...]) -> Iterator[Markup]:
+    for group in _groups(blocks):
         if group.docked is None:
-            parts.append(page.blocks(group.before))
+            yield page.blocks(group.before)
         else:
             before, after = page.blocks(group.before), page.blocks(group.after)
-            instrument = page.block(group.docked)
-            parts.append(
-                page.template("partials/dock.html", before=before, docked=instrument, after=after)
-            )
-    return Markup("\n").join((*parts, page.footnotes()))
+            docked = page.block(group.docked)
+            yield page.template("partials/dock.html", before=before, docked=docked, after=after)
 
 
 class _Group(Struct, frozen=True):
@@ -103,10 +118,10 @@ def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]
     for block in document.blocks:
         if not isinstance(block, Heading) or block.level > 3:
             continue
-        entry = ContentsEntry(block.anchor, page.inlines(without_links(block.children)))
+        title = page.inlines(without_links(block.children))
+        entry = ContentsEntry(block.anchor, title, block.goes_further)
         if block.level == 3 and entries:
-            last = entries[-1]
-            entries[-1] = ContentsEntry(last.anchor, last.title, (*last.children, entry))
+            entries[-1] = replace(entries[-1], children=(*entries[-1].children, entry))
         else:
             entries.append(entry)
     return tuple(entries)

@@ -25,6 +25,7 @@ class LessonLink(Struct, frozen=True):
     href: str
     status: str
     minutes: int | None
+    further: int | None
     summary: str
     needs: tuple[LessonLink, ...] = ()
     asked: str = ""
@@ -38,6 +39,7 @@ class LessonHead(Struct, frozen=True):
     title: str
     summary: str
     minutes: int | None
+    further: int | None
     objectives: tuple[str, ...]
     aliases: tuple[str, ...] = ()
     """Other names, which the page does not show."""
@@ -45,7 +47,8 @@ class LessonHead(Struct, frozen=True):
     @classmethod
     def of(cls, lesson: Lesson) -> LessonHead:
         """The head of a lesson of the map."""
-        about = (lesson.summary, lesson.minutes, lesson.objectives, lesson.aliases)
+        minutes = (lesson.minutes, lesson.further)
+        about = (lesson.summary, *minutes, lesson.objectives, lesson.aliases)
         return cls(lesson.id, lesson.title, *about)
 
 
@@ -68,6 +71,7 @@ def lesson_link(
         place.href(urls.lesson_path(lesson)),
         lesson.status.value,
         lesson.minutes,
+        lesson.further,
         lesson.summary,
         tuple(lesson_link(library, place, need) for need in required),
     )

@@ -14,7 +14,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model import Limits
+from coursebuild.core.model import Limits, Pace
 from coursebuild.core.syntax.fields import NotNegative, Text
 from coursebuild.core.syntax.theme import ThemeTable
 
@@ -208,7 +208,11 @@ class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ()
     minutes: Annotated[
         Annotated[int, Meta(ge=1, le=100_000)] | None,
-        Meta(description="the time to read it and work through it"),
+        Meta(description="the time to read it and work through it, without what goes further"),
+    ] = None
+    further: Annotated[
+        Annotated[int, Meta(ge=1, le=100_000)] | None,
+        Meta(description="minutes of the sections marked `{.further}`"),
     ] = None
 
 
@@ -259,6 +263,7 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     format: FormatTable | None = None
     security: SecurityTable = SecurityTable()
     limits: Limits = Limits()
+    pace: Pace | None = None
     callouts: Annotated[
         dict[str, Text | CalloutTable],
         Meta(description="more kinds of callouts by name, with a label or a table"),

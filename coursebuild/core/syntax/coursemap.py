@@ -120,6 +120,7 @@ def _course(
         features=_paths(table, "features", about.features),
         packages=_paths(table, "packages", about.packages),
         environment=tuple(sorted(verify.env.items())),
+        pace=fields.pace,
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
@@ -165,6 +166,7 @@ def _lesson(node: ObjectNode, fields: LessonTable, level: str) -> Lesson:
         prerequisites=fields.prerequisites,
         prerequisite_spans=spans,
         minutes=fields.minutes,
+        further=fields.further,
         level=level,
         document=None,
     )

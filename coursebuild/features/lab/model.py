@@ -84,6 +84,10 @@ class Lab(FeatureBlock, frozen=True):
         key = f"goal-{digest[:8]}"
         return key, (key,)
 
+    def tasks(self) -> int:
+        """To try it."""
+        return 1
+
     def summary(self) -> Lab:
         """The lab without its Markdown."""
         return replace(self, note=(), goal=())

@@ -108,6 +108,8 @@ def _facts(inputs: PageInputs, lesson: LessonHead, words: Strings, locate: Locat
     facts.append(_line(words(f"status.{inputs.values['status']}")))
     if lesson.minutes:
         facts.append(_line(words("lesson.minutes", n=lesson.minutes)))
+    if lesson.further:
+        facts.append(_line(words("lesson.more_minutes", n=lesson.further)))
     needs = lesson_links(inputs, "needs", locate)
     if needs:
         facts.append(f"{_line(words('lesson.needs'))} {', '.join(needs)}")

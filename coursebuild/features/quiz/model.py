@@ -138,6 +138,10 @@ class Quiz(FeatureBlock, frozen=True):
         """What a reader's answers are kept under."""
         return self.id, self.keys
 
+    def tasks(self) -> int:
+        """Its questions."""
+        return len(self.keys)
+
     def output_questions(self) -> Iterator[OutputQuestion]:
         """The questions whose answer a script gives."""
         return (question for question in self.questions if isinstance(question, OutputQuestion))

@@ -7,7 +7,7 @@
 
 import { h } from '../lab/page/dom.js'
 import { linkedLab } from './labs.js'
-import { decoded } from './lines.js'
+import { decoded } from './unfold.js'
 
 const FLOW = '.prose > :not(.dock), .dock > * > *'
 const END = 'h2, h3, h4, h5, h6, hr, .footnotes'

@@ -4,6 +4,7 @@
  * The event `coursebuild:run` has a lab load at once, and do what the event's detail lists: labels of buttons, and values by label.
  */
 
+import { unfold } from './unfold.js'
 import { within } from './within.js'
 
 const NEAR = '600px 0px' // of the window's edge
@@ -42,7 +43,10 @@ export function loadLabs(part, words, progress) {
     lab.addEventListener('coursebuild:run', async ({ detail }) => (await start(lab))?.run?.(detail))
   }
   const linked = linkedLab(location.hash)
-  if (part === document) labs.find((lab) => lab.dataset.lab === linked)?.scrollIntoView()
+  const shared = part === document ? labs.find((lab) => lab.dataset.lab === linked) : null
+  if (!shared) return
+  unfold(shared)
+  shared.scrollIntoView()
 }
 
 /** The lab whose state an address holds; null where it holds none. */

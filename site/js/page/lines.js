@@ -6,6 +6,7 @@
  * is read out is the line that is marked and not one number after the other.
  */
 
+import { decoded, unfold } from './unfold.js'
 import { within } from './within.js'
 
 const LINES = /^#?(.+)\.L([1-9]\d{0,8})(?:-L([1-9]\d{0,8}))?$/
@@ -28,15 +29,6 @@ export function lineAt(y, height, first, count) {
   return Math.min(Math.max(line, first), first + count - 1)
 }
 
-/** What a part of an address says. */
-export function decoded(text) {
-  try {
-    return decodeURIComponent(text)
-  } catch {
-    return text // a percent sign that begins no character
-  }
-}
-
 /** Mark the lines of an address and open what they are folded in. Gives the marked elements. */
 function mark(document, lines) {
   for (const old of document.querySelectorAll('.marked')) old.classList.remove('marked')
@@ -45,8 +37,7 @@ function mark(document, lines) {
     const line = document.getElementById(`${lines.stem}.L${n}`)
     if (!line) break
     line.classList.add('marked')
-    const fold = line.closest('details')
-    if (fold) fold.open = true
+    unfold(line)
     line.closest('[hidden]')?.dispatchEvent(new Event('beforematch'))
     found.push(line)
   }
