@@ -19,9 +19,9 @@ from coursebuild.core.text.source import Span
 _ELEMENTS = frozenset(
     "a abbr address article aside audio b bdi bdo big blockquote br caption center cite code col "
     "colgroup data dd del details dfn div dl dt em figcaption figure footer h1 h2 h3 h4 h5 h6 "
-    "header hgroup hr i img ins kbd li mark nav ol p picture pre q rp rt ruby s samp section "
-    "small source span strike strong sub summary sup table tbody td tfoot th thead time tr track "
-    "tt u ul var video wbr "
+    "header hgroup hr i img ins kbd li mark meter nav ol p picture pre progress q rp rt ruby s "
+    "samp section small source span strike strong sub summary sup table tbody td tfoot th thead "
+    "time tr track tt u ul var video wbr "
     # SVG
     "circle clippath defs desc ellipse g line lineargradient marker mask path pattern polygon "
     "polyline radialgradient rect stop svg symbol text textpath title tspan use "
@@ -33,8 +33,9 @@ _ELEMENTS = frozenset(
 _WORDS = frozenset(
     "abbr align alt autoplay border cellpadding cellspacing class colspan compact "
     "controls coords datetime decoding default dir display download headers height hidden "
-    "hreflang id itemprop kind label lang loading loop media muted nowrap open playsinline "
-    "preload rel reversed role rowspan rules scope sizes span srclang start tabindex target title "
+    "high hreflang id itemprop kind label lang loading loop low max media min muted nowrap open "
+    "optimum playsinline preload rel reversed role rowspan rules scope sizes span srclang start "
+    "tabindex target title "
     "translate type valign value width xml:lang xml:space xmlns xmlns:xlink "
     # SVG and MathML
     "accent accentunder clippathunits columnalign columnspan columnspacing cx cy d depth dx dy "
