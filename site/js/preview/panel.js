@@ -108,7 +108,7 @@ export class Panel {
     const kind = blocks ? 'Blocks this page' : severity === 'error' ? 'Mistake' : 'Warning'
     item.append(
       h('p', { class: 'preview-message' }, h('strong', {}, kind), ' ', ...coded(message)),
-      h('p', { class: 'preview-place' }, this.place(place), ` ${rule}`),
+      this.place(place, rule),
     )
     if (line.trim()) {
       const marked = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
@@ -120,14 +120,14 @@ export class Panel {
     return item
   }
 
-  place(text) {
+  place(text, rule) {
     const answer = h('span', { class: 'preview-why', role: 'status' })
     const button = h('button', { type: 'button', title: 'Open in the editor' }, h('code', {}, text))
     button.addEventListener('click', async () => {
       const why = await this.openPlace(text)
-      answer.textContent = why && `It cannot be opened: ${why}.`
+      answer.replaceChildren(...(why ? coded(`It cannot be opened: ${why}.`) : []))
     })
-    return h('span', {}, button, ' ', answer)
+    return h('p', { class: 'preview-place' }, button, ` ${rule} `, answer)
   }
 }
 
