@@ -74,8 +74,8 @@ def prepare(
                     if file.path.endswith(".html"):
                         file.make()
         except TemplateFailure as failure:
-            from coursebuild.pipeline.theme import told
+            from coursebuild.pipeline.theme import template_diagnostic
 
-            wrong = (told(checked.course, failure),)
+            wrong = (template_diagnostic(checked.course, failure),)
         report = checked.report(wrong)
         yield report, site if report.ok else None

@@ -1,7 +1,7 @@
 """The files of a course's theme: read, and checked.
 
-Entry points: `load_theme`; `copied_template`, a template as a course begins with it; `told`, what
-to say of one that fails.
+Entry points: `load_theme`; `copied_template`, a template as a course begins with it;
+`template_diagnostic`, what to say of one that fails.
 
 A copied template names in its first line the text that it was copied from, by some digits of its
 hash. Where the tool has another text by now, the author hears of it.
@@ -143,7 +143,7 @@ def _check_templates(theme: Theme) -> Iterator[Diagnostic]:
             yield diagnose("template-outdated", source.span(0, len(first)), message, help=help)
 
 
-def told(course: Course, failure: TemplateFailure) -> Diagnostic:
+def template_diagnostic(course: Course, failure: TemplateFailure) -> Diagnostic:
     """What to tell of a template that failed while a page was drawn."""
     sources = {source.path: source for source in course.theme.templates}
     return _broken(sources[failure.path], failure.line, failure.message)

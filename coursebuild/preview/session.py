@@ -42,7 +42,7 @@ from coursebuild.pipeline.load import MAP, Loaded, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
-from coursebuild.pipeline.theme import told
+from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verified
 from coursebuild.preview.files import Files
 
@@ -399,7 +399,7 @@ class Session:
         """Tell that a template of the course fails."""
         with self.changed:
             assert self.course is not None
-            found = (told(self.course, failure),)
+            found = (template_diagnostic(self.course, failure),)
             if found != self._failed:
                 self._failed = found
                 self.tell()

@@ -100,8 +100,8 @@ def _missing(error: Exception) -> EffectError:
     return EffectError(f"mini-racer's V8 cannot be used: {error}", help=help)
 
 
-class Progress(NamedTuple):
-    """By what is seen from outside that a script gets on."""
+class Heartbeat(NamedTuple):
+    """What shows from outside that a script gets on."""
 
     beats: memoryview
     """Bytes that it changes."""
@@ -147,7 +147,7 @@ class Isolate:
                 self._running.cancel()
 
     def call(
-        self, function: str, argument: str, seconds: float, progress: Progress | None = None
+        self, function: str, argument: str, seconds: float, progress: Heartbeat | None = None
     ) -> str:
         """Call a global function from string to string.
 
@@ -173,7 +173,7 @@ class Isolate:
         assert isinstance(place, memoryview)
         place[:] = data
 
-    def _evaluate(self, code: str, seconds: float, progress: Progress | None = None) -> object:
+    def _evaluate(self, code: str, seconds: float, progress: Heartbeat | None = None) -> object:
         from py_mini_racer import JSEvalException, JSOOMException
 
         with self._lock:
@@ -195,7 +195,7 @@ class Isolate:
     def _submit(self, work: Coroutine[Any, Any, Any]) -> Future[Any]:
         return asyncio.run_coroutine_threadsafe(work, self._loop)
 
-    async def _in_time(self, code: str, seconds: float, progress: Progress | None) -> object:
+    async def _in_time(self, code: str, seconds: float, progress: Heartbeat | None) -> object:
         """The value of a script, in the loop's thread.
 
         Processor time is what counts, since other work on this machine must not end a good script;

@@ -17,7 +17,7 @@ from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import MEMORY
-from coursebuild.core.run.v8 import Isolate, LimitError, Progress, ScriptError, StoppedError
+from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError, StoppedError
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.files import script_path, wasm_path
 
@@ -94,7 +94,7 @@ class LabEngine:
         isolate = self._ready()
         try:
             isolate.fill("mjb", mjb)
-            progress = Progress(isolate.buffer("beats"), self._patience)
+            progress = Heartbeat(isolate.buffer("beats"), self._patience)
             text = isolate.call("trial", json.dumps(request), seconds, progress)
         except LimitError as error:
             return self._ended(isolate, "timeout", str(error))

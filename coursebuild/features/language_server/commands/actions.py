@@ -17,7 +17,7 @@ from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Span
 from coursebuild.features.language_server.commands.diagnosis import diagnoses
-from coursebuild.features.language_server.commands.texts import Texts
+from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.preview.messages import new_output
 
 
@@ -30,7 +30,7 @@ class Action(Struct, frozen=True):
     """What is no longer wrong then."""
 
 
-def actions(texts: Texts, place: Span) -> Iterator[Action]:
+def actions(texts: OpenTexts, place: Span) -> Iterator[Action]:
     """What is offered for a stretch of a text."""
     found = [one for one in diagnoses(texts.session) if one.span.source == place.source]
     for one in found:
@@ -45,7 +45,7 @@ def _meet(one: Span, other: Span) -> bool:
     return one.start <= other.end and other.start <= one.end
 
 
-def _outputs(texts: Texts, place: Span, found: list[Diagnostic]) -> Iterator[Action]:
+def _outputs(texts: OpenTexts, place: Span, found: list[Diagnostic]) -> Iterator[Action]:
     library = texts.library
     for verdict in () if library is None else library.results.verdicts:
         span = verdict.recording.span
@@ -59,7 +59,7 @@ def _outputs(texts: Texts, place: Span, found: list[Diagnostic]) -> Iterator[Act
             yield Action(f"Accept what `{run.path}` prints", (edit,), mends)
 
 
-def _numbers(texts: Texts, place: Span) -> Iterator[Action]:
+def _numbers(texts: OpenTexts, place: Span) -> Iterator[Action]:
     library, document = texts.library, texts.document(place.source)
     if library is None or document is None:
         return

@@ -26,7 +26,7 @@ from coursebuild.features.language_server.commands.fields import (
     field_place,
     known_values,
 )
-from coursebuild.features.language_server.commands.texts import Texts
+from coursebuild.features.language_server.commands.texts import OpenTexts
 
 
 class Proposal(NamedTuple):
@@ -41,14 +41,14 @@ class Proposal(NamedTuple):
 class _Asked(Struct, frozen=True):
     """Where something is to be written, and what stands before it."""
 
-    texts: Texts
+    texts: OpenTexts
     library: Library
     source: Source
     offset: int
     found: re.Match[str]
 
 
-def completions(texts: Texts, source: Source, offset: int) -> tuple[Span, list[Proposal]]:
+def completions(texts: OpenTexts, source: Source, offset: int) -> tuple[Span, list[Proposal]]:
     """What may be written in the place of a span; the client leaves out what does not fit."""
     library, here = texts.library, source.span(offset, offset)
     if library is None:

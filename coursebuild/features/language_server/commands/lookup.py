@@ -29,13 +29,13 @@ from coursebuild.core.text.source import Source, Span
 from coursebuild.features.glossary.sentences import sentence_of
 from coursebuild.features.language_server.commands.engine import described_name
 from coursebuild.features.language_server.commands.fields import field_place
-from coursebuild.features.language_server.commands.texts import Texts
+from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.symbols.mathml import only_symbol, symbols
 
 _QUOTED = re.compile(r"""(["'])([^"'\s]+)\1""")
 
 
-class Definition(Struct, frozen=True):
+class Referent(Struct, frozen=True):
     """What something stands for."""
 
     span: Span
@@ -46,7 +46,7 @@ class Definition(Struct, frozen=True):
     """Where that is said."""
 
 
-def look_up(texts: Texts, source: Source, offset: int) -> Definition | None:
+def look_up(texts: OpenTexts, source: Source, offset: int) -> Referent | None:
     """What stands at an offset of a text, if it stands for anything."""
     library, document = texts.library, texts.document(source)
     if library is None:
@@ -65,27 +65,27 @@ def _covers(span: Span, offset: int) -> bool:
     return span.start <= offset < span.end
 
 
-def _of_field(library: Library, source: Source, offset: int) -> Definition | None:
+def _of_field(library: Library, source: Source, offset: int) -> Referent | None:
     place = field_place(source, offset)
     if place is None or place.field is None or not place.text:
         return None
     key, lesson = place.key, library.lessons.get(place.text)
     if lesson is not None and key in ("id", "prerequisites"):
         at = lesson.span if lesson.document is None else lesson.document.source.span(0, 0)
-        return Definition(place.span, f"**Lesson {lesson.id}: {lesson.title}**", at)
+        return Referent(place.span, f"**Lesson {lesson.id}: {lesson.title}**", at)
     if key == "rule" and place.text in RULES:
-        return Definition(place.span, RULES[place.text].summary)
+        return Referent(place.span, RULES[place.text].summary)
     said = "" if key else description(place.field)
-    return Definition(place.span, f"`{place.text}`: {said}") if said else None
+    return Referent(place.span, f"`{place.text}`: {said}") if said else None
 
 
 class _Lookup:
     """Of things in one document."""
 
-    def __init__(self, texts: Texts, library: Library, document: model.Document) -> None:
+    def __init__(self, texts: OpenTexts, library: Library, document: model.Document) -> None:
         self.texts, self.library, self.document = texts, library, document
 
-    def of_node(self, node: model.Block | model.Inline, offset: int) -> Definition | None:
+    def of_node(self, node: model.Block | model.Inline, offset: int) -> Referent | None:
         """What a node stands for, or what stands at the offset in it."""
         match node:
             case model.Link():
@@ -100,15 +100,15 @@ class _Lookup:
             case model.Callout() if _covers(node.kind_span, offset):
                 label = self.library.callout_label(node.kind)
                 promise = self.library.callout_promise(node.kind)
-                return Definition(node.kind_span, f"**{label}**\n\n{promise}")
+                return Referent(node.kind_span, f"**{label}**\n\n{promise}")
             case model.Script() | model.PlainCode() | model.FeatureBlock() | model.CodeSpan():
                 return self.code(node, offset)
             case _:
                 return None
 
     @staticmethod
-    def definition(span: Span, text: str, place: Span | None) -> Definition | None:
-        return Definition(span, text, place) if text else None
+    def definition(span: Span, text: str, place: Span | None) -> Referent | None:
+        return Referent(span, text, place) if text else None
 
     # --- what links lead to
 
@@ -195,7 +195,7 @@ class _Lookup:
 
     # --- formulas, numbers, code
 
-    def formula(self, formula: model.Math | model.MathBlock, offset: int) -> Definition | None:
+    def formula(self, formula: model.Math | model.MathBlock, offset: int) -> Referent | None:
         """The symbols in a formula whose meaning the text declares."""
         known = self.texts.formulas(self.document.source.path)
 
@@ -215,9 +215,9 @@ class _Lookup:
         ]
         at = [one for one, _ in found if _stands_at(one.tex.text, formula.span, offset)]
         first = next(iter([*at, *(one for one, _ in found)]), None)
-        return None if first is None else Definition(formula.span, "\n".join(said), first.span)
+        return None if first is None else Referent(formula.span, "\n".join(said), first.span)
 
-    def binding(self, binding: model.NumberBinding) -> Definition | None:
+    def binding(self, binding: model.NumberBinding) -> Referent | None:
         """The printed line that bears a number out."""
         results, shown = self.library.results, Shown.of(binding.text)
         printed = Printed(results.verdicts, results.runs, self.library.scripts)
@@ -226,14 +226,14 @@ class _Lookup:
                 if shown.shows(window) and window.line.locate is not None:
                     place = window.line.locate(window.numbers[0].start, window.numbers[-1].end)
                     said = f"`{verdict.recording.script}` printed\n```text\n{window.line.text}\n```"
-                    return Definition(binding.span, said, place)
+                    return Referent(binding.span, said, place)
         return None
 
     def code(
         self,
         node: model.Script | model.PlainCode | model.FeatureBlock | model.CodeSpan,
         offset: int,
-    ) -> Definition | None:
+    ) -> Referent | None:
         """A model in quotes, or a name of the engine."""
         named: Iterable[str] = ()
         if isinstance(node, model.Script):
@@ -246,9 +246,9 @@ class _Lookup:
                 name = quoted[2].removeprefix("models/").removesuffix(".xml")
                 said, place = self.of_model(name)
                 if said:
-                    return Definition(Span(node.span.source, *quoted.span(2)), said, place)
+                    return Referent(Span(node.span.source, *quoted.span(2)), said, place)
         described = described_name(node.span, offset, self.facts(sorted(named)))
-        return None if described is None else Definition(*described)
+        return None if described is None else Referent(*described)
 
 
 def _stands_at(tex: str, span: Span, offset: int) -> bool:

@@ -14,10 +14,10 @@ from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.course_map import with_lesson_renamed
 from coursebuild.features.authoring.references import references
 from coursebuild.features.language_server.commands.fields import field_place
-from coursebuild.features.language_server.commands.texts import Texts
+from coursebuild.features.language_server.commands.texts import OpenTexts
 
 
-def named_lesson(texts: Texts, source: Source, offset: int) -> tuple[Lesson, Span] | None:
+def named_lesson(texts: OpenTexts, source: Source, offset: int) -> tuple[Lesson, Span] | None:
     """The lesson whose id stands at an offset, and where the id stands."""
     library, document = texts.library, texts.document(source)
     if library is None:

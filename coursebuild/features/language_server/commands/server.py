@@ -26,7 +26,7 @@ from coursebuild.features.language_server.commands.lookup import look_up
 from coursebuild.features.language_server.commands.outline import folds, headings
 from coursebuild.features.language_server.commands.places import Places
 from coursebuild.features.language_server.commands.renaming import named_lesson, renamed
-from coursebuild.features.language_server.commands.texts import Texts
+from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.preview.session import Session
 
 
@@ -35,7 +35,7 @@ class Server:
 
     def __init__(self, session: Session, store: Memo) -> None:
         self.session = session
-        self.texts = Texts(session, store)
+        self.texts = OpenTexts(session, store)
         self.places = Places(session.root)
         self.client = LanguageServer(
             "coursebuild", __version__, types.TextDocumentSyncKind.Full, max_workers=1

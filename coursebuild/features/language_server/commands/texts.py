@@ -1,6 +1,6 @@
 """The texts of a course as they are now, in an editor or on the disk.
 
-Entry point: `Texts`.
+Entry point: `OpenTexts`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from coursebuild.pipeline.reading import kept_formulas
 from coursebuild.preview.session import Session
 
 
-class Texts:
+class OpenTexts:
     """See the module."""
 
     def __init__(self, session: Session, store: Memo) -> None:
