@@ -1,4 +1,4 @@
-"""A course with a face of its own: that of docs/how-to/theme.md, built, changed and previewed."""
+"""A course with a look of its own: that of docs/how-to/theme.md, built, changed and previewed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A course's own face: what its map says of it, with the files that it names.
+"""A course's own look: what its map says of it, with the files that it names.
 
 Entry point: `Theme`.
 """

@@ -1,4 +1,4 @@
-"""The course's own face in what all pages share.
+"""The course's own look in what all pages share.
 
 Entry points: `theme_faces`, its fonts; `theme_style`, the end of the style sheet; `picture_size`.
 """
