@@ -11,9 +11,14 @@ import pytest
 
 from support.live_course import Live
 from support.live_course import live as live
-from support.scratch_course import ROOT, Folder
+from support.markdown_files import DOCS, fences
+from support.scratch_course import Folder
 
 pytestmark = pytest.mark.site
+
+CODE = [fence for fence in fences(DOCS / "how-to/features.md") if fence.kind == "python"]
+EXAMPLES = [fence.text for fence in CODE if not fence.words]
+STEPS = [fence.text for fence in CODE if fence.is_("fragment")]
 
 SHOUT = '''"""Text in capitals."""
 
@@ -151,9 +156,7 @@ def test_a_feature_stands_in_its_folder(course: Folder, path: str) -> None:
 
 
 def test_the_example_of_the_docs_works(course: Folder) -> None:
-    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
-    code = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    course.write("features/shout.py", code[0])
+    course.write("features/shout.py", EXAMPLES[0])
     task = '\n```task name="A & B"\nDo **this**.\n```\n'
     course.write("content/lessons/1.1-one.md", f"## Hello\n{task}")
     done = course.main("build")
@@ -172,9 +175,7 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
 def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
     """Each step takes the place of what has its name in the feature as it is made."""
     assert course.main("new", "feature", "mermaid").status == 0
-    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
-    steps = re.findall(r"^```python fragment\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    walked = [node for step in steps for node in ast.parse(step).body]
+    walked = [node for step in STEPS for node in ast.parse(step).body]
     names = {defined(node) for node in walked if defined(node)} | {"check"}
     first, *made = ast.parse(course.text("features/mermaid.py")).body[1:]
     nodes = [*(node for node in made if defined(node) not in names), *walked]
@@ -203,9 +204,7 @@ def defined(node: ast.stmt) -> str:
 @pytest.fixture
 def inventory(course: Folder) -> Folder:
     """A course with the page of the docs."""
-    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
-    code = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    course.write("features/inventory.py", code[1])
+    course.write("features/inventory.py", EXAMPLES[1])
     course.replace(MAP, '"features/shout.py"', '"features/shout.py", "features/inventory.py"')
     course.write("models/box.xml", "<mujoco><worldbody/></mujoco>\n")
     return course

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
 
-from support.scratch_course import GOOD, ROOT, Folder
+from support.markdown_files import DOCS, fences
+from support.scratch_course import GOOD, Folder
 
 pytestmark = pytest.mark.site
 
@@ -17,9 +17,8 @@ MAP = "content/course.toml"
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
     """A course with the exporter that the docs show."""
-    page = (ROOT / "docs/how-to/features.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    [code] = (block for block in blocks if "Exporter(" in block)
+    page = fences(DOCS / "how-to/features.md")
+    [code] = (fence.text for fence in page if "Exporter(" in fence.text)
     folder = Folder(tmp_path / "a course")
     folder.fill([GOOD, "## Two\n"], stores)
     folder.write("features/lessons.py", code)
