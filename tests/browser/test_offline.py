@@ -399,7 +399,8 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
         "worker.js": page_script(bundled["js/preview-worker.js"]) if script == "worker.js" else b"",
     }
     session = Previewed(Options(host.folder, 1, True))
-    preview = PreviewServer(int(host.url.split(":")[2].strip("/")), session, own)
+    port = int(host.url.split(":")[2].strip("/"))
+    preview = PreviewServer("127.0.0.1", port, session, own)
     preview.start()
     try:
         page.goto(host.url + FIRST)
