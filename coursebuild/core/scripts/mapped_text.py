@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate
 
 from msgspec import Struct
 
 from coursebuild.core.model import Filter
+from coursebuild.core.text.patterns import replacements
 
 _LINE_END = re.compile(r"\r\n?|\n")
 # Possessive, and only at the start of a run, so that long runs of white space take linear time.
@@ -74,21 +74,24 @@ class MappedText(Struct, frozen=True):
         high = last.start + end - last.at if last.verbatim else last.end
         return low, low if start == end else max(low, high)
 
-    def substituted(self, pattern: re.Pattern[str], replacement: str) -> MappedText:
-        """`pattern.sub(replacement, text)`, mapped."""
+    def substituted(self, pattern: re.Pattern[str], text: str) -> MappedText:
+        """The text with another in place of each match."""
+        return self.edited({found.span(): text for found in pattern.finditer(self.text)})
+
+    def edited(self, places: Mapping[tuple[int, int], str]) -> MappedText:
+        """The text with others in places of it, given in order by where they start and end."""
         parts: list[str] = []
         segments: list[MappingSegment] = []
         length = copied = 0
-        for found in pattern.finditer(self.text):
-            written = found.expand(replacement)
-            if written == found.group():
+        for (start, end), written in places.items():
+            if written == self.text[start:end]:
                 continue
-            self._copy(copied, found.start(), length, segments)
-            parts += (self.text[copied : found.start()], written)
-            length += found.start() - copied
-            copied = found.end()
+            self._copy(copied, start, length, segments)
+            parts += (self.text[copied:start], written)
+            length += start - copied
+            copied = end
             if written:
-                replaced = self._replaced(found.start(), found.end())
+                replaced = self._replaced(start, end)
                 segments.append(MappingSegment(length, *replaced, False))
                 length += len(written)
         self._copy(copied, len(self.text), length, segments)
@@ -124,17 +127,11 @@ class MappedText(Struct, frozen=True):
                 into.append(MappingSegment(new_at, segment.start, segment.end, False))
 
 
-@lru_cache(maxsize=64)
-def _compiled(pattern: str) -> re.Pattern[str]:
-    return re.compile(pattern, re.MULTILINE)
-
-
 def filtered(mapped: MappedText, filters: Iterable[Filter]) -> MappedText:
     """The text after the filters."""
     for rule in filters:
-        pattern = _compiled(rule.pattern)
-        if pattern.search(mapped.text):
-            mapped = mapped.substituted(pattern, rule.replacement)
+        if places := replacements(rule.pattern, rule.replacement, mapped.text):
+            mapped = mapped.edited(places)
     return mapped
 
 

@@ -130,7 +130,7 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
 class FilterTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A replacement in both texts before they are compared."""
 
-    pattern: Annotated[str, Meta(min_length=1, description="a regular expression of Python")]
+    pattern: Annotated[str, Meta(min_length=1, description="a regular expression, as RE2 reads it")]
     replacement: Annotated[str, Meta(description="with groups as in `\\1`")]
 
 

@@ -20,8 +20,9 @@ from coursebuild.core.syntax.course_schema import (
 )
 from coursebuild.core.syntax.decode import Decoding
 from coursebuild.core.syntax.nodes import NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.wording import named, pattern_mistake
+from coursebuild.core.syntax.wording import named
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.patterns import pattern_mistake
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
 

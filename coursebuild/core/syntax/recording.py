@@ -15,8 +15,8 @@ from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.syntax.fence import Fence, is_ours
 from coursebuild.core.syntax.info import FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.wording import pattern_mistake
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.patterns import matches_nothing, pattern_mistake
 from coursebuild.core.text.source import Span
 
 _CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
@@ -179,7 +179,7 @@ def _pattern(word: Word | None, diagnostics: list[Diagnostic]) -> str:
         return ""
     pattern = word.value_text.text
     mistake = pattern_mistake(pattern) or pattern_mistake(volatile_pattern(pattern))
-    if mistake is None and re.search(pattern, "") is None:
+    if mistake is None and not matches_nothing(pattern):
         return pattern
     message = "the pattern matches where there is nothing"
     if mistake is not None:

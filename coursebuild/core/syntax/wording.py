@@ -1,13 +1,12 @@
 """How messages call types and the author's values.
 
 Entry points: `FormatWords` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`,
-`quoted`, `short`, `pattern_mistake`.
+`quoted`, `short`.
 """
 
 from __future__ import annotations
 
 import re
-import warnings
 from typing import assert_never
 
 import msgspec.inspect as inspect
@@ -188,17 +187,3 @@ def type_help(node: Node, type: inspect.Type) -> str:
     if any(accepts(array.item_type, node) for array in arrays):
         return f"put it between brackets: `[{raw}]`"
     return ""
-
-
-def pattern_mistake(pattern: str, replacement: str = "") -> tuple[str, int | None] | None:
-    """Why a regular expression, or a replacement for it, cannot be used, and at which character."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            re.compile(pattern).sub(replacement, "")
-    except RecursionError:
-        return "it nests too deep", None
-    except (re.error, ValueError, OverflowError, IndexError) as error:
-        text, at = (error.msg, error.pos) if isinstance(error, re.error) else (str(error), None)
-        return text[:1].lower() + text[1:], at
-    return None

@@ -31,6 +31,12 @@ def test_filtering_is_substitution(text: str, rules: list[tuple[str, str]]) -> N
     assert mapped.text == expected
 
 
+def test_a_filter_ends_where_backtracking_would_not() -> None:
+    text = "a" * 5000 + "b"
+    rules = (Filter(r"(a+)+$", ""), Filter(r"(a|a)*c", ""), Filter("(a*)*b$", "end"))
+    assert filtered(MappedText.of_text(text), rules).text == "end"
+
+
 @given(TEXTS, st.lists(PATTERNS, max_size=4), st.data())
 def test_origins_lie_in_the_text_and_grow(
     text: str, rules: list[tuple[str, str]], data: st.DataObject
