@@ -243,6 +243,7 @@ def course(
                 prerequisites=(),
                 prerequisite_spans=(),
                 minutes=None,
+                further=None,
                 level="1",
                 document=found,
             )
