@@ -115,14 +115,14 @@ def _inserted(course: Course, id: str, lines: Sequence[str]) -> str:
     line_end = _line_end(text)
     if above or not level.lessons:
         last = above[-1].span if above else level.span
-        at, end = _header(text, last.start), _end_of_line(text, last.end)
+        at, end = _start_of_line(text, last.start), _end_of_line(text, last.end)
         entry = line_end.join(["", "", *_indented(lines, text[at : last.start])])
         if any(line.strip() for line in text[end:].splitlines()[1:2]):
             entry += line_end
         return text[:end] + entry + text[end:]
     first = level.lessons[0].span.start
     at, _ = _entry(text, level.lessons[0])
-    entry = line_end.join([*_indented(lines, text[_header(text, first) : first]), "", ""])
+    entry = line_end.join([*_indented(lines, text[_start_of_line(text, first) : first]), "", ""])
     return text[:at] + entry + text[at:]
 
 
@@ -163,8 +163,7 @@ def _line_end(text: str) -> str:
     return "\r\n" if "\r\n" in text else "\n"
 
 
-def _header(text: str, at: int) -> int:
-    """Where the line of an offset begins."""
+def _start_of_line(text: str, at: int) -> int:
     return text.rfind("\n", 0, at) + 1
 
 

@@ -2,10 +2,9 @@
 
 Entry point: `format_document`.
 
-1. JSON in fences of ours, tables, white space at line ends, empty lines, and paragraphs where there
-   is a width each give edits by span.
-2. The text with all of them is read again. Where it does not say what it said, those that are to
-   blame are left out: each half of the edits is tried by itself, down to single ones.
+1. JSON in fences, tables, white space, empty lines, and paragraphs if there is a width give edits.
+2. The text with all edits is parsed again. If its meaning has changed, each half of the edits is
+   tried by itself, down to single ones, and those that change it are left out.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ WIDTH = 120
 def format_document(
     source: Source, callouts: frozenset[str], *, lesson: bool, width: int
 ) -> Parsed[str]:
-    """The text of a document, formatted; as it is, with what is wrong, where that is unclear.
+    """The text of a document, formatted; one with mistakes stays as it is, and they are told.
 
     `width` is that of paragraphs; 0 leaves their lines as they are.
     """
@@ -77,7 +76,7 @@ def _errors(parsed: Parsed[Document]) -> tuple[Diagnostic, ...]:
 def _choose(
     edits: list[Edit], kept: list[Edit], harmless: Callable[[Sequence[Edit]], bool]
 ) -> list[Edit]:
-    """Those of the edits that can be added to others and do no harm."""
+    """The edits that were kept, and as many of the others as are harmless together."""
     if not edits or harmless(kept + edits):
         return kept + edits
     if len(edits) == 1:
@@ -87,12 +86,12 @@ def _choose(
 
 
 def _meaning(document: Document) -> str:
-    """What a document says, wherever it says it and however its lines are broken."""
+    """A hash of what a document says, whatever its places and line breaks."""
     return fingerprint((document.blocks, document.footnotes), _SHOWN)
 
 
 def _join_text(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Inlines with their text in as few pieces as can be, and a blank for each white space."""
+    """Inlines with neighbouring texts joined, and each run of white space as one blank."""
     out: list[Any] = []
     for value in values:
         if isinstance(value, SoftBreak):
@@ -118,11 +117,11 @@ _SOLID = (CodeSpan, Image, RawInline)
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _DELIMITERS = re.compile(r"[-:|][-:| \t]*$")
 _PARENTS = ("", "blockquote_open", "footnote_reference_open")
-"""What blocks stand in with an empty line between them."""
+"""Tokens in which blocks are separated by empty lines."""
 
 
 class _Layout:
-    """The edits of a document that are worth trying."""
+    """Finds the edits that would format a document."""
 
     def __init__(self, source: Source, width: int) -> None:
         self.source, self.width = source, width
@@ -153,7 +152,7 @@ class _Layout:
                 yield from self._lay_out_json(read_fence(token, self.base, nested=False))
             elif token.type == "table_open":
                 yield from self._align_table(at)
-        yield from self._strip()
+        yield from self._white_space()
         yield from self._separate()
 
     def _wrap(self, paragraph: Paragraph) -> Iterator[Edit]:
@@ -199,8 +198,8 @@ class _Layout:
         span = self.base.span(rows[0].start, rows[-1].start + len(texts[-1]))
         yield Edit(span, (self._line_end(second) + prefix).join(lines))
 
-    def _strip(self) -> Iterator[Edit]:
-        """None at line ends, no two empty lines in succession, one line end after the text."""
+    def _white_space(self) -> Iterator[Edit]:
+        """None at line ends, single empty lines, one line end at the end of the text."""
         text, starts = self.source.text, self.source.line_starts
         end = len(text.rstrip(" \t\r\n"))
         inner = {
@@ -226,7 +225,7 @@ class _Layout:
             yield Edit(self.source.span(end), line_end)
 
     def _separate(self) -> Iterator[Edit]:
-        """One between two blocks, but for what may belong together: HTML, footnotes, a title."""
+        """An empty line between blocks, except beside HTML, between footnotes and below a title."""
         around: list[list[str]] = [["", ""]]
         for token in self.tokens:
             if token.nesting < 0:

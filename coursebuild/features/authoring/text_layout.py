@@ -1,4 +1,4 @@
-"""Lines of text: words that fill them, rows of tables with their columns below each other.
+"""Lines of text: paragraphs filled with words, tables with aligned columns.
 
 Entry points: `split_words` and `fill`; `align_table`.
 """
@@ -12,7 +12,7 @@ from coursebuild.core.text.cells import cells
 from coursebuild.core.text.source import Span
 
 GAP = re.compile(r"[ \t]*(?:\r\n|\r|\n)([ \t>]*)|[ \t]+")
-"""White space between words, and at a line end what stands before the next line."""
+"""White space between words; group 1 is what precedes the next line in a quote or list."""
 _OPENING = re.compile(r"[-+*#=_|]+$|>|\d+[.)]$|`{3}|~{3}|\$\$")
 """Words that would begin another block at the beginning of a line."""
 _PIPE = re.compile(r"(?<!\\)\|")
