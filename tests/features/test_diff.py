@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from support.scratch_course import Folder, block
-from support.workflows import git
+from support.workflows import commit, git
 
 pytestmark = pytest.mark.site
 
@@ -124,14 +124,8 @@ def course(tmp_path: Path, stores: Path) -> Folder:
     folder.write("content/lessons/flip.svg", SVG % 50)
     folder.write(".gitignore", ".coursebuild\n")
     git(folder.root.parent, "init", "-q", "-b", "main")
-    commit(folder)
+    commit(folder.root)
     return folder
-
-
-def commit(course: Folder) -> str:
-    git(course.root, "add", "-A")
-    git(course.root, "commit", "-q", "-m", "a change")
-    return git(course.root, "rev-parse", "--short=7", "HEAD")
 
 
 def change(course: Folder) -> None:
@@ -155,7 +149,7 @@ def test_everything_that_a_change_does_is_told(course: Folder, tmp_path: Path) -
     git(course.root, "checkout", "-q", "--detach", "main")  # main goes on, which is no change here
     git(course.root, "stash", "-q", "-u")
     course.write("models/other.xml", MODEL % "0.3")
-    commit(course)
+    commit(course.root)
     git(course.root, "branch", "-q", "-f", "main", "HEAD")
     git(course.root, "checkout", "-q", "change")
     git(course.root, "stash", "pop", "-q")
@@ -202,7 +196,7 @@ def test_a_base_that_cannot_be_had(course: Folder, tmp_path: Path) -> None:
     assert (done.status, done.out, done.err) == (2, "", said)
     first = git(course.root, "rev-parse", "HEAD")
     (course.root / "content/course.toml").rename(tmp_path / "map")
-    commit(course)
+    commit(course.root)
     (tmp_path / "map").rename(course.root / "content/course.toml")
     done = course.main("diff", "main")
     assert (done.status, "the course map" in done.err) == (2, True)

@@ -1,8 +1,8 @@
 """Workflows of GitHub, run step by step on this machine.
 
-Entry point: `Runner`. What the actions of others do is done here in a few lines; `pip`, `npx` and
-`rsync` are programs that only note how they were called. An action or an expression that is not
-known fails the test.
+Entry points: `Runner`; `git` and `commit`. What the actions of others do is done here in a few
+lines; `pip`, `npx` and `rsync` are programs that only note how they were called. An action or an
+expression that is not known fails the test.
 """
 
 from __future__ import annotations
@@ -178,6 +178,12 @@ def git(place: Path, *arguments: str) -> str:
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
+
+
+def commit(place: Path) -> None:
+    """All that changed."""
+    git(place, "add", "-A")
+    git(place, "commit", "-q", "-m", "a change")
 
 
 def _filled(text: str, values: dict[str, str]) -> str:

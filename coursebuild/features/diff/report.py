@@ -25,9 +25,9 @@ from coursebuild.core.text.source import Excerpt
 from coursebuild.features.truth.claims import Claims, claims_of, documents_of, total
 
 _ROWS = 40
-"""Of a table: GitHub shows a summary of up to a mebibyte."""
+"""Rows of a table: GitHub shows a summary of up to a mebibyte."""
 _SHORT = 40
-"""Characters of a value that is shown."""
+"""Characters of a value, up to which it is shown."""
 
 Row = tuple[str, ...]
 K = TypeVar("K")
@@ -48,9 +48,7 @@ class ScriptState(Struct, frozen=True):
     """Id of its lesson or page."""
     code: str
     outputs: tuple[Recording, ...]
-    """Tables as their text."""
-    default: Comparison
-    """How those are compared that do not say it."""
+    """Tables as their text, and each with how it is compared."""
 
 
 class LabState(Struct, frozen=True):
@@ -128,11 +126,11 @@ def _scripts(course: Course) -> dict[str, ScriptState]:
             if isinstance(block, Recording):
                 body = block.body if isinstance(block.body, Excerpt) else None
                 text = body or Excerpt.of_span(block.body_span)
-                recorded.setdefault(block.script, []).append(replace(block, body=text))
+                how = block.comparison or course.comparison
+                whole = replace(block, body=text, comparison=how)
+                recorded.setdefault(block.script, []).append(whole)
     return {
-        one.path: ScriptState(
-            one.owner, one.text, tuple(recorded.get(one.path, ())), course.comparison
-        )
+        one.path: ScriptState(one.owner, one.text, tuple(recorded.get(one.path, ())))
         for one in extract(course).value
     }
 
@@ -163,10 +161,9 @@ def _recorded(before: ScriptState, now: ScriptState) -> str:
         largest = max((change.relative_error or 0.0 for change in changes), default=0.0)
         more = f" (relative, up to {largest:.1e})" if largest else ""
         said += [classes(changes) + more] if changes else []
-        how = old.comparison or before.default, new.comparison or now.default
-        modes = [one.mode.value for one in how]
-        if how[0] != how[1]:
-            said.append(f"**compared in another way** ({' → '.join(dict.fromkeys(modes))})")
+        if old.comparison != new.comparison:
+            modes = dict.fromkeys(one.comparison.mode.value for one in (old, new) if one.comparison)
+            said.append(f"**compared in another way** ({' → '.join(modes)})")
     return "; ".join(said)
 
 

@@ -19,7 +19,7 @@ from coursebuild.cli.commands import known_commands, parser_of
 from coursebuild.core.run.versions import engine_version
 from support.markdown_files import DOCS, ROOT, fences
 from support.scratch_course import FIRST, SECOND, Folder
-from support.workflows import Runner, Step, git
+from support.workflows import Runner, Step, commit, git
 
 PAGES = ("continuous-integration", "publish")
 FENCES = [fence for page in PAGES for fence in fences(DOCS / f"how-to/{page}.md")]
@@ -130,14 +130,8 @@ def course(tmp_path: Path, stores: Path) -> Folder:
     folder.fill([FIRST, SECOND], stores)
     folder.write(".gitignore", ".coursebuild/\nexamples/\npublic/\n")
     git(folder.root, "init", "-q", "-b", "main")
-    commit(folder)
+    commit(folder.root)
     return folder
-
-
-def commit(course: Folder) -> str:
-    git(course.root, "add", "-A")
-    git(course.root, "commit", "-q", "-m", "a change")
-    return git(course.root, "rev-parse", "HEAD")
 
 
 @pytest.fixture
@@ -155,7 +149,7 @@ def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
     base = git(course.root, "rev-parse", "main")
     git(course.root, "checkout", "-q", "-B", "change", "main")
     course.write(course.lesson(2), lesson)
-    commit(course)
+    commit(course.root)
     git(course.root, "checkout", "-q", "-B", "merged", "main")
     git(course.root, "merge", "-q", "--no-ff", "-m", "merged", "change")
     event = {"event_name": "pull_request", "event.pull_request.base.sha": base}
