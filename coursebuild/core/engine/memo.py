@@ -4,15 +4,13 @@ Entry point: `Memo`: `get` and `put`, or both in one, `get_or_create`; `get_valu
 of JSON.
 
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
-   together. It begins with the hash of its name and of what follows. Whoever reads one says what
-   its bytes must be; one that was cut, flipped, put under another name, or holds something else is
-   told of, removed, and made again instead of served.
-2. It is written beside its place and renamed there, so that processes at work at the same time see
-   whole entries only.
-3. What a script or a trial found may be shared: what is not there is looked for in the shared
-   cache, if there is one, and what is made is sent there. Everything else is made on this machine.
-4. When a command ends, now and then, what was not used for longest is removed until all takes less
-   than the limit.
+   together. It begins with a hash of its name and its data, and whoever reads it says of which type
+   the data must be. A damaged entry is reported, removed and made again.
+2. It is written beside its place and renamed there, so that other processes see whole entries only.
+3. Results of scripts and trials can be shared: they are also looked for in the shared cache, if
+   there is one, and sent there. Everything else is made on this machine.
+4. Now and then, as a command ends, entries are removed until all take less than the limit, those
+   first that were used longest ago.
 
 Nothing is lost when the folder is deleted.
 """
@@ -99,6 +97,8 @@ class Memo:
         self._waiting: list[str] = []
         self._tell: Callable[[str], None] = self._waiting.append
         self._written = 0
+        if shared is not None:
+            shared.tell = self._say
 
     def listen(self, tell: Callable[[str], None]) -> None:
         """Be told what is wrong with entries, a line each; also what was found before."""
@@ -107,8 +107,6 @@ class Memo:
             waiting, self._waiting = self._waiting, []
         for line in waiting:
             tell(line)
-        if self.shared is not None:
-            self.shared.listen(self._say)
 
     def get_or_create(self, kind: str, key: str, make: Callable[[], bytes]) -> bytes:
         """The result of this kind and key: one that is kept, or made now and kept."""

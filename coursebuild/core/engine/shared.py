@@ -1,10 +1,10 @@
 """Results shared between machines: a folder, or any place that fsspec knows (`s3://…`).
 
-Entry point: `shared_cache(where)`; `SharedCache` is what the store uses.
+Entry point: `shared_cache(where)` gives the `SharedCache` that a `Memo` uses.
 
-1. What it holds is the store's entries under the same names; the store verifies them.
-2. It is read when it is asked, and written behind the work by threads of its own.
-3. A place that cannot be reached, or takes too long, is told of once and left alone for a while:
+1. It holds entries of memos under the same names; the memo that reads one verifies it.
+2. Reading waits for the place. Threads write, while the work goes on.
+3. A place that cannot be reached, or takes too long, is reported once and left alone for a while:
    it costs time, and is never an error.
 """
 
@@ -155,7 +155,7 @@ def shared_cache(where: str, key: bytes = b"") -> SharedCache:
 
 
 class SharedCache:
-    """What the store asks, whatever becomes of the place."""
+    """A place where entries are shared; its failures raise nothing."""
 
     def __init__(
         self, where: str, place: SharedFolder, key: bytes = b"", timeout: float = _TIMEOUT
@@ -166,21 +166,15 @@ class SharedCache:
         """What entries are signed with; empty where they are not."""
         self._folder = _SIGNED if key else _VERSION
         self.timeout = timeout
-        self.trouble = ""
-        """What was wrong with it first."""
+        self.tell: Callable[[str], None] = lambda line: None
+        """Is told, once, when the place cannot be used."""
+        self._told = False
         self._down_until = -1.0
         self._queue: queue.Queue[tuple[str, bytes]] = queue.Queue()
         self._writers = 0
         self._lock = threading.Lock()
         self._unsent = 0
         self._sent = threading.Condition()
-        self._tell: Callable[[str], None] | None = None
-
-    def listen(self, tell: Callable[[str], None]) -> None:
-        """Be told, once, when the place cannot be used."""
-        self._tell = tell
-        if self.trouble:
-            tell(self.trouble)
 
     def read(self, name: str) -> bytes | None:
         """An entry; `None` where there is none or it cannot be had."""
@@ -258,12 +252,10 @@ class SharedCache:
 
     def _fail(self, why: str) -> None:
         with self._lock:
-            first = not self.trouble
             self._down_until = time.monotonic() + _PAUSE
-            if first:
-                self.trouble = f"the shared cache {self.where} cannot be used: {why}"
-        if first and self._tell is not None:
-            self._tell(self.trouble)
+            told, self._told = self._told, True
+        if not told:
+            self.tell(f"the shared cache {self.where} cannot be used: {why}")
 
 
 def _words(error: Exception) -> str:

@@ -102,8 +102,8 @@ class Memory:
         root: the course folder.
         store: where it is kept.
         fresh: whether all is to be run again.
-        place: another interpreter that runs them. Where it is not the course's own, what is noted
-            under a script's path stays as it is.
+        place: another interpreter that runs them. Only for the course's own is it noted what
+            scripts did last.
     """
 
     def __init__(

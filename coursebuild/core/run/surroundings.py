@@ -55,8 +55,8 @@ class OtherEnvironment(Struct, frozen=True):
     """An interpreter and what is installed for it, where scripts run that do not run here."""
 
     name: str
-    """Of one that the course is only compared with: what is remembered of it holds in no other, and
-    is not what the course's scripts did last. Empty for the course's own."""
+    """Empty for the course's own. Results of another one, as `check --against` makes it, are kept
+    apart under its name."""
     python: str
     """The interpreter's absolute path."""
     prefix: str

@@ -1,10 +1,10 @@
-"""Raw HTML of which nothing can run, ask another host or pass for a part of the interface.
+"""Raw HTML that runs nothing, loads nothing from other hosts and cannot imitate the interface.
 
 Entry point: `forbidden_in`.
 
-1. A text is allowed where it is nothing but text, comments, and tags of the elements and attributes
-   that are named here, written so plainly that every reader of HTML finds the same tags in it.
-2. Nothing is taken out or written anew: what is published is the text that was judged.
+1. HTML may hold text, comments, and the elements and attributes that are named here, in a form that
+   every parser reads alike.
+2. Nothing is removed or rewritten: what is published is the text that was judged.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ _PLAIN = re.compile(
 
 
 def forbidden_in(html: str, place: Callable[[int, int], Span]) -> tuple[ForbiddenHtml, ...]:
-    """What a page must not hold of a piece of HTML; `place` says where a part of it stands."""
+    """The parts of HTML that a page must not hold; `place` gives the span of two offsets."""
     return tuple(
         ForbiddenHtml(place(start, end), message) for start, end, message in _forbidden(html)
     )

@@ -1,7 +1,7 @@
-"""The reply of a trial, read: plain values with arrays.
+"""What an engine replies when it has tried a lab.
 
-Entry points: `read_reply`, `reply_bytes`; `unpack_arrays`. What a reply holds is said in
-docs/explanation/how-labs-run.md.
+Entry points: `read_reply`, `reply_bytes`; `unpack_arrays`, of arrays that are base64 in a reply.
+docs/explanation/how-labs-run.md says what a reply means.
 """
 
 from __future__ import annotations
