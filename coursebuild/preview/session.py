@@ -214,12 +214,12 @@ class Session:
         for path in sorted(paths):
             owner = known.get(path)
             read = read_sources(self.root, [path], self.open_texts)
-            if owner is None or owner.document is None or not read.value:
+            sources = [one for one in read.value if len(one.text) <= self.course.limits.text]
+            if owner is None or owner.document is None or not sources:
                 return None
-            (source,) = read.value
+            (source,) = sources
             if source != owner.document.source or self._static.get(path):
-                callouts = _callouts(self.course)
-                lesson = isinstance(owner, Lesson)
+                callouts, lesson = _callouts(self.course), isinstance(owner, Lesson)
                 parsed = self._documents.document(source, callouts, lesson=lesson)
                 found = (*read.diagnostics, *parsed.diagnostics)
                 fresh.append((replace(owner, document=parsed.value), found))

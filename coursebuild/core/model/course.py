@@ -207,3 +207,10 @@ class Course(Struct, frozen=True):
         """Every parsed document: lessons, then pages."""
         parts: tuple[Lesson | Page, ...] = (*self.lessons, *self.pages)
         return tuple(part.document for part in parts if part.document is not None)
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Every text: the map, the documents, the models and what stands beside them."""
+        holders: tuple[Document | MjcfModel | Declarations, ...]
+        holders = (*self.documents, *self.models, *self.declarations)
+        return (self.map, *(holder.source for holder in holders))

@@ -75,11 +75,8 @@ def doubtful_places(
         rf"lesson:({id})(?!\w|\.\w)|(?<![\w.])({id})-{lesson.slug}(?![\w-])"
         rf"|(?i:\blessons?)\s(?:{_NUMBER}|[\s,–-]|and\b|or\b|to\b)*?(?<![\w.])({id})(?!\w|\.\w)"
     )
-    documents = [document.source for document in course.documents]
-    models = [model.source for model in course.models]
-    declared = [one.source for one in course.declarations]
     found = []
-    for source in (course.map, *documents, *models, *declared, *others):
+    for source in (*course.sources, *others):
         for match in names.finditer(source.text):
             place = source.span(*match.span(match.lastindex or 0))
             if not any(span.contains(place) for span in known):

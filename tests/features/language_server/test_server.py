@@ -167,6 +167,19 @@ def test_any_text_is_read(editor: Editor) -> None:
     assert editor.request("hover", types.HoverParams(nowhere, types.Position(5, 5))) is None
 
 
+def test_a_text_that_is_too_long_is_not_read(editor: Editor) -> None:
+    text = "$x$ *a* {out} " * 20_000
+    editor.write(ONE, text)
+    editor.until(ONE, "text-long")
+    asked = editor.named(ONE), types.FormattingOptions(4, True)
+    assert not editor.request("formatting", types.DocumentFormattingParams(*asked))
+    assert not editor.request("folding_range", types.FoldingRangeParams(asked[0]))
+    assert not editor.actions(ONE, text[:3] + "|" + text[3:])
+    editor.write(ONE, FALL)
+    editor.until(ONE)
+    assert "after 0.002 s" in editor.hover_text(ONE, "`1.0|00`{out}")
+
+
 def test_a_model_that_goes_is_missed(editor: Editor) -> None:
     editor.until(TWO)
     (editor.folder.root / "models/ball.xml").unlink()
@@ -222,7 +235,7 @@ def test_shapes_are_those_of_the_model_at_hand(editor: Editor) -> None:
         (TWO, "lesson:1.1#fa|ll", f"{ONE}:1"),
         (TWO, "lesson:1.1#eq:en|ergy", f"{ONE}:6"),
         (TWO, "examples/fa|ll.py", f"{ONE}:8"),
-        (TWO, "Lesson 1.|1 and", f"{ONE}:1"),
+        (TWO, "Lesson 1.1| and", f"{ONE}:1"),
         (TWO, "(#li|nks)", f"{TWO}:1"),
         (MAP, 'id = "1.|2"', f"{TWO}:1"),
     ],

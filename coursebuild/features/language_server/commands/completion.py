@@ -7,11 +7,10 @@ the declarations of fields, the catalogue of rules, the engine.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from collections.abc import Mapping
 
+from lsprotocol import types
 from lsprotocol.types import CompletionItemKind as Kind
-from msgspec import Struct
 
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.pages.library import Library
@@ -28,122 +27,111 @@ from coursebuild.features.language_server.commands.fields import (
 )
 from coursebuild.features.language_server.commands.texts import OpenTexts
 
-
-class Proposal(NamedTuple):
-    """Something that may be written."""
-
-    text: str
-    detail: str
-    """What it is, in a line."""
-    kind: Kind = Kind.Reference
-
-
-class _Asked(Struct, frozen=True):
-    """Where something is to be written, and what stands before it."""
-
-    texts: OpenTexts
-    library: Library
-    source: Source
-    offset: int
-    found: re.Match[str]
-
-
-def completions(texts: OpenTexts, source: Source, offset: int) -> tuple[Span, list[Proposal]]:
-    """What may be written in the place of a span; the client leaves out what does not fit."""
-    library, here = texts.library, source.span(offset, offset)
-    if library is None:
-        return here, []
-    line = source.text[source.line_starts[source.position(offset)[0] - 1] : offset]
-    for pattern, propose in _PLACES:
-        found = re.search(pattern, line)
-        if found is not None:
-            proposals = list(propose(_Asked(texts, library, source, offset, found)))
-            if proposals:
-                return source.span(offset - len(found["word"]), offset), proposals
-    place = field_place(source, offset)
-    return (here, []) if place is None else (place.span, list(_fields(library, place)))
-
-
-# --- in Markdown and code
-
-
-def _lessons(asked: _Asked) -> Iterator[Proposal]:
-    return (Proposal(one.id, one.title) for one in asked.library.lessons.values())
-
-
-def _pages(asked: _Asked) -> Iterator[Proposal]:
-    return (Proposal(one.id, one.title) for one in asked.library.pages.values())
-
-
-def _models(asked: _Asked) -> Iterator[Proposal]:
-    return (Proposal(one.name, one.about, Kind.File) for one in asked.library.course.models)
-
-
-def _terms(asked: _Asked) -> Iterator[Proposal]:
-    return (Proposal(id, f"of {one.id}: {one.title}") for id, one in asked.library.terms.items())
-
-
-def _scripts(asked: _Asked) -> Iterator[Proposal]:
-    for path, (_, one) in asked.library.scripts.items():
-        yield Proposal(path, f"of {one.id}: {one.title}", Kind.File)
-
-
-def _callouts(asked: _Asked) -> Iterator[Proposal]:
-    promise = asked.library.callout_promise
-    return (Proposal(name, promise(name), Kind.EnumMember) for name in asked.library.callouts)
-
-
-def _fences(asked: _Asked) -> Iterator[Proposal]:
-    if fence_at(asked.source, asked.offset) is None:
-        yield from (Proposal(name, "", Kind.Keyword) for name in (*CORE_FENCES, *fence_names()))
-
-
-def _anchors(asked: _Asked) -> Iterator[Proposal]:
-    """Those of the lesson or page that is named before, or of this one."""
-    library, id = asked.library, asked.found["id"]
-    owner = library.lessons.get(id) if asked.found["kind"] == "lesson" else library.pages.get(id)
-    source = asked.source if id is None else owner and asked.texts.source(owner.path)
-    document = source and asked.texts.document(source)
-    for name, place in anchors(document).items() if document else ():
-        yield Proposal(name, place.first_line().text.lstrip("# "))
-
-
-def _members(asked: _Asked) -> Iterator[Proposal]:
-    _, code = fence_at(asked.source, asked.offset) or ("", asked.source.span(0, 0))
-    known = members(tuple(asked.found["path"].split(".")), code.text)
-    return (Proposal(name, one.doc, Kind.Field) for name, one in known.items())
-
-
 _NAME = r"[A-Za-z_]\w*"
-_PLACES: tuple[tuple[str, Callable[[_Asked], Iterator[Proposal]]], ...] = (
-    (r"(?:\blesson:|\bLessons? )(?P<word>[\w.]*)$", _lessons),
-    (r"\bpage:(?P<word>[\w-]*)$", _pages),
-    (r"\bmodel:(?P<word>[\w/-]*)$", _models),
-    (r"""(?:model_path\(|"model"\s*:\s*)["'](?P<word>[\w/-]*)$""", _models),
-    (r"\bterm:(?P<word>[\w-]*)$", _terms),
-    (r"(?:\]\(|\{out=)(?P<word>e?[\w./-]*)$", _scripts),
-    (r"\]\((?:(?P<kind>lesson|page):(?P<id>[\w.-]+))?#(?P<word>[\w.:-]*)$", _anchors),
-    (r"^[ \t>]*>[ ]*\[!(?P<word>[\w-]*)$", _callouts),
-    (r"^[ \t>]*```[ ]*(?P<word>[\w-]*)$", _fences),
-    (rf"(?<![\w.])(?P<path>{_NAME}(?:\.{_NAME})*)\.(?P<word>\w*)$", _members),
+_PLACES = (
+    ("lesson", Kind.Reference, r"(?:\blesson:|\bLessons? )(?P<word>[\w.]*)$"),
+    ("page", Kind.Reference, r"\bpage:(?P<word>[\w-]*)$"),
+    ("model", Kind.File, r"\bmodel:(?P<word>[\w/-]*)$"),
+    ("model", Kind.File, r"""(?:model_path\(|"model"\s*:\s*)["'](?P<word>[\w/-]*)$"""),
+    ("term", Kind.Reference, r"\bterm:(?P<word>[\w-]*)$"),
+    ("script", Kind.File, r"(?:\]\(|\{out=)(?P<word>e?[\w./-]*)$"),
+    ("callout", Kind.EnumMember, r"^[ \t>]*>[ ]*\[!(?P<word>[\w-]*)$"),
+    ("fence", Kind.Keyword, r"^[ \t>]*```[ ]*(?P<word>[\w-]*)$"),
+    (
+        "anchor",
+        Kind.Reference,
+        r"\]\((?:(?P<kind>lesson|page):(?P<id>[\w.-]+))?#(?P<word>[\w.:-]*)$",
+    ),
+    ("member", Kind.Field, rf"(?<![\w.])(?P<path>{_NAME}(?:\.{_NAME})*)\.(?P<word>\w*)$"),
 )
-"""What is proposed behind what; `word` is written of it already."""
+"""What may be written behind what; `word` is written of it already."""
 
 
-# --- in JSON and TOML
+def completions(
+    texts: OpenTexts, source: Source, asked: types.CompletionParams
+) -> list[types.CompletionItem]:
+    """What may be written; the client leaves out what does not fit."""
+    offset = texts.places.offset(source, asked.position)
+    here = source.span(offset, offset)
+    line = source.text[source.line_starts[here.line - 1] : offset]
+    for what, kind, pattern in _PLACES:
+        found = re.search(pattern, line)
+        names = {} if found is None else _names(texts, here, what, found)
+        if found is not None and names:
+            return _items(texts, source.span(offset - len(found["word"]), offset), kind, names)
+    place = field_place(source, offset)
+    if place is None:
+        return []
+    kind = Kind.Value if place.key else Kind.Property
+    return _items(texts, place.span, kind, _fields(texts.library, place))
 
 
-def _fields(library: Library, place: FieldPlace) -> Iterator[Proposal]:
-    """Keys that are not given yet, or the values that are known of one."""
-    if not place.key:
-        quote = "" if place.span.path.endswith(".toml") else '"'
-        for name, field in place.fields.items():
-            if name not in place.given:
-                yield Proposal(f"{quote}{name}{quote}", description(field), Kind.Property)
-    elif place.key == "rule":
-        warnings = (rule for rule in RULES.values() if rule.severity == "warning")
-        yield from (Proposal(f'"{one.name}"', one.summary, Kind.EnumMember) for one in warnings)
-    elif place.key == "prerequisites":
-        yield from (Proposal(f'"{one.id}"', one.title) for one in library.lessons.values())
-    elif place.field is not None:
-        yield from (Proposal(one, "", Kind.Value) for one in known_values(place.field.type))
+def _items(
+    texts: OpenTexts, span: Span, kind: Kind, names: Mapping[str, str]
+) -> list[types.CompletionItem]:
+    """What may be written in the place of a span, and what it is, in a line."""
+    there = texts.places.range(span)
+    return [
+        types.CompletionItem(
+            name.strip('"'),
+            kind=kind,
+            detail=detail,
+            filter_text=name,
+            text_edit=types.TextEdit(there, name),
+        )
+        for name, detail in names.items()
+    ]
+
+
+def _names(texts: OpenTexts, here: Span, what: str, found: re.Match[str]) -> Mapping[str, str]:
+    library = texts.library
+    match what:
+        case "lesson":
+            return {one.id: one.title for one in library.lessons.values()}
+        case "page":
+            return {one.id: one.title for one in library.pages.values()}
+        case "model":
+            return {one.name: one.about for one in library.course.models}
+        case "term":
+            return {id: f"of {one.id}: {one.title}" for id, one in library.terms.items()}
+        case "script":
+            scripts = library.scripts.items()
+            return {path: f"of {one.id}: {one.title}" for path, (_, one) in scripts}
+        case "callout":
+            return {name: library.callout_promise(name) for name in library.callouts}
+        case "fence":
+            outside = fence_at(here.source, here.start) is None
+            return dict.fromkeys((*CORE_FENCES, *fence_names()), "") if outside else {}
+        case "anchor":
+            return _anchors(texts, here.source, found)
+        case _:
+            _, code = fence_at(here.source, here.start) or ("", here)
+            known = members(tuple(found["path"].split(".")), code.text)
+            return {name: one.doc for name, one in known.items()}
+
+
+def _anchors(texts: OpenTexts, source: Source, found: re.Match[str]) -> Mapping[str, str]:
+    """Those of the lesson or page that is named before, or of this one."""
+    library, id = texts.library, found["id"]
+    if id is not None:
+        owner = library.lessons.get(id) if found["kind"] == "lesson" else library.pages.get(id)
+        source = texts.source("" if owner is None else owner.path)
+    document = texts.document(source)
+    known = {} if document is None else anchors(document)
+    return {name: place.first_line().text.lstrip("# ") for name, place in known.items()}
+
+
+def _fields(library: Library, place: FieldPlace) -> Mapping[str, str]:
+    """Keys of JSON or TOML that are not given yet, or the values that are known of one."""
+    quote = "" if place.span.path.endswith(".toml") else '"'
+    match place.key:
+        case "":
+            missing = {n: one for n, one in place.fields.items() if n not in place.given}
+            return {f"{quote}{name}{quote}": description(one) for name, one in missing.items()}
+        case "rule":
+            warnings = (rule for rule in RULES.values() if rule.severity == "warning")
+            return {f'"{one.name}"': one.summary for one in warnings}
+        case "prerequisites":
+            return {f'"{one.id}"': one.title for one in library.lessons.values()}
+        case _:
+            return dict.fromkeys(known_values(place.field.type) if place.field else (), "")

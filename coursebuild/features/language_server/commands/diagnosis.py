@@ -17,9 +17,8 @@ from functools import lru_cache
 from lsprotocol import types
 from msgspec.structs import replace
 
-from coursebuild.core.model import Course
 from coursebuild.core.scripts.findings import script_findings
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Severity
 from coursebuild.core.text.rules import HELP
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.places import Places
@@ -39,7 +38,7 @@ def diagnoses(session: Session) -> tuple[Diagnostic, ...]:
         course, library, verified = session.course, session.library, session.verified
         found, last = session.found_by_reading, session.found_by_running
     if course is not None and library is not None and verified is not None:
-        now, then = _sources(course), _sources(verified)
+        now, then = ({s.path: s for s in one.sources} for one in (course, verified))
         changed = {path for path, source in now.items() if source != then.get(path)}
         if changed:
             last = tuple(d for d in last if d.span.path not in changed or d.rule not in _COMPARED)
@@ -50,54 +49,41 @@ def diagnoses(session: Session) -> tuple[Diagnostic, ...]:
     return judge(course, found).diagnostics
 
 
-def _sources(course: Course) -> dict[str, Source]:
-    sources = [course.map, *(document.source for document in course.documents)]
-    sources += [model.source for model in course.models]
-    sources += [declared.source for declared in course.declarations]
-    return {source.path: source for source in sources}
-
-
 # --- what is known of a text as it was
 
 
 def _moved(diagnostic: Diagnostic, now: dict[str, Source]) -> Diagnostic | None:
     """A diagnostic where its lines stand now; `None` where they are others."""
     span = _moved_span(diagnostic.span, now)
-    if span is None or span is diagnostic.span:
-        return diagnostic if span is not None else None
+    if span is None:
+        return None
     notes = [Note(one.message, one.span and _moved_span(one.span, now)) for one in diagnostic.notes]
-    edits = [(_moved_span(edit.span, now), edit.text) for edit in diagnostic.edits]
-    kept = tuple(Edit(place, text) for place, text in edits if place is not None)
-    whole = kept if len(kept) == len(edits) else ()
-    return replace(diagnostic, span=span, notes=tuple(notes), edits=whole)
+    edits = diagnostic.edits if span is diagnostic.span else ()
+    return replace(diagnostic, span=span, notes=tuple(notes), edits=edits)
 
 
 def _moved_span(span: Span, now: dict[str, Source]) -> Span | None:
     source = now.get(span.path, span.source)
     if source == span.source:
         return span
-    for start, new_start, length in _same_lines(span.source, source):
-        if start <= span.start and span.end <= start + length:
-            return Span(source, span.start - start + new_start, span.end - start + new_start)
-    return None
+    known = _moves(span.source, source)
+    moves = {known.get(line) for line in range(span.line, span.end_line + 1)}
+    by = moves.pop() if len(moves) == 1 else None
+    if by is None:
+        return None
+    starts = source.line_starts[span.line + by - 1], source.line_starts[span.end_line + by - 1]
+    return Span(source, starts[0] + span.column - 1, starts[1] + span.end_column - 1)
 
 
 @lru_cache(maxsize=16)
-def _same_lines(old: Source, new: Source) -> tuple[tuple[int, int, int], ...]:
-    """Stretches of lines that both have: offsets in the one and the other, and their length."""
+def _moves(old: Source, new: Source) -> dict[int, int]:
+    """The lines of a text that another has as well, and how far down they are there."""
     lines, new_lines = (
-        [source.text[a:b] for a, b in zip(source.line_starts, _ends(source), strict=True)]
+        [source.line_text(number + 1) for number in range(len(source.line_starts))]
         for source in (old, new)
     )
-    starts, new_starts = [*old.line_starts, len(old.text)], [*new.line_starts, len(new.text)]
-    return tuple(
-        (starts[one.a], new_starts[one.b], starts[one.a + one.size] - starts[one.a])
-        for one in SequenceMatcher(None, lines, new_lines, autojunk=False).get_matching_blocks()
-    )
-
-
-def _ends(source: Source) -> list[int]:
-    return [*source.line_starts[1:], len(source.text)]
+    same = SequenceMatcher(None, lines, new_lines).get_matching_blocks()
+    return {one.a + n: one.b - one.a for one in same for n in range(1, one.size + 1)}
 
 
 # --- for a client
@@ -116,10 +102,8 @@ def published(diagnostic: Diagnostic, places: Places) -> types.Diagnostic:
         code_description=types.CodeDescription(HELP.format(diagnostic.rule)),
         source="coursebuild",
         related_information=[
-            _related(note, note.span, places) for note in diagnostic.notes if note.span
+            types.DiagnosticRelatedInformation(places.location(note.span), note.message)
+            for note in diagnostic.notes
+            if note.span is not None
         ],
     )
-
-
-def _related(note: Note, span: Span, places: Places) -> types.DiagnosticRelatedInformation:
-    return types.DiagnosticRelatedInformation(places.location(span), note.message)

@@ -51,19 +51,16 @@ def described_name(
 
     `facts` are those of the model at hand, whose sizes become numbers.
     """
-    found = next(
-        (m for m in _NAME.finditer(code.source.text, code.start, code.end) if m.end() > offset),
-        None,
-    )
-    if found is None or found.start() > offset:
+    names = _NAME.finditer(code.source.text, code.start, code.end)
+    found = next((one for one in names if one.start() <= offset < one.end()), None)
+    if found is None:
         return None
-    end = found[0].find(".", offset - found.start())
-    name = found[0] if end < 0 else found[0][:end]
-    path = tuple(name.split("."))
-    declared = members(path[:-1], code.text).get(path[-1]) if len(path) > 1 else None
+    end = code.source.text.find(".", offset, found.end())
+    span = code.source.span(found.start(), end if end >= 0 else found.end())
+    *path, name = span.text.split(".")
+    declared = members(tuple(path), code.text).get(name) if path else None
     if declared is None:
         return None
-    span = Span(code.source, found.start(), found.start() + len(name))
     said = f"```c\n{declared}\n```\n{declared.doc}"
     extent = getattr(declared, "array_extent", None)
     return span, f"{said}\n\n{_shape(extent, facts)}" if extent else said
@@ -74,10 +71,6 @@ def _shape(extent: Iterable[str | int], facts: ModelFacts | None) -> str:
     if facts is not None:
         sizes = {"nq": facts.nq, "nv": facts.nv, "nu": facts.nu, "nbody": facts.bodies + 1}
         sizes |= {"ngeom": facts.geoms, "njnt": facts.joints, "nkey": len(facts.keyframes)}
-    shape, known = (_tuple(size) for size in (extent, (sizes.get(one, one) for one in extent)))
-    return f"shape `{shape}`" + (f", here `{known}`" if known != shape else "")
-
-
-def _tuple(sizes: Iterable[str | int]) -> str:
-    texts = list(map(str, sizes))
-    return f"({', '.join(texts)}{',' if len(texts) == 1 else ''})"
+    names, known = tuple(extent), tuple(sizes.get(one, one) for one in extent)
+    here = f", here `{known}`" if known != names else ""
+    return f"shape `{names}`{here}".replace("'", "")

@@ -19,10 +19,17 @@ from coursebuild.core.files.course_root import MAP
 from coursebuild.core.syntax.schemas import schema_roots
 from coursebuild.core.text.source import Source, Span
 
-_FENCE = re.compile(r"^[ \t>]*(`{3,}|~{3,})[ \t]*([\w-]*)", re.MULTILINE)
-_TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*"|"[\w./-]*|[{}\[\]:,=]|[^\s"{}\[\]:,=>]+')
-_HEADER = re.compile(r"^[ \t]*\[\[?[ \t]*([\w.-]+).*$", re.MULTILINE)
-_KEY = re.compile(r"^[ \t]*([\w-]+)[ \t]*=[ \t]*(.*)$", re.MULTILINE)
+_FENCE = re.compile(
+    r"^[ \t>]*(?P<marks>`{3,}+|~{3,}+)[ \t]*(?P<kind>[\w-]*).*\n(?P<body>[\s\S]*?)"
+    # One that was never closed ends where the next one begins.
+    r"(?:(?=^[ \t>]*(?P=marks)[ \t]*\w)|^[ \t>]*(?P=marks).*|\Z)",
+    re.MULTILINE,
+)
+_TOKEN = r'[{}\[\]:,=]|"(?:[^"\\\n]|\\.)*"|"[\w./-]*|[^\s"{}\[\]:,=>]+'
+_JSON = re.compile(_TOKEN)
+_TOML = re.compile(
+    rf"(?:^[ \t]*\[\[?(?P<header>[\w. -]+)\]\]?[ \t\r]*)?(?:#.*)?\n|{_TOKEN}", re.MULTILINE
+)
 
 
 class FieldPlace(Struct, frozen=True):
@@ -48,112 +55,83 @@ class FieldPlace(Struct, frozen=True):
         return self.fields.get(self.key or self.text)
 
 
-class _Container(Struct):
-    """An object or array, as far as it was read."""
+class _Object(Struct):
+    """An object or table, as far as it was read."""
 
-    is_array: bool = False
-    members: dict[str, str] = {}
-    """Its scalars as they are written, and nothing for all else."""
     key: str = ""
     """Whose value comes next."""
+    members: dict[str, str] = {}
+    """Its scalars as they are written, and nothing for all else."""
+
+    def read(self, token: str) -> None:
+        """Read on, outside of the values that are objects or arrays."""
+        if token[-1] in ",\n":
+            self.key = ""
+        elif self.key and token not in ":=":
+            self.members[self.key] = token.strip('"')
+        elif token not in ":=":
+            self.key = token.strip('"')
+            self.members.setdefault(self.key, "")
 
 
 def field_place(source: Source, offset: int) -> FieldPlace | None:
     """The place of a key or a value at an offset, where it is known which there can be."""
-    roots = schema_roots()
     if source.path == MAP:
-        return _in_toml(source, offset, roots["course"][0])
-    if source.path.startswith("models/"):
-        return (
-            _in_toml(source, offset, roots["model"][0]) if source.path.endswith(".toml") else None
-        )
-    kind, body = fence_at(source, offset) or ("", source.span(0, 0))
-    return _in_json(body, offset, roots[kind][0]) if kind in roots else None
+        kind, body = "course", source.span()
+    elif source.path.startswith("models/") and source.path.endswith(".toml"):
+        kind, body = "model", source.span()
+    else:
+        kind, body = fence_at(source, offset) or ("", source.span(0, 0))
+    if kind not in (roots := schema_roots()):
+        return None
+    span, around = _surroundings(body, offset)
+    return _place(span, around, roots[kind][0]) if around else None
 
 
 def fence_at(source: Source, offset: int) -> tuple[str, Span] | None:
     """The kind of the fence in which an offset lies, and the text between its marks."""
-    opened: re.Match[str] | None = None
-    for mark in chain(_FENCE.finditer(source.text), (None,)):
-        if opened is not None and mark is not None and not mark[1].startswith(opened[1]):
-            continue
-        if opened is not None:
-            start = source.text.find("\n", opened.end()) + 1
-            stop = len(source.text) if mark is None else mark.start()
-            if 0 < start <= offset <= stop:
-                return opened[2], Span(source, start, stop)
-        # A fence that was never closed ends where the next one begins.
-        opened = mark if mark is not None and (opened is None or mark[2]) else None
+    for fence in _FENCE.finditer(source.text):
+        if fence.start("body") <= offset <= fence.end("body"):
+            return fence["kind"], source.span(*fence.span("body"))
     return None
 
 
-# --- reading what is there
+def _surroundings(body: Span, offset: int) -> tuple[Span, list[tuple[_Object, str]]]:
+    """What is written at an offset, and the objects around it, each with the key that leads on.
 
-
-def _in_json(body: Span, offset: int, root: type[Struct]) -> FieldPlace | None:
-    stack: list[_Container] = []
-    here: tuple[Span, list[tuple[_Container, str]]] | None = None
-    for token in _TOKEN.finditer(body.source.text, body.start, body.end):
-        scalar = token[0] not in "{}[]:,="
-        if here is None and token.end() >= offset:
-            touches = scalar and token.start() <= offset
-            place = token.span() if touches else (offset, offset)
-            here = Span(body.source, *place), [(one, one.key) for one in stack]
-        if token[0] in "{[":
-            stack.append(_Container(token[0] == "["))
-        elif token[0] in "}]":
+    All of the body is read: an object may have further keys behind the offset.
+    """
+    is_toml = body.path.endswith(".toml")
+    stack: list[_Object | None] = [_Object()] if is_toml else []  # `None` is an array
+    here: tuple[Span, list[tuple[_Object, str]]] | None = None
+    for found in (_TOML if is_toml else _JSON).finditer(body.text + "\n}"):
+        token, start, end = found[0], body.start + found.start(), body.start + found.end()
+        is_scalar = token[-1] not in "\n{}[]:,="
+        if here is None and (end > offset or (end == offset and is_scalar)):
+            touched = (start, end) if is_scalar and start <= offset else (offset, offset)
+            objects = [(one, one.key) for one in stack if one is not None]
+            here = Span(body.source, *touched), objects if found.lastgroup is None else []
+        if found.lastgroup is not None:
+            stack = [*map(_Object, found["header"].split(".")), _Object()]
+        elif token in "{[":
+            stack.append(_Object() if token == "{" else None)
+        elif token in "}]":
             del stack[-1:]
-        elif stack and not stack[-1].is_array:
-            _read(stack[-1], token[0], scalar=scalar)
-    if here is None or not here[1]:
-        return None
-    return _place(here[0], here[1], root)
-
-
-def _read(container: _Container, token: str, *, scalar: bool) -> None:
-    if token == ",":
-        container.key = ""
-    elif scalar and container.key:
-        container.members[container.key] = token.strip('"')
-    elif scalar:
-        container.key = token.strip('"')
-        container.members.setdefault(container.key, "")
-
-
-def _in_toml(source: Source, offset: int, root: type[Struct]) -> FieldPlace | None:
-    text = source.text
-    headers = list(_HEADER.finditer(text))
-    above = [header for header in headers if header.start() <= offset]
-    start = above[-1].end() if above else 0
-    if offset < start:
-        return None
-    end = next((header.start() for header in headers if header.start() > offset), len(text))
-    keys = list(_KEY.finditer(text, start, end))
-    before = [key for key in keys if key.start(2) <= offset]
-    written = text[before[-1].start(2) : offset] if before else "\n"
-    in_value = "\n" not in written or written.count("[") > written.count("]")
-    key = before[-1][1] if before and in_value else ""
-    parts = above[-1][1].split(".") if above else []
-    members = {found[1]: found[2].strip().strip('"') for found in keys}
-    around = [*((_Container(), part) for part in parts), (_Container(members=members), key)]
-    words = (w for w in _TOKEN.finditer(text, start, end) if w.start() <= offset <= w.end())
-    word = next((w.span() for w in words if w[0] not in "{}[]:,="), (offset, offset))
-    return _place(Span(source, *word), around, root)
+        elif stack and stack[-1] is not None:
+            stack[-1].read(token)
+    assert here is not None  # the bracket at the end is behind every offset
+    return here
 
 
 # --- what is declared
 
 
-def _place(
-    span: Span, around: list[tuple[_Container, str]], root: type[Struct]
-) -> FieldPlace | None:
-    """A place inside some containers, of each of which is known the key that leads on."""
-    objects = [(one, key) for one, key in around if not one.is_array]
+def _place(span: Span, around: list[tuple[_Object, str]], root: type[Struct]) -> FieldPlace:
     declared = inspect.type_info(root)
-    for container, key in objects[:-1]:
-        inner = _fields(declared, container.members).get(key)
+    for object, key in around[:-1]:
+        inner = _fields(declared, object.members).get(key)
         declared = _mapped(declared) if inner is None else inner.type
-    innermost, key = objects[-1]
+    innermost, key = around[-1]
     given = frozenset(innermost.members) - {span.text.strip('"')}
     return FieldPlace(span, _fields(declared, innermost.members), given, key)
 
@@ -161,17 +139,12 @@ def _place(
 def _fields(declared: inspect.Type, members: Mapping[str, str]) -> dict[str, inspect.Field]:
     """The fields of a struct; of a union's those that its tag leaves, and the tag."""
     structs = [one for one in _parts(declared) if isinstance(one, inspect.StructType)]
-    found: dict[str, inspect.Field] = {}
-    tags: dict[str, list[str]] = {}
-    for struct in structs:
-        if struct.tag_field is not None:
-            tags.setdefault(struct.tag_field, []).append(str(struct.tag))
-    for struct in structs:
-        tag = members.get(struct.tag_field or "")
-        if tag == struct.tag or tag not in tags.get(struct.tag_field or "", ()):
-            found |= {field.name: field for field in struct.fields}
-    for name, values in tags.items():
-        found[name] = inspect.Field(name, name, inspect.LiteralType(tuple(values)))
+    tag = next((one.tag_field for one in structs if one.tag_field), "")
+    chosen = [one for one in structs if tag and one.tag == members.get(tag)] or structs
+    found = {field.name: field for one in chosen for field in one.fields}
+    if tag:
+        kinds = inspect.LiteralType(tuple(str(one.tag) for one in structs))
+        found[tag] = inspect.Field(tag, tag, kinds)
     return found
 
 

@@ -1,6 +1,6 @@
 """What something in a text stands for, and where that is said.
 
-Entry point: `look_up`.
+Entry points: `hover`, `definition`.
 
 1. In a document it is the smallest thing at the place that stands for something: a link, a term, a
    bound number, a formula, a kind of callout, a model or a name of the engine in code.
@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterable
 from urllib.parse import unquote
 
+from lsprotocol import types
 from msgspec import Struct
 
 from coursebuild.core import model
@@ -44,25 +45,47 @@ class Referent(Struct, frozen=True):
     """What it is, as Markdown."""
     place: Span | None = None
     """Where that is said."""
+    lesson: model.Lesson | None = None
+    """Where it is one."""
 
 
-def look_up(texts: OpenTexts, source: Source, offset: int) -> Referent | None:
-    """What stands at an offset of a text, if it stands for anything."""
-    library, document = texts.library, texts.document(source)
-    if library is None:
+def hover(texts: OpenTexts, source: Source, asked: types.HoverParams) -> types.Hover | None:
+    """What stands at a place of a text."""
+    found = look_up(texts, source, asked.position)
+    if found is None:
         return None
-    found = None
+    text = types.MarkupContent(types.MarkupKind.Markdown, found.text)
+    return types.Hover(text, texts.places.range(found.span))
+
+
+def definition(
+    texts: OpenTexts, source: Source, asked: types.DefinitionParams
+) -> types.Location | None:
+    """Where it is said what stands at a place."""
+    found = look_up(texts, source, asked.position)
+    place = None if found is None else found.place
+    return None if place is None else texts.places.location(place)
+
+
+def look_up(texts: OpenTexts, source: Source, position: types.Position) -> Referent | None:
+    """What stands at a place of a text, if it stands for anything."""
+    offset, document = texts.places.offset(source, position), texts.document(source)
     if document is not None:
-        lookup = _Lookup(texts, library, document)
-        inlines = (i for i in model.document_inlines(document) if _covers(i.span, offset))
+        lookup = _Lookup(texts, document)
         blocks = (b for b in model.document_blocks(document) if _covers(b.span, offset))
-        nodes = reversed([*blocks, *inlines])
-        found = next(filter(None, (lookup.of_node(node, offset) for node in nodes)), None)
-    return found or _of_field(library, source, offset)
+        inlines = (i for i in model.document_inlines(document) if _touches(i.span, offset))
+        for node in reversed([*blocks, *inlines]):
+            if found := lookup.of_node(node, offset):
+                return found
+    return _of_field(texts.library, source, offset)
 
 
 def _covers(span: Span, offset: int) -> bool:
     return span.start <= offset < span.end
+
+
+def _touches(span: Span, offset: int) -> bool:
+    return span.start <= offset <= span.end
 
 
 def _of_field(library: Library, source: Source, offset: int) -> Referent | None:
@@ -72,7 +95,7 @@ def _of_field(library: Library, source: Source, offset: int) -> Referent | None:
     key, lesson = place.key, library.lessons.get(place.text)
     if lesson is not None and key in ("id", "prerequisites"):
         at = lesson.span if lesson.document is None else lesson.document.source.span(0, 0)
-        return Referent(place.span, f"**Lesson {lesson.id}: {lesson.title}**", at)
+        return Referent(place.span, f"**Lesson {lesson.id}: {lesson.title}**", at, lesson)
     if key == "rule" and place.text in RULES:
         return Referent(place.span, RULES[place.text].summary)
     said = "" if key else description(place.field)
@@ -82,17 +105,17 @@ def _of_field(library: Library, source: Source, offset: int) -> Referent | None:
 class _Lookup:
     """Of things in one document."""
 
-    def __init__(self, texts: OpenTexts, library: Library, document: model.Document) -> None:
-        self.texts, self.library, self.document = texts, library, document
+    def __init__(self, texts: OpenTexts, document: model.Document) -> None:
+        self.texts, self.library, self.document = texts, texts.library, document
 
     def of_node(self, node: model.Block | model.Inline, offset: int) -> Referent | None:
         """What a node stands for, or what stands at the offset in it."""
         match node:
             case model.Link():
-                target = model.resolve(node.target, self.library.course, node.span.path)
-                return self.definition(node.span, *self.target(target))
+                course = self.library.course
+                return self.link(node, model.resolve(node.target, course, node.span.path))
             case model.Term():
-                return self.definition(node.span, *self.target(model.TermTarget(node.id)))
+                return self.link(node, model.TermTarget(node.id))
             case model.NumberBinding():
                 return self.binding(node)
             case model.Math() | model.MathBlock():
@@ -106,14 +129,15 @@ class _Lookup:
             case _:
                 return None
 
-    @staticmethod
-    def definition(span: Span, text: str, place: Span | None) -> Referent | None:
-        return Referent(span, text, place) if text else None
-
     # --- what links lead to
 
-    def target(self, target: model.Target) -> tuple[str, Span | None]:
-        """What a link leads to, and where that is; no text where there is no such thing."""
+    def link(self, node: model.Link | model.Term, target: model.Target) -> Referent | None:
+        found = self.target(target)
+        id = target.id if isinstance(target, model.LessonTarget) else ""
+        return found and Referent(node.span, *found, self.library.lessons.get(id))
+
+    def target(self, target: model.Target) -> tuple[str, Span | None] | None:
+        """What a link leads to, and where that is; `None` where there is no such thing."""
         library = self.library
         match target:
             case model.LessonTarget(id=id, anchor=anchor) if id in library.lessons:
@@ -138,36 +162,31 @@ class _Lookup:
             case model.UrlTarget(url=url):
                 path = model.local_file(url, self.document.source.path)
                 known = path in library.course.files
-                return (f"`{path}`", Source(path, "").span()) if known else ("", None)
+                return (f"`{path}`", Source(path, "").span()) if known else None
             case _:
-                return "", None
+                return None
 
-    def owner(self, owner: Owner, anchor: str | None, *lines: str) -> tuple[str, Span | None]:
-        document = self.document_of(owner)
-        text, place = "", owner.span
-        if document is not None:
-            text, found = self.anchor(document, anchor or "")
-            place = found or document.source.span(0, 0)
+    def owner(self, owner: Owner, anchor: str | None, *lines: str) -> tuple[str, Span]:
+        document = self.texts.document(self.texts.source(owner.path))
+        if document is None:
+            return _paragraphs(*lines), owner.span
+        text, place = self.anchor(document, anchor or "") or ("", document.source.span(0, 0))
         return _paragraphs(*lines, text), place
 
-    def document_of(self, owner: Owner) -> model.Document | None:
-        """Another document as it is now, whole."""
-        source = self.texts.source(owner.path)
-        return None if source is None else self.texts.document(source)
-
-    def anchor(self, document: model.Document, anchor: str) -> tuple[str, Span | None]:
+    def anchor(self, document: model.Document, anchor: str) -> tuple[str, Span] | None:
         """What an id of a page is: a formula, or the line at its place."""
         name = unquote(anchor)
         place = anchors(document).get(name)
         tex = next((f.tex for f in display_formulas(document) if name and f.id == name), None)
-        if place is None or tex is None:
-            return ("" if place is None else place.first_line().text.lstrip("# ")), place
-        return f"```tex\n{tex.strip()}\n```", place
+        if place is None:
+            return None
+        line = place.first_line().text.lstrip("# ")
+        return line if tex is None else f"```tex\n{tex.strip()}\n```", place
 
-    def of_model(self, name: str) -> tuple[str, Span | None]:
+    def of_model(self, name: str) -> tuple[str, Span] | None:
         found = next((one for one in self.library.course.models if one.name == name), None)
         if found is None:
-            return "", None
+            return None
         facts = self.facts((name,))
         held = facts and (
             f"{facts.bodies} bodies, {facts.geoms} geoms; nq = {facts.nq}, nv = {facts.nv}, "
@@ -181,17 +200,17 @@ class _Lookup:
         known = (self.library.models.get(name) for name in models)
         return next((one.facts for one in known if one is not None and one.facts is not None), None)
 
-    def term(self, id: str, owner: Owner) -> tuple[str, Span | None]:
+    def term(self, id: str, owner: Owner) -> tuple[str, Span] | None:
         """The sentence that defines a term."""
-        document = self.document_of(owner)
-        blocks = () if document is None else model.document_blocks(document)
-        for paragraph in [block for block in blocks if isinstance(block, model.Paragraph)]:
-            for term in model.walk_inlines(paragraph.children):
+        document = self.texts.document(self.texts.source(owner.path))
+        for block in () if document is None else model.document_blocks(document):
+            inlines = block.children if isinstance(block, model.Paragraph) else ()
+            for term in model.walk_inlines(inlines):
                 if isinstance(term, model.Term) and term.id == id:
-                    sentence = without_links(sentence_of(paragraph.children, term))
+                    sentence = without_links(sentence_of(inlines, term))
                     said = (i.text if isinstance(i, model.Text) else i.span.text for i in sentence)
                     return _paragraphs(f"**{term.name}**", "".join(said).strip()), term.span
-        return "", None
+        return None
 
     # --- formulas, numbers, code
 
@@ -203,19 +222,21 @@ class _Lookup:
             display = isinstance(one, model.MathBlock) or one.display
             return known.get(Formula(one.tex.text, display), "")
 
-        declared = {
-            only_symbol(mathml(one)): (one, one.meaning)
+        shown = symbols(mathml(formula))
+        found = [
+            one
             for one in model.document_inlines(self.document)
-            if isinstance(one, model.Math) and one.meaning is not None
-        }
-        found = [declared[symbol] for symbol in symbols(mathml(formula)) if symbol in declared]
-        said = [
-            f"- `{one.tex.text}`: {meaning.text}{meaning.unit and f', {meaning.unit}'}"
-            for one, meaning in found
+            if isinstance(one, model.Math) and one.meaning and only_symbol(mathml(one)) in shown
         ]
-        at = [one for one, _ in found if _stands_at(one.tex.text, formula.span, offset)]
-        first = next(iter([*at, *(one for one, _ in found)]), None)
-        return None if first is None else Referent(formula.span, "\n".join(said), first.span)
+        if not found:
+            return None
+        said = (
+            f"- `{one.tex.text}`: {meaning.text}{meaning.unit and f', {meaning.unit}'}"
+            for one in found
+            if (meaning := one.meaning)
+        )
+        at = (one for one in found if _stands_at(one.tex.text, formula.span, offset))
+        return Referent(formula.span, "\n".join(said), next(at, found[0]).span)
 
     def binding(self, binding: model.NumberBinding) -> Referent | None:
         """The printed line that bears a number out."""
@@ -235,20 +256,19 @@ class _Lookup:
         offset: int,
     ) -> Referent | None:
         """A model in quotes, or a name of the engine."""
+        text = node.span.source.text
+        for quoted in _QUOTED.finditer(text, node.span.start, node.span.end):
+            if _covers(place := node.span.source.span(*quoted.span(2)), offset):
+                found = self.of_model(place.text.removeprefix("models/").removesuffix(".xml"))
+                if found is not None:
+                    return Referent(place, *found)
         named: Iterable[str] = ()
         if isinstance(node, model.Script):
             named = models_named(node)
         elif isinstance(node, model.FeatureBlock):
             named = node.models()
-        text = node.span.source.text
-        for quoted in _QUOTED.finditer(text, node.span.start, node.span.end):
-            if quoted.start() <= offset < quoted.end():
-                name = quoted[2].removeprefix("models/").removesuffix(".xml")
-                said, place = self.of_model(name)
-                if said:
-                    return Referent(Span(node.span.source, *quoted.span(2)), said, place)
         described = described_name(node.span, offset, self.facts(sorted(named)))
-        return None if described is None else Referent(*described)
+        return described and Referent(*described)
 
 
 def _stands_at(tex: str, span: Span, offset: int) -> bool:

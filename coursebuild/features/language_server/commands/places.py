@@ -1,4 +1,4 @@
-"""Places in texts: offsets, and the positions of a client.
+"""Places in texts and edits of them, as a client has them.
 
 Entry point: `Places`. A client counts lines as CommonMark does, and in a line UTF-16 units, or what
 it has agreed on. Texts are never cut at other line ends that Python knows, such as U+2028.
@@ -6,19 +6,21 @@ it has agreed on. Texts are never cut at other line ends that Python knows, such
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from lsprotocol import types
 from pygls import uris
 
+from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source, Span
 
-_BYTES = {"utf-8": 1, "utf-16": 2, "utf-32": 4}
-"""In a unit of each encoding."""
+_UNITS = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}
+"""The codec of each encoding, and the bytes of a unit."""
 
 
 class Places:
-    """Of the files of a course, as a client has them."""
+    """Of the files of a course."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -42,18 +44,18 @@ class Places:
 
     def offset(self, source: Source, position: types.Position) -> int:
         """The offset of a position, or the nearest that there is."""
-        starts = source.line_starts
-        if position.line >= len(starts):
+        if position.line >= len(source.line_starts):
             return len(source.text)
-        line = source.line_text(position.line + 1)
-        units = line.encode(self._codec)[: position.character * _BYTES[self.encoding]]
-        return starts[position.line] + len(units.decode(self._codec, "ignore"))
+        codec, size = _UNITS[self.encoding]
+        units = source.line_text(position.line + 1).encode(codec)[: position.character * size]
+        return source.line_starts[position.line] + len(units.decode(codec, "ignore"))
 
     def position(self, source: Source, offset: int) -> types.Position:
         """The position of an offset."""
+        codec, size = _UNITS[self.encoding]
         line, column = source.position(offset)
         before = source.line_text(line)[: column - 1]
-        return types.Position(line - 1, len(before.encode(self._codec)) // _BYTES[self.encoding])
+        return types.Position(line - 1, len(before.encode(codec)) // size)
 
     def range(self, span: Span) -> types.Range:
         """The range of a span."""
@@ -64,6 +66,10 @@ class Places:
         """Where a span stands."""
         return types.Location(self.uri(span.path), self.range(span))
 
-    @property
-    def _codec(self) -> str:
-        return self.encoding if self.encoding == "utf-8" else f"{self.encoding}-le"
+    def changes(self, edits: Iterable[Edit]) -> dict[str, list[types.TextEdit]]:
+        """Edits by the addresses of their files."""
+        found: dict[str, list[types.TextEdit]] = {}
+        for edit in edits:
+            its = found.setdefault(self.uri(edit.span.path), [])
+            its.append(types.TextEdit(self.range(edit.span), edit.text))
+        return found

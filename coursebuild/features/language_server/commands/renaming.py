@@ -1,53 +1,56 @@
 """Another id for a lesson, wherever the course names it, as `coursebuild rename` gives it.
 
-Entry points: `named_lesson`, at a place; `renamed`, the edits and the file's new path.
+Entry points: `lesson_id`, one at a place; `rename`, the edits and the file's new path.
 """
 
 from __future__ import annotations
 
+from lsprotocol import types
 from msgspec.structs import replace
+from pygls.exceptions import JsonRpcInvalidParams
 
-from coursebuild.core.model import Lesson, LessonTarget, Link, document_inlines, resolve
-from coursebuild.core.pages.library import Library
+from coursebuild.core.files.errors import UsageError
 from coursebuild.core.text.diagnostics import Edit
-from coursebuild.core.text.source import Source, Span
+from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.course_map import with_lesson_renamed
 from coursebuild.features.authoring.references import references
-from coursebuild.features.language_server.commands.fields import field_place
+from coursebuild.features.language_server.commands.lookup import look_up
 from coursebuild.features.language_server.commands.texts import OpenTexts
 
 
-def named_lesson(texts: OpenTexts, source: Source, offset: int) -> tuple[Lesson, Span] | None:
-    """The lesson whose id stands at an offset, and where the id stands."""
-    library, document = texts.library, texts.document(source)
-    if library is None:
+def lesson_id(
+    texts: OpenTexts, source: Source, asked: types.PrepareRenameParams
+) -> types.Range | None:
+    """Where the id of a lesson stands, if it is named at a place."""
+    found = look_up(texts, source, asked.position)
+    if found is None or found.lesson is None:
         return None
-    if document is None:
-        place = field_place(source, offset)
-        is_id = place is not None and place.key in ("id", "prerequisites")
-        return _named(library, place.text, place.span) if place is not None and is_id else None
-    for inline in document_inlines(document):
-        if isinstance(inline, Link) and inline.span.start <= offset <= inline.span.end:
-            target = resolve(inline.target, library.course, source.path)
-            if isinstance(target, LessonTarget):
-                return _named(library, target.id, inline.target_span)
-    return None
+    id = found.lesson.id
+    start = found.span.start + max(found.span.text.rfind(id), 0)
+    return texts.places.range(source.span(start, start + len(id)))
 
 
-def _named(library: Library, id: str, span: Span) -> tuple[Lesson, Span] | None:
-    lesson, start = library.lessons.get(id), span.start + max(span.text.find(id), 0)
-    return None if lesson is None else (lesson, Span(span.source, start, start + len(id)))
-
-
-def renamed(library: Library, lesson: Lesson, id: str) -> tuple[list[Edit], tuple[str, str] | None]:
-    """The edits, and the path of the lesson's file, if it has one, before and after.
+def rename(
+    texts: OpenTexts, source: Source, asked: types.RenameParams
+) -> types.WorkspaceEdit | None:
+    """The edits that give the lesson at a place another id, and then its file another name.
 
     Raises:
-        UsageError: the map cannot have this id.
+        JsonRpcInvalidParams: the map cannot have this id.
     """
-    course = library.course
+    found = look_up(texts, source, asked.position)
+    if found is None or found.lesson is None:
+        return None
+    lesson, id, course, places = found.lesson, asked.new_name, texts.library.course, texts.places
     edits = references(course, lesson, id)
     of_map = [edit for edit in edits if edit.span.source == course.map]
-    whole_map = Edit(course.map.span(), with_lesson_renamed(course, lesson, id, of_map))
-    moved = None if lesson.document is None else (lesson.path, replace(lesson, id=id).path)
-    return [whole_map, *(edit for edit in edits if edit not in of_map)], moved
+    try:
+        whole_map = Edit(course.map.span(), with_lesson_renamed(course, lesson, id, of_map))
+    except UsageError as error:
+        raise JsonRpcInvalidParams(str(error)) from None
+    changes = places.changes([whole_map, *(edit for edit in edits if edit not in of_map)])
+    named = types.OptionalVersionedTextDocumentIdentifier
+    files = [types.TextDocumentEdit(named(uri), its) for uri, its in changes.items()]
+    old, new = places.uri(lesson.path), places.uri(replace(lesson, id=id).path)
+    moved = [] if lesson.document is None else [types.RenameFile(old, new)]
+    return types.WorkspaceEdit(document_changes=[*files, *moved])

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from msgspec import Struct
+
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.model import Document, Lesson
@@ -14,53 +16,40 @@ from coursebuild.core.model.results import Formula
 from coursebuild.core.pages.library import Library, Owner, owners
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from coursebuild.features.authoring.format import format_document
+from coursebuild.features.language_server.commands.places import Places
 from coursebuild.pipeline.reading import kept_formulas
 from coursebuild.preview.session import Session
 
 
-class OpenTexts:
+class OpenTexts(Struct, frozen=True):
     """See the module."""
 
-    def __init__(self, session: Session, store: Memo) -> None:
-        self.session = session
-        self._store = store
+    session: Session
+    library: Library
+    """What is known of the course."""
+    places: Places
+    store: Memo
 
-    @property
-    def library(self) -> Library | None:
-        """What is known of the course; `None` where its map could never be read."""
-        return self.session.library
-
-    def source(self, path: str) -> Source | None:
-        """The text of a file of the course."""
+    def source(self, path: str) -> Source:
+        """The text of a file of the course; one of nothing where there is none."""
         read = read_sources(self.session.root, [path], self.session.open_texts)
-        return next(iter(read.value), None)
+        return next(iter(read.value), Source(path, ""))
 
     def document(self, source: Source) -> Document | None:
-        """A lesson or page with its prose."""
-        owner, callouts = self._owner(source)
+        """A lesson or page with its prose; `None` for any other text, and for one too long."""
+        owner = self.owner(source)
+        callouts = frozenset(self.library.callouts)
         return None if owner is None else _parsed(source, callouts, isinstance(owner, Lesson))
 
-    def formatted(self, source: Source) -> str | None:
-        """The text of a lesson or page as `coursebuild fmt` has it; `None` if it has mistakes."""
-        owner, callouts = self._owner(source)
-        if owner is None or self.library is None:
-            return None
-        lesson, width = isinstance(owner, Lesson), self.library.course.width
-        new = format_document(source, callouts, lesson=lesson, width=width)
-        return None if new.diagnostics else new.value
-
-    def _owner(self, source: Source) -> tuple[Owner | None, frozenset[str]]:
-        """The lesson or page that has a text, and the kinds of callouts that it may use."""
-        if self.library is None:
-            return None, frozenset()
-        known = owners(self.library.course)
-        owner = next((owner for owner in known if owner.path == source.path), None)
-        return owner, frozenset(self.library.callouts)
+    def owner(self, source: Source) -> Owner | None:
+        """The lesson or page that has a text, if it is not too long to be read."""
+        course = self.library.course
+        known = owners(course) if len(source.text) <= course.limits.text else ()
+        return next((owner for owner in known if owner.path == source.path), None)
 
     def formulas(self, path: str) -> dict[Formula, str]:
         """MathML of the formulas that a text had when it was last read."""
-        return kept_formulas(self._store, path)
+        return kept_formulas(self.store, path)
 
 
 @lru_cache(maxsize=16)
