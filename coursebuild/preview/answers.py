@@ -1,48 +1,33 @@
 """What an address has: files of the site, and what the preview adds to pages.
 
-Entry point: `Answers.find`. Files come from a `Session`, which decides what there is; nothing is
-read from disk here.
+Entry point: `Answers.find`. Files of the site come from a `Session`, which decides what there is.
 """
 
 from __future__ import annotations
 
 import hashlib
 import posixpath
-from collections.abc import Mapping
 from html import escape
 from http import HTTPStatus
+from mimetypes import MimeTypes
 from urllib.parse import unquote
 
+from coursebuild.core.files.resources import Bundle
+from coursebuild.core.pages.assets import page_script
 from coursebuild.preview.session import Session
 
 PREFIX = "/.coursebuild/"
-HTML = "text/html; charset=utf-8"
-JSON = "application/json; charset=utf-8"
-TEXT = "text/plain; charset=utf-8"
-_TYPES = {
-    ".html": HTML,
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".mjs": "text/javascript; charset=utf-8",
-    ".json": JSON,
-    ".xml": "application/xml; charset=utf-8",
-    ".txt": TEXT,
-    ".md": TEXT,
-    ".py": TEXT,
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-    ".jpg": "image/jpeg",
-    ".jpeg": "image/jpeg",
-    ".webp": "image/webp",
-    ".gif": "image/gif",
-    ".ico": "image/x-icon",
+HTML, TEXT = "text/html; charset=utf-8", "text/plain; charset=utf-8"
+_TYPES = MimeTypes().types_map[True] | {
+    ".js": "text/javascript",
+    ".md": "text/plain",
+    ".mjs": "text/javascript",
+    ".py": "text/plain",
     ".ttf": "font/ttf",
+    ".webp": "image/webp",
     ".woff2": "font/woff2",
-    ".wasm": "application/wasm",
-    ".zip": "application/zip",
-    ".pdf": "application/pdf",
-    ".webmanifest": "application/manifest+json",
 }
+"""Python's own table, and what it lacks or has otherwise in some version."""
 _WORKER = "/service-worker.js"
 _NOTHING = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
 
@@ -50,28 +35,30 @@ _NOTHING = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p><
 class Answers:
     """See the module."""
 
-    def __init__(self, session: Session, own: Mapping[str, bytes]) -> None:
-        """`own` are the preview's files, by name: `preview.js`, `preview.css`, `worker.js`."""
+    def __init__(self, session: Session) -> None:
         self._session = session
-        self._own = own
-        self.tool = digest(b"".join(own.values()))
+        bundled = Bundle()
+        self._own = {
+            f"{PREFIX}preview.js": page_script(bundled["js/preview.js"]),
+            f"{PREFIX}preview.css": bundled["css/preview.css"],
+            f"{PREFIX}worker.js": page_script(bundled["js/preview-worker.js"]),
+        }
+        self.tool = digest(b"".join(self._own.values()))
         """By which versions of the preview are told apart."""
 
     def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
         """Status, content type and bytes of an address path."""
         if path.endswith(_WORKER):
             path = f"{PREFIX}worker.js"
-        own = self._own.get(path.removeprefix(PREFIX)) if path.startswith(PREFIX) else None
-        if own is not None:
-            return HTTPStatus.OK, _type_of(path), own
+        if path in self._own:
+            return HTTPStatus.OK, _type_of(path), self._own[path]
         name, data = self._file(path)
-        if data is not None and not name.endswith(".html"):
-            return HTTPStatus.OK, _type_of(name), data
         if data is not None:
-            return HTTPStatus.OK, _type_of(name), _tagged(data, name, digest(data))
+            text = _tagged(data, name, digest(data)) if name.endswith(".html") else data
+            return HTTPStatus.OK, _type_of(name), text
         if self._session.files.has_page(name):
-            text = b"This page cannot be shown before its mistakes are mended."
-            return HTTPStatus.OK, HTML, _tagged(_NOTHING % text, name, "")
+            why = b"This page cannot be shown before its mistakes are mended."
+            return HTTPStatus.OK, HTML, _tagged(_NOTHING % why, name, "")
         missing = self._session.find("404.html")
         if missing is None:
             missing = _NOTHING % b"Nothing is built yet."
@@ -104,7 +91,8 @@ def digest(data: bytes | None) -> str:
 
 
 def _type_of(name: str) -> str:
-    return _TYPES.get(posixpath.splitext(name)[1].lower(), "application/octet-stream")
+    kind = _TYPES.get(posixpath.splitext(name)[1].lower(), "application/octet-stream")
+    return f"{kind}; charset=utf-8" if kind.startswith("text/") else kind
 
 
 def _tagged(page: bytes, name: str, state: str) -> bytes:

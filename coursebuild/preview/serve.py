@@ -19,8 +19,6 @@ from typing import NoReturn
 
 import segno
 
-from coursebuild.core.files.resources import Bundle
-from coursebuild.core.pages.assets import page_script
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.rebuild import BackgroundRebuild
@@ -52,14 +50,8 @@ def serve(
     """
     progress = Progress(quiet=options.quiet)
     session = Session(options)
-    bundled = Bundle()
-    files = {
-        "preview.js": page_script(bundled["js/preview.js"]),
-        "preview.css": bundled["css/preview.css"],
-        "worker.js": page_script(bundled["js/preview-worker.js"]),
-    }
     try:
-        server = PreviewServer(host, port, session, files, embed)
+        server = PreviewServer(host, port, session, embed)
     except OSError as error:
         why = error.strerror or error
         raise UsageError(f"port {port} of {host} cannot be used: {why}") from None
@@ -71,7 +63,6 @@ def serve(
         gc.set_threshold(_GARBAGE, 50, 50)
         server.start()
         watcher.start()
-        watcher.wait()
         _announce(server.links, browse=browse, draw=progress.live)
         _work(session, watcher, BackgroundRebuild(session, options, progress, style), progress)
     finally:

@@ -25,13 +25,13 @@ import threading
 from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, TypeAlias
+from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import msgspec
 
 from coursebuild.preview.access import Access
-from coursebuild.preview.answers import JSON, PREFIX, TEXT, Answers, digest
+from coursebuild.preview.answers import PREFIX, TEXT, Answers, digest
 from coursebuild.preview.editor import open_in_editor
 from coursebuild.preview.messages import accept, page_news
 from coursebuild.preview.session import Session
@@ -40,50 +40,51 @@ _HEARTBEAT = 15.0
 """Seconds between signs of life on an event stream, by which a browser that went away is noticed.
 """
 _LASTING = re.compile(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
-_Address: TypeAlias = ipaddress.IPv4Address | ipaddress.IPv6Address
 _LARGEST = 1 << 16
 """Bytes of a request's body."""
 
 
-class PreviewServer:
+class PreviewServer(ThreadingHTTPServer):
     """Serves a site."""
 
-    def __init__(
-        self,
-        host: str,
-        port: int,
-        session: Session,
-        own: Mapping[str, bytes],
-        embed: tuple[str, ...] = (),
-    ) -> None:
+    daemon_threads = True
+
+    def __init__(self, host: str, port: int, session: Session, embed: tuple[str, ...] = ()) -> None:
         """Take a port of a host; port 0 is any free one.
 
-        `own` are the preview's files, by name: `preview.js`, `preview.css`, `worker.js`. Pages of
-        the origins `embed` may show the preview in a frame.
+        Pages of the origins `embed` may show the preview in a frame.
 
         Raises:
             OSError: the port cannot be had.
         """
         self.session = session
-        self.answers = Answers(session, own)
+        self.answers = Answers(session)
         self.ended = False
-        self._server = _Server(host, port, self)
-        address, number = self._server.server_address[:2]
-        self._address, self._port = ipaddress.ip_address(str(address)), int(number)
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        self.address_family, _, _, _, (address, *_) = found[0]
+        super().__init__((str(address), port), _Handler)
+        self._address = ipaddress.ip_address(str(self.server_address[0]))
+        self._port = int(self.server_address[1])
         token = "" if self._address.is_loopback else secrets.token_urlsafe(12)
         self.access = Access(self._port, token, embed)
         self._thread = threading.Thread(
-            target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, name="preview"
+            target=self.serve_forever, kwargs={"poll_interval": 0.05}, name="preview", daemon=True
         )
-        self._thread.daemon = True
+
+    def server_bind(self) -> None:
+        """Without the name of this host, which may take long to find."""
+        socketserver.TCPServer.server_bind(self)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that hangs up is no news."""
 
     @property
     def links(self) -> list[str]:
         """Addresses of the preview: one for this machine, then one for others."""
-        hosts = [self._address]
+        hosts = [str(self._address)]
         if self._address.is_unspecified:
-            hosts = [ipaddress.ip_address("127.0.0.1"), *_outer_address()]
-        shown = [f"[{host}]" if host.version == 6 else str(host) for host in hosts]
+            hosts = ["127.0.0.1", *_outer_address()]
+        shown = [f"[{host}]" if ":" in host else host for host in hosts]
         query = f"?token={self.access.token}" if self.access.token else ""
         return [f"http://{host}:{self._port}/{query}" for host in shown]
 
@@ -99,42 +100,25 @@ class PreviewServer:
             changed.notify_all()
             changed.release()
         if self._thread.ident is not None:  # otherwise nobody would hear of it
-            self._server.shutdown()
-        self._server.server_close()
+            self.shutdown()
+        self.server_close()
 
 
-def _outer_address() -> list[_Address]:
+def _outer_address() -> list[str]:
     """By what other machines reach this one, if they do; nothing is sent to find it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))
         except OSError:
             return []
-        return [ipaddress.ip_address(probe.getsockname()[0])]
-
-
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-
-    def __init__(self, host: str, port: int, preview: PreviewServer) -> None:
-        self.preview = preview
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        self.address_family, _, _, _, (address, *_) = found[0]
-        super().__init__((str(address), port), _Handler)
-
-    def server_bind(self) -> None:
-        """Without the name of this host, which may take long to find."""
-        socketserver.TCPServer.server_bind(self)
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that hangs up is no news."""
+        return [probe.getsockname()[0]]
 
 
 class _Handler(BaseHTTPRequestHandler):
     """One request."""
 
     protocol_version = "HTTP/1.1"
-    server: _Server
+    server: PreviewServer
     timeout = 60
     # Without it each answer's body waits for the acknowledgement of its head.
     wbufsize = -1
@@ -152,7 +136,7 @@ class _Handler(BaseHTTPRequestHandler):
         if path == f"{PREFIX}events":
             self._events(query.get("page", ["index.html"])[0])
         else:
-            self._send(*self.server.preview.answers.find(path))
+            self._send(*self.server.answers.find(path))
 
     do_HEAD = do_GET
 
@@ -161,7 +145,7 @@ class _Handler(BaseHTTPRequestHandler):
         body = self._body()
         if not self._may_ask():
             return
-        session = self.server.preview.session
+        session = self.server.session
         match self.path.removeprefix(PREFIX), _texts(body):
             case "accept", {"page": page, "id": id}:
                 why = accept(session, page, id)
@@ -180,13 +164,13 @@ class _Handler(BaseHTTPRequestHandler):
 
     def end_headers(self) -> None:
         """Whatever is answered, errors of the base class too, is for pages of the preview only."""
-        for name, value in self.server.preview.access.headers.items():
+        for name, value in self.server.access.headers.items():
             self.send_header(name, value)
         super().end_headers()
 
     def _may_ask(self) -> bool:
         """Whether a request is answered; one that is not is told why."""
-        access = self.server.preview.access
+        access = self.server.access
         why = access.refusal(self.command, self.headers)
         if not why and access.is_known(self.headers):
             return True
@@ -205,7 +189,7 @@ class _Handler(BaseHTTPRequestHandler):
         return self.rfile.read(int(length))
 
     def _say(self, status: HTTPStatus, message: str) -> None:
-        self._send(status, JSON, json.dumps({"message": message}).encode())
+        self._send(status, "application/json", json.dumps({"message": message}).encode())
 
     def _send(
         self, status: HTTPStatus, kind: str, data: bytes, more: Mapping[str, str] | None = None
@@ -240,18 +224,18 @@ class _Handler(BaseHTTPRequestHandler):
             return
 
     def _follow(self, page: str) -> None:
-        preview, session = self.server.preview, self.server.preview.session
-        self._tell("hello", json.dumps({"tool": preview.answers.tool}))
+        server, session = self.server, self.server.session
+        self._tell("hello", json.dumps({"tool": server.answers.tool}))
         seen, state, news = -1, None, None
 
         def stir() -> bool:
-            return preview.ended or session.version != seen
+            return server.ended or session.version != seen
 
         while True:
             with session.changed:
                 stirred = session.changed.wait_for(stir, _HEARTBEAT)
                 seen = session.version
-            if preview.ended:
+            if server.ended:
                 return
             now = digest(session.find(page))
             if now != state:

@@ -38,11 +38,8 @@ class FolderWatcher:
         self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
 
     def start(self) -> None:
-        """Begin to watch; `wait` says when nothing is missed any more."""
+        """Begin to watch; from then on no change is missed."""
         self._thread.start()
-
-    def wait(self) -> None:
-        """Until no change is missed."""
         self._begun.wait()
 
     @property

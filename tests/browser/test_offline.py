@@ -6,14 +6,14 @@ import json
 import re
 import shutil
 from collections.abc import Iterator, Mapping
+from http import HTTPStatus
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from coursebuild.core.files.resources import bundled_files
-from coursebuild.core.pages.assets import page_script
 from coursebuild.pipeline.options import Options
+from coursebuild.preview.answers import PREFIX, Answers
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from support.built_sites import Site
@@ -383,6 +383,18 @@ class Previewed(Session):
         return file.read_bytes() if file.is_file() else None
 
 
+class OneScript(Answers):
+    """Answers of which one script is empty: that of the page, or the worker's."""
+
+    def __init__(self, session: Session, script: str) -> None:
+        super().__init__(session)
+        self.empty = "/service-worker.js" if script == "preview.js" else f"{PREFIX}preview.js"
+
+    def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
+        status, kind, data = super().find(path)
+        return status, kind, b"" if path.endswith(self.empty) else data
+
+
 @pytest.mark.parametrize("script", ["preview.js", "worker.js"])
 def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     context: BrowserContext, made: Folder, tmp_path: Path, script: str
@@ -392,15 +404,9 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     host = Host(tmp_path / "site")
     page, _ = opened(context, host)
     host.stop()
-    bundled = dict(bundled_files())
-    own = {
-        "preview.css": b"",
-        "preview.js": bundled["js/preview.js"] if script == "preview.js" else b"",
-        "worker.js": page_script(bundled["js/preview-worker.js"]) if script == "worker.js" else b"",
-    }
     session = Previewed(Options(host.folder, 1, True))
-    port = int(host.url.split(":")[2].strip("/"))
-    preview = PreviewServer("127.0.0.1", port, session, own)
+    preview = PreviewServer("127.0.0.1", int(host.url.split(":")[2].strip("/")), session)
+    preview.answers = OneScript(session, script)
     preview.start()
     try:
         page.goto(host.url + FIRST)

@@ -36,7 +36,6 @@ def saves(root: Path) -> Iterator[FolderWatcher]:
     found = FolderWatcher(root)
     found.watch_also(frozenset({"docs/guide.md", "own.md", LESSON}))
     found.start()
-    found.wait()
     yield found
     found.stop()
     assert found.stopped
@@ -178,7 +177,6 @@ def test_files_in_a_linked_folder(root: Path) -> None:
     (root / "content/near").symlink_to(root / "far")
     saves = FolderWatcher(root)
     saves.start()
-    saves.wait()
     told_of_a_save(root, saves, "content/near/a.svg")
     saves.stop()
 

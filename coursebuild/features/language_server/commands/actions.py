@@ -61,11 +61,11 @@ def _outputs(texts: OpenTexts, place: Span, found: list[Diagnostic]) -> Iterator
     for verdict in library.results.verdicts:
         span = verdict.recording.span
         if verdict.status == "drift" and span.source == place.source and _meet(span, place):
-            run = library.runs[verdict.recording.script or ""]
-            edit = new_output(texts.session, library.course, verdict, run)
+            edit = new_output(texts.session, library, verdict)
             if isinstance(edit, Edit):
                 mended = [d for d in found if d.rule == "output-drift" and span.contains(d.span)]
-                yield _action(texts.places, f"accept what `{run.path}` prints", [edit], mended)
+                title = f"accept what `{verdict.recording.script}` prints"
+                yield _action(texts.places, title, [edit], mended)
 
 
 def _numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:

@@ -58,7 +58,6 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         session.start(options, Progress(quiet=True))
         watcher.start()
-        watcher.wait()
         _begin(lambda: follow(session, watcher, lambda paths, seconds: None))
         _begin(server.take_typing)
         _begin(server.publish)
