@@ -1,6 +1,6 @@
 """The files of a course's theme: read, and checked.
 
-Entry points: `load_theme`; `copied_template`, a template as a course begins with it;
+Entry points: `load_theme`; `template_copies`, templates as a course begins with them;
 `template_diagnostic`, what to say of one that fails.
 
 A copied template names in its first line the text that it was copied from, by some digits of its
@@ -107,17 +107,12 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def copied_template(name: str) -> str | None:
-    """The template of a name as a course begins with it; `None` where there is none."""
-    text = _originals().get(name)
-    if text is None:
-        return None
-    return f"{{# Copied from coursebuild {__version__}: {_digest(text)} #}}\n{text}"
-
-
-def template_names() -> tuple[str, ...]:
-    """The names of all templates."""
-    return tuple(_originals())
+def template_copies() -> dict[str, str]:
+    """The tool's templates by name, each below a line that says which it is."""
+    return {
+        name: f"{{# Copied from coursebuild {__version__}: {_digest(text)} #}}\n{text}"
+        for name, text in _originals().items()
+    }
 
 
 def _check_templates(theme: Theme) -> Iterator[Diagnostic]:

@@ -15,42 +15,20 @@ from coursebuild.core.model.theme import Accent, FontFamily, Theme, ThemeFile
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
-_PATH = r"^theme(/[\w-][\w.-]*)+\.{}$"
-Picture: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=_PATH.format("(svg|png)"),
-        extra={"expects": "an SVG or PNG in `theme/`, as in `theme/logo.svg`"},
-    ),
-]
-Png: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=_PATH.format("png"),
-        extra={"expects": "a PNG in `theme/`, as in `theme/icon.png`"},
-    ),
-]
-StyleSheet: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=_PATH.format("css"),
-        extra={"expects": "a style sheet in `theme/`, as in `theme/style.css`"},
-    ),
-]
-Font: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=_PATH.format("(ttf|otf|woff2?)"),
-        extra={"expects": "a font in `theme/`, as in `theme/Vollkorn.ttf`"},
-    ),
-]
-Licence: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=_PATH.format("(txt|md)"),
-        extra={"expects": "a text in `theme/`, as in `theme/OFL.txt`"},
-    ),
-]
+
+def _file(what: str, endings: str, example: str) -> Meta:
+    """The field of a file in `theme/` with one of these endings."""
+    return Meta(
+        pattern=rf"^theme(/[\w-][\w.-]*)+\.({endings})$",
+        extra={"expects": f"{what} in `theme/`, as in `theme/{example}`"},
+    )
+
+
+Picture: TypeAlias = Annotated[str, _file("an SVG or PNG", "svg|png", "logo.svg")]
+Png: TypeAlias = Annotated[str, _file("a PNG", "png", "icon.png")]
+StyleSheet: TypeAlias = Annotated[str, _file("a style sheet", "css", "style.css")]
+Font: TypeAlias = Annotated[str, _file("a font", "ttf|otf|woff2?", "Vollkorn.ttf")]
+Licence: TypeAlias = Annotated[str, _file("a text", "txt|md", "OFL.txt")]
 Colour: TypeAlias = Annotated[
     str,
     Meta(pattern="^#[0-9A-Fa-f]{6}$", extra={"expects": "a colour as in `#17487a`"}),

@@ -19,7 +19,7 @@ from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import with_feature, with_lesson
 from coursebuild.pipeline.load import load_course
-from coursebuild.pipeline.theme import copied_template, template_names
+from coursebuild.pipeline.theme import template_copies
 
 EXAMPLES = """\
 examples:
@@ -97,12 +97,11 @@ def _new_model(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
 
 
 def _new_template(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
-    name = arguments.name
-    text = copied_template(name)
-    if text is None:
-        near = did_you_mean(name, template_names())
+    name, copies = arguments.name, template_copies()
+    if name not in copies:
+        near = did_you_mean(name, copies)
         raise UsageError(f"there is no template `{name}`" + (f"; {near}" if near else ""))
-    return [FileChange(f"{TEMPLATES}{name}", None, text.encode())]
+    return [FileChange(f"{TEMPLATES}{name}", None, copies[name].encode())]
 
 
 def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
