@@ -8,6 +8,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from jinja2 import Environment
+
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.changes import FileChange
@@ -41,8 +43,6 @@ _MODEL = """\
 </mujoco>
 """
 _FEATURE = Path(__file__).parents[1] / "feature"
-_SCRIPT = re.compile(r"^# with --script\n(.*?)(?:^# without\n(.*?))?^# end\n", re.M | re.S)
-"""What a feature with a script has, and what it has without one."""
 _NAME = re.compile(r"\w[\w-]*(?:/\w[\w-]*)*", re.ASCII)
 
 
@@ -119,11 +119,9 @@ def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
 
 
 def _code(file: str, arguments: argparse.Namespace) -> bytes:
-    """A file of `feature/`, under another name, with what is for a script or without it."""
-    text = (_FEATURE / file).read_text(encoding="utf-8")
-    chosen = 1 if arguments.script else 2
-    text = _SCRIPT.sub(lambda part: part[chosen] or "", text)
-    for old in ("example", "Example"):
-        new = arguments.name if old.islower() else arguments.name.capitalize()
-        text = text.replace(old, new)
-    return text.encode()
+    """A file of `feature/`, which is a template, for a feature of another name."""
+    template = (_FEATURE / file).read_text(encoding="utf-8")
+    jinja = Environment(trim_blocks=True, keep_trailing_newline=True)
+    text = jinja.from_string(template).render(script=arguments.script)
+    name = arguments.name
+    return text.replace("example", name).replace("Example", name.capitalize()).encode()
