@@ -32,14 +32,14 @@ from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.runner import Finished, RunAll, RunStoppedError, ScriptServer, Started
 from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.scripts.bindings import HeldLines
-from coursebuild.core.scripts.extract import Extraction, extract
+from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import run
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now
-from coursebuild.preview.session import Session, is_same_script
+from coursebuild.preview.session import Session, script_keys
 from coursebuild.report import Report, Style, diagnostic_text, summary_line
 from coursebuild.report.text import location
 
@@ -93,7 +93,7 @@ class BackgroundRebuild:
             try:
                 with project_lock(self._options.root, self._said.say):
                     self.once()
-            except SupersededError:
+            except (SupersededError, RunStoppedError):
                 continue
             except EffectError as error:
                 text = f"coursebuild: {error.message}" + (f"\n{error.help}" if error.help else "")
@@ -177,32 +177,28 @@ class BackgroundRebuild:
 
     def _verify(self, course: Course) -> None:
         session = self._session
-        scripts = extract(course).value
         with session.changed:
             everything, session.all_due = session.all_due, False
-        known = {} if everything else session.known_runs(scripts)
+        known = {} if everything else session.known_runs(course)
         try:
             verified = verify(
                 course,
-                replace(self._options, run_all=self._run_all(scripts)),
+                replace(self._options, run_all=self._run_all(course)),
                 self._progress,
                 static=True,
                 held=self._held,
                 known=known,
             )
-        except BaseException as error:
+        except BaseException:
             session.all_due |= everything
-            if isinstance(error, RunStoppedError):
-                raise SupersededError from None
             raise
         self._options.store.fresh = False  # what was made anew once holds from now on
         session.take_results(course, verified)
-        self._run_again(course, scripts, session.drifted(verified.results.runs))
+        self._run_again(course, session.drifted(verified.results.runs))
 
-    def _run_all(self, scripts: Sequence[Extraction]) -> RunAll:
+    def _run_all(self, course: Course) -> RunAll:
         """What runs scripts, and shows what each prints as soon as it has ended."""
-        begun = {extraction.path: extraction for extraction in scripts}
-        session, serve = self._session, self._run_unless_edited(scripts)
+        session, serve, keys = self._session, self._run_unless_edited(course), script_keys(course)
 
         def run_all(
             root: Path,
@@ -215,7 +211,7 @@ class BackgroundRebuild:
         ) -> tuple[ScriptRun, ...]:
             def ended(run: ScriptRun) -> None:
                 finished(run)
-                session.take_run(begun[run.path], run)
+                session.take_run(keys[run.path], run)
 
             there = functools.partial(serve, root, parallel=parallel, place=place)
             runs = there(todo, started=started, finished=ended)
@@ -227,10 +223,9 @@ class BackgroundRebuild:
 
         return run_all
 
-    def _run_unless_edited(self, scripts: Sequence[Extraction]) -> RunAll:
+    def _run_unless_edited(self, course: Course) -> RunAll:
         """What runs scripts until one that runs is another by now: nobody waits for its output."""
-        begun = {extraction.path: extraction for extraction in scripts}
-        session, edits = self._session, self._seen
+        session, edits, keys = self._session, self._seen, script_keys(course)
 
         def unwanted(running: frozenset[str]) -> bool:
             nonlocal edits
@@ -238,25 +233,21 @@ class BackgroundRebuild:
                 if session.edits == edits or session.course is None:
                     return False
                 edits = session.edits
-                now = {e.path: e for e in extract(session.course).value}
-            return not all(is_same_script(begun[path], now.get(path)) for path in running)
+                now = script_keys(session.course)
+            return any(now.get(path) != keys[path] for path in running)
 
         return functools.partial(self._server.run, unwanted=unwanted)
 
-    def _run_again(
-        self, course: Course, scripts: Sequence[Extraction], drifted: Collection[str]
-    ) -> None:
+    def _run_again(self, course: Course, drifted: Collection[str]) -> None:
         """Run those that drifted once more, where what they did was remembered."""
         session, options = self._session, self._options.for_course(course)
-        unsure = [e for e in scripts if e.path in drifted and session.printed_again(e.path) is None]
-        if unsure:
+        unsure = {path for path in drifted if session.printed_again(path) is None}
+        scripts = [script for script in extract(course).value if script.path in unsure]
+        if scripts:
             self._busy("running scripts again")
             memory = options.memory(fresh=True)
-            served = replace(options, run_all=self._run_unless_edited(scripts))
-            try:
-                again = run(unsure, served, self._progress, "running scripts again", memory)
-            except RunStoppedError:
-                raise SupersededError from None
+            served = replace(options, run_all=self._run_unless_edited(course))
+            again = run(scripts, served, self._progress, "running scripts again", memory)
             session.take_second_runs(again)
 
 

@@ -58,7 +58,7 @@ def serve(
     watcher = FolderWatcher(options.root)
     sys.setswitchinterval(_SWITCH)
     try:
-        session.start(options, progress)
+        session.start(progress)
         gc.freeze()  # what is read lives as long as the preview: nobody need look through it again
         gc.set_threshold(_GARBAGE, 50, 50)
         server.start()

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import Generic, TypeVar
+from typing import TypeAlias
 
 from msgspec.structs import replace
 
@@ -25,20 +25,20 @@ from coursebuild.core.features import PublishedTrials
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Page
-from coursebuild.core.model.results import Outcome, Results, ScriptRun
+from coursebuild.core.model.results import Outcome, Results, ScriptJob, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.library import Library, Owner, named_models, owners
+from coursebuild.core.pages.library import Library, Owner, owners
 from coursebuild.core.pages.templates import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
-from coursebuild.core.scripts.extract import Extraction, extract, jobs
+from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.source_parts import shown_files
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, Severity
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.load import MAP, Loaded, load
+from coursebuild.pipeline.load import MAP, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
@@ -46,26 +46,10 @@ from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verified
 from coursebuild.preview.files import Files
 
-T = TypeVar("T")
-
+ScriptKey: TypeAlias = tuple[str, ScriptJob]
+"""The text of a script, and how it is run."""
 MOST = 8
 """Documents saved at once that are taken one by one; more are read with the whole course."""
-
-
-class PerDocument(Generic[T]):
-    """A function of a document, which is not called again for the very same one."""
-
-    def __init__(self, make: Callable[[Document], T]) -> None:
-        self._make = make
-        self._known: dict[str, tuple[Document, T]] = {}
-
-    def __call__(self, document: Document) -> T:
-        """The result for a document."""
-        path = document.source.path
-        known = self._known.get(path)
-        if known is None or known[0] is not document:
-            known = self._known[path] = document, self._make(document)
-        return known[1]
 
 
 class Session:
@@ -90,7 +74,6 @@ class Session:
         self.trouble = ""
         """Why background work could not be done, if it could not."""
         self._is_map_broken = False
-        self.course: Course | None = None
         self.library: Library | None = None
         """What is known of the course, for drawing; `None` before a map could be read."""
         self.verified: Course | None = None
@@ -102,27 +85,25 @@ class Session:
         self._reading = threading.Lock()
         """Held while documents are read: `Documents` knows one text of each."""
         self._assets = Assets(template_texts(), Bundle(), prepared_folder())
-        self._models_of = PerDocument(named_models)
         self._static: dict[str, tuple[Diagnostic, ...]] = {}
         """What reading and checking found, by file."""
         self._failed: tuple[Diagnostic, ...] = ()
         """That a template of the course failed when a page was drawn."""
         self._targets: LinkTargets | None = None
-        self._site_paths: dict[str, str] = {}
-        """The site paths of lessons and pages, by the path of their file."""
         self._results = Results((), (), (), (), python_version(), engine_version())
         self._reports = Reports()
-        self._ran: dict[str, Extraction] = {}
+        self._ran: dict[str, ScriptKey] = {}
         """The scripts that were run, as they were then."""
-        self._again: dict[str, tuple[Extraction, str, str]] = {}
-        """Of scripts that ran twice: what was run, and what each run printed."""
+        self._again: dict[str, tuple[tuple[ScriptKey, str], str]] = {}
+        """Of scripts that ran twice: what was run and what it printed, and then what it printed."""
         self._trials = PublishedTrials()
+        self._options = options
         self.files = Files(options, self._assets, self._documents, self._is_sound)
         self._site = site
 
-    def start(self, options: Options, progress: Progress) -> None:
+    def start(self, progress: Progress) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
-        with Documents(options.store, options.jobs, progress.stage) as documents:
+        with Documents(self._options.store, self._options.jobs, progress.stage) as documents:
             self.read(documents)
 
     def close(self) -> None:
@@ -131,6 +112,11 @@ class Session:
             self._documents.close()
 
     # --- what may be asked
+
+    @property
+    def course(self) -> Course | None:
+        """The course as it was last read; `None` before a map could be read."""
+        return None if self.library is None else self.library.course
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Everything that is known to be wrong."""
@@ -161,24 +147,14 @@ class Session:
         """The path under which the published site will be, with a slash at both ends."""
         return "/" if self.course is None else urls.base_path(self.course)
 
-    def tell(self) -> None:
-        """Say that there is news."""
+    def tell(self, *, saved: bool = False) -> None:
+        """Say that there is news; `saved`: of files, from which all else follows."""
         with self.changed:
+            if saved:
+                self.edits += 1
+                self.busy = self.busy or "checking"
             self.version += 1
             self.changed.notify_all()
-
-    def touch(self) -> None:
-        """Note that something was saved, whatever it comes to."""
-        with self.changed:
-            self.edits += 1
-            self.busy = self.busy or "checking"
-            self.tell()
-
-    def _tell_of(self, *, saved: bool) -> None:
-        if saved:
-            self.touch()
-        else:
-            self.tell()
 
     # --- the course
 
@@ -194,32 +170,33 @@ class Session:
                 return None
             if not fresh:
                 if saved and not self.open_texts.keys().isdisjoint(paths):
-                    self.touch()  # its scripts may run
+                    self.tell(saved=True)  # its scripts may run
                 return False
             self._show(_with_owners(course, [owner for owner, _ in fresh]))
             for owner, found in fresh:
                 assert owner.document is not None
                 self._static[owner.path] = (*found, *self._check(owner.document))
-            self._tell_of(saved=saved)
+            self.tell(saved=saved)
             for owner, _ in fresh if self._site else ():
-                self.find(self._site_paths[owner.path])
+                self.find(urls.owner_path(owner))
             return True
 
     def _saved(self, paths: Collection[str]) -> list[tuple[Owner, tuple[Diagnostic, ...]]] | None:
         """The lessons and pages whose text is another now, and what is wrong in it by itself."""
-        if self.course is None or len(paths) > MOST:
+        if self.library is None or len(paths) > MOST:
             return None
-        known = {owner.path: owner for owner in owners(self.course)}
+        course = self.library.course
+        known = {owner.path: owner for owner in owners(course)}
         fresh: list[tuple[Owner, tuple[Diagnostic, ...]]] = []
         for path in sorted(paths):
             owner = known.get(path)
             read = read_sources(self.root, [path], self.open_texts)
-            sources = [one for one in read.value if len(one.text) <= self.course.limits.text]
+            sources = [one for one in read.value if len(one.text) <= course.limits.text]
             if owner is None or owner.document is None or not sources:
                 return None
             (source,) = sources
             if source != owner.document.source or self._static.get(path):
-                callouts, lesson = _callouts(self.course), isinstance(owner, Lesson)
+                callouts, lesson = frozenset(self.library.callouts), isinstance(owner, Lesson)
                 parsed = self._documents.document(source, callouts, lesson=lesson)
                 found = (*read.diagnostics, *parsed.diagnostics)
                 fresh.append((replace(owner, document=parsed.value), found))
@@ -234,7 +211,7 @@ class Session:
         """Take saves of other files."""
         with self.changed:
             self.all_due = True
-            self.touch()
+            self.tell(saved=True)
         self.read()
 
     def read(self, documents: Documents | None = None, *, saved: bool = True) -> bool:
@@ -248,14 +225,16 @@ class Session:
             with self._reading:
                 loaded = load(self.root, documents, self.open_texts)
                 course = loaded.course
-                reports = None if course is None else shown_reports(self.root, course)
+                reports = Parsed(Reports(), ())
+                if course is not None:
+                    reports = shown_reports(self.root, course)
                 with self.changed:
                     if edits != self.edits:
                         continue
-                    found = loaded.diagnostics + (reports.diagnostics if reports else ())
-                    fresh = self._take_course(loaded, found, reports.value if reports else None)
+                    found = (*loaded.diagnostics, *reports.diagnostics)
+                    fresh = self._take_course(course, found, reports.value)
                     if fresh:
-                        self._tell_of(saved=saved)
+                        self.tell(saved=saved)
                     return fresh
 
     def saved_course(self) -> Course | None:
@@ -268,47 +247,31 @@ class Session:
             return load(self.root, self._documents).course
 
     def _take_course(
-        self, loaded: Loaded, diagnostics: Iterable[Diagnostic], reports: Reports | None
+        self, course: Course | None, diagnostics: Iterable[Diagnostic], reports: Reports
     ) -> bool:
         found: dict[str, tuple[Diagnostic, ...]] = {}
         for diagnostic in diagnostics:
             path = diagnostic.span.path
             found[path] = (*found.get(path, ()), diagnostic)
         same = found == {path: told for path, told in self._static.items() if told}
-        self._is_map_broken = loaded.course is None
+        self._is_map_broken = course is None
         self._static = found
-        if loaded.course is not None:
-            same = same and reports == self._reports and _is_same(self.course, loaded.course)
-            self._reports = reports or Reports()
-            self._show(loaded.course)
+        if course is not None:
+            same = same and reports == self._reports and course == self.course
+            self._reports = reports
+            self._show(course)
         return not same
 
     def _show(self, course: Course) -> None:
         """Draw pages of this course from now on, with what is known of it."""
-        scripts = {extraction.path: extraction for extraction in extract(course).value}
-        runs = tuple(
-            run
-            for run in self._results.runs
-            if is_same_script(self._ran.get(run.path), scripts.get(run.path))
-        )
+        same = dict(self._ran.items() & script_keys(course).items())
+        runs = tuple(run for run in self._results.runs if run.path in same)
         results = replace(self._results, runs=runs, verdicts=compare(course, runs))
         self._failed = ()
-        self.course = course
-        self.library = library = Library.of(
-            course,
-            results,
-            self._assets,
-            self._reports,
-            trials=self._trials,
-            models_of=self._models_of,
-        )
+        self.library = Library.of(course, results, self._assets, self._reports, trials=self._trials)
         self._targets = link_targets(course)
-        self._site_paths = {
-            **{entry.path: urls.lesson_path(entry) for entry in course.lessons},
-            **{page.path: urls.page_path(page) for page in course.pages},
-        }
         if self._site:
-            self.files.show(library)
+            self.files.show(self.library)
 
     # --- what background work found
 
@@ -320,12 +283,12 @@ class Session:
         with self.changed:
             self.verified, self.found_by_running = course, verified.diagnostics
             self._results, self._trials = results, trials
-            self._ran = {extraction.path: extraction for extraction in extract(course).value}
+            self._ran = script_keys(course)
             if self.course is not None:
                 self._show(self.course)
             self.tell()
 
-    def take_run(self, script: Extraction, run: ScriptRun) -> None:
+    def take_run(self, script: ScriptKey, run: ScriptRun) -> None:
         """Show what one script did, while others run."""
         with self.changed:
             others = (other for other in self._results.runs if other.path != run.path)
@@ -341,13 +304,10 @@ class Session:
             verdicts = () if self.course is None else compare(self.course, runs)
         return {v.recording.script or "" for v in verdicts if v.status == "drift"}
 
-    def known_runs(self, scripts: Iterable[Extraction]) -> dict[str, ScriptRun]:
-        """What these scripts did, by path; nothing where one of them is another than it was."""
-        now = {script.path: script for script in scripts}
+    def known_runs(self, course: Course) -> dict[str, ScriptRun]:
+        """What a course's scripts did, by path; nothing where one is another than it was."""
         with self.changed:
-            same = now.keys() == self._ran.keys() and all(
-                is_same_script(script, self._ran[path]) for path, script in now.items()
-            )
+            same = script_keys(course) == self._ran
             return {run.path: run for run in self._results.runs} if same else {}
 
     def take_second_runs(self, runs: Iterable[ScriptRun]) -> None:
@@ -356,15 +316,15 @@ class Session:
         with self.changed:
             for run in runs:
                 printed = run.stdout if run.outcome is Outcome.OK else ""
-                self._again[run.path] = self._ran[run.path], first[run.path].stdout, printed
+                self._again[run.path] = (self._ran[run.path], first[run.path].stdout), printed
             self.tell()
 
     def printed_again(self, path: str) -> str | None:
         """What a script printed when it ran once more with the same text, if it did."""
-        script, first, printed = self._again.get(path, (None, "", ""))
-        now = next((run for run in self._results.runs if run.path == path), None)
-        same = now is not None and now.stdout == first
-        return printed if same and is_same_script(script, self._ran.get(path)) else None
+        first, printed = self._again.get(path, (None, ""))
+        run = next((run for run in self._results.runs if run.path == path), None)
+        same = run is not None and first == (self._ran.get(path), run.stdout)
+        return printed if same else None
 
     def make_site(self, pause: Callable[[], None]) -> None:
         """Put all files of the site together, and serve them; `pause` is called between pages."""
@@ -372,9 +332,9 @@ class Session:
             return
         with self.changed:
             library = self.library
+            assert library is not None
             wrong = {path for path, found in self._static.items() if has_errors(found)}
-            broken = {site for path, site in self._site_paths.items() if path in wrong}
-        assert library is not None
+            broken = {urls.owner_path(o) for o in owners(library.course) if o.path in wrong}
         try:
             serve = self.files.make(library, broken, pause)
         except TemplateFailure as failure:
@@ -415,15 +375,10 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     return any(d.severity is Severity.ERROR for d in diagnostics)
 
 
-def is_same_script(one: Extraction | None, two: Extraction | None) -> bool:
-    """Whether two scripts are run alike and print the same."""
-    if one is None or two is None:
-        return False
-    return one.text == two.text and jobs([one]) == jobs([two])
-
-
-def _callouts(course: Course) -> frozenset[str]:
-    return frozenset(kind.name for kind in course.callouts)
+def script_keys(course: Course) -> dict[str, ScriptKey]:
+    """What the scripts of a course are run by: those with the same key print the same."""
+    scripts = extract(course).value
+    return {job.path: (e.text, job) for e, job in zip(scripts, jobs(scripts), strict=True)}
 
 
 def _with_owners(course: Course, fresh: Iterable[Owner]) -> Course:
@@ -435,16 +390,3 @@ def _with_owners(course: Course, fresh: Iterable[Owner]) -> Course:
         for level in course.levels
     )
     return replace(course, levels=levels, pages=tuple(pages.get(p.id, p) for p in course.pages))
-
-
-def _is_same(old: Course | None, new: Course) -> bool:
-    """Whether two readings gave the same course."""
-    return (
-        old is not None
-        and old.map.text == new.map.text
-        and old.models == new.models
-        and old.theme == new.theme
-        and old.declarations == new.declarations
-        and old.files == new.files
-        and [d.source for d in old.documents] == [d.source for d in new.documents]
-    )

@@ -30,7 +30,7 @@ class Live:
         options, quiet = Options(folder.root.resolve(), 2, True), Progress(quiet=True)
         self.session = Session(options)
         self.rebuild = BackgroundRebuild(self.session, options, quiet, Style())
-        self.session.start(options, quiet)
+        self.session.start(quiet)
 
     def save(self, *paths: str) -> bool:
         """Take a save; whether the fast way was taken."""

@@ -7,7 +7,7 @@ afterwards.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -118,12 +118,10 @@ class Library(Struct, frozen=True, dict=True):
         reports: Reports | None = None,
         *,
         trials: PublishedTrials | None = None,
-        models_of: Callable[[Document], NamedModels] | None = None,
     ) -> Library:
         """Look everything over once.
 
-        `trials` is what a site needs of what was tried, where it is known. `models_of` is
-        `named_models`, or what remembers its results.
+        `trials` is what a site needs of what was tried, where it is known.
         """
         questions: dict[str, str] = {}
         terms: dict[str, Owner] = {}
@@ -155,7 +153,7 @@ class Library(Struct, frozen=True, dict=True):
             order=course.lessons,
             positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
             leads=_leads(course),
-            uses=uses_of(course, models_of or named_models),
+            uses=_uses(course),
             referrers={id: tuple(found) for id, found in referrers.items()},
             terms=terms,
             asked=questions,
@@ -282,8 +280,11 @@ class NamedModels(Struct, frozen=True):
     by_links: frozenset[str]
 
 
-def named_models(document: Document) -> NamedModels:
+def _named_models(document: Document) -> NamedModels:
     """The models that a document may use."""
+    known: NamedModels | None = document.__dict__.get("models")
+    if known is not None:  # asked for with each edit of another
+        return known
     blocks = tuple(document_blocks(document))
     ours = [block for block in blocks if isinstance(block, FeatureBlock)]
     labs = {name for block in ours for name in block.models()}
@@ -291,7 +292,9 @@ def named_models(document: Document) -> NamedModels:
     targets = (i.target for i in document_inlines(document) if isinstance(i, Link))
     links = {target.name for target in targets if isinstance(target, ModelTarget)}
     shown = {name for block in ours for name in block.mentioned_models()}
-    return NamedModels(frozenset(labs), frozenset(scripts), frozenset(links | shown))
+    found = NamedModels(frozenset(labs), frozenset(scripts), frozenset(links | shown))
+    document.__dict__["models"] = found
+    return found
 
 
 def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
@@ -316,13 +319,11 @@ def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
     return {id: tuple(lessons) for id, lessons in found.items()}
 
 
-def uses_of(
-    course: Course, models_of: Callable[[Document], NamedModels]
-) -> dict[str, tuple[ModelUse, ...]]:
+def _uses(course: Course) -> dict[str, tuple[ModelUse, ...]]:
     """Where each model is used."""
     found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
     for owner, document in documents(course) if found else ():
-        named = models_of(document)
+        named = _named_models(document)
         for name in sorted(named.by_labs | named.by_scripts | named.by_links):
             if name in found:
                 how = (name in named.by_labs, name in named.by_scripts, name in named.by_links)

@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     rebuild = BackgroundRebuild(session, options, Progress(quiet=True), Style())
     server = Server(session, options.store)
     try:
-        session.start(options, Progress(quiet=True))
+        session.start(Progress(quiet=True))
         watcher.start()
         _begin(lambda: follow(session, watcher, lambda paths, seconds: None))
         _begin(server.take_typing)
