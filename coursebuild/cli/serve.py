@@ -46,9 +46,14 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> NoReturn:
     """Build, serve, rebuild and reload on change, until it is interrupted."""
-    options, said = options_of(arguments), arguments
-    style = style_of(sys.stderr)
-    serve(options, said.host, said.port, tuple(said.embed), style, browse=said.open)
+    serve(
+        options_of(arguments),
+        arguments.host,
+        arguments.port,
+        tuple(arguments.embed),
+        style_of(sys.stderr),
+        browse=arguments.open,
+    )
 
 
 def _port(text: str) -> int:

@@ -78,9 +78,10 @@ class Files:
         self._entries = {entry.path: entry for entry in page_list(library)}
         self._pages = {path: one for path, one in self._pages.items() if path in self._entries}
         self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
-        if not self._sites:  # whatever characters pages will have
+        if self._sites:
+            self._set_frame()
+        else:  # whatever characters pages will have
             self._serve(self._maker(library).made((), whole_fonts=True))
-        self._set_frame(library)
 
     def make(
         self, library: Library, broken: Collection[str], pause: Callable[[], None]
@@ -107,13 +108,12 @@ class Files:
         files = {file.path: file for file in site.files}
         self._sites = [*self._sites[1 - _SITES :], (site, files)]
         self._last_good |= {p: key for p, key in site.keys.items() if p in self._entries}
-        if self._library is not None:
-            self._set_frame(self._library)
+        self._set_frame()
 
-    def _set_frame(self, library: Library) -> None:
+    def _set_frame(self) -> None:
         names = self._sites[-1][0].names
-        assert names is not None
-        self._frame = PageFrame(library, names)
+        assert self._library is not None and names is not None
+        self._frame = PageFrame(self._library, names)
 
     # --- what may be asked
 

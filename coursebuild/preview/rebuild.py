@@ -34,7 +34,6 @@ from coursebuild.core.run.surroundings import OtherEnvironment
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import run
 from coursebuild.pipeline.verify import verify
@@ -58,14 +57,12 @@ class SupersededError(Exception):
 class BackgroundRebuild:
     """See the module."""
 
-    def __init__(
-        self, session: Session, options: Options, progress: Progress, style: Style
-    ) -> None:
+    def __init__(self, session: Session, progress: Progress, style: Style) -> None:
         self._session = session
-        self._options = options
-        self._said = progress
-        # Which scripts run is said on a terminal, where it is gone again when they are done.
-        self._progress = progress if progress.live else Progress(quiet=True)
+        self._options = session.options
+        self._progress = progress
+        # A terminal also shows which scripts run, in a line that is erased when they have ended.
+        self._stages = progress if progress.live else Progress(quiet=True)
         self._seen = -1
         """The number of the state that was looked at last."""
         self._held: HeldLines = {}
@@ -91,7 +88,7 @@ class BackgroundRebuild:
         while True:
             self._wait()
             try:
-                with project_lock(self._options.root, self._said.say):
+                with project_lock(self._options.root, self._progress.say):
                     self.once()
             except (SupersededError, RunStoppedError):
                 continue
@@ -164,14 +161,14 @@ class BackgroundRebuild:
         for diagnostic in new:
             print(diagnostic_text(diagnostic, self._style) + "\n", file=sys.stderr, flush=True)
         for diagnostic in gone:
-            self._said.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
+            self._progress.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
         counts = [f"{len(new)} new"] if new else []
         counts += [f"{len(gone)} gone"] if gone else []
         verdict = summary_line(report).rpartition(": ")[2]
         if now and before is not None:
             verdict = f"{verdict} ({', '.join(counts)})" if counts else f"still {verdict}"
         if now or now != before:
-            self._said.say(f"checked: {verdict}")
+            self._progress.say(f"checked: {verdict}")
 
     # --- scripts
 
@@ -184,7 +181,7 @@ class BackgroundRebuild:
             verified = verify(
                 course,
                 replace(self._options, run_all=self._run_all(course)),
-                self._progress,
+                self._stages,
                 static=True,
                 held=self._held,
                 known=known,
@@ -247,7 +244,7 @@ class BackgroundRebuild:
             self._busy("running scripts again")
             memory = options.memory(fresh=True)
             served = replace(options, run_all=self._run_unless_edited(course))
-            again = run(scripts, served, self._progress, "running scripts again", memory)
+            again = run(scripts, served, self._stages, "running scripts again", memory)
             session.take_second_runs(again)
 
 

@@ -1,6 +1,6 @@
 """From events of the file system to saves, and from saves to pages.
 
-Entry point: `follow(session, watcher, said)`, which a thread of its own runs.
+Entry point: `follow(session, watcher, progress)`, which a thread of its own runs.
 
 1. What one save of an editor comes to (an empty file that is written next, a new file that takes
    the place of the old one) counts once: when nothing more happened for some milliseconds.
@@ -11,9 +11,10 @@ Entry point: `follow(session, watcher, said)`, which a thread of its own runs.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
+from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.session import MOST, Session
 from coursebuild.preview.watcher import FolderWatcher
 
@@ -27,12 +28,10 @@ LONGEST = 0.250
 """Seconds after which what there is counts, whatever still happens; with many files, four times."""
 
 
-def follow(
-    session: Session, watcher: FolderWatcher, said: Callable[[frozenset[str], float], None]
-) -> None:
+def follow(session: Session, watcher: FolderWatcher, progress: Progress) -> None:
     """Take saves until the watcher is stopped.
 
-    `said` is told what was saved, and how many seconds after its first event it was taken.
+    Each is told, with the milliseconds from its first event until it was taken.
     """
     while not watcher.stopped:
         watcher.watch_also(session.files_elsewhere())
@@ -49,7 +48,8 @@ def follow(
         finally:
             session.calm.set()
         if changed is not False:
-            said(paths, time.monotonic() - began)
+            names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
+            progress.say(f"changed: {names} ({1e3 * (time.monotonic() - began):.0f} ms)")
 
 
 def _complete(root: Path, watcher: FolderWatcher, paths: frozenset[str]) -> frozenset[str]:

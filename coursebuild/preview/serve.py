@@ -56,6 +56,14 @@ def serve(
         why = error.strerror or error
         raise UsageError(f"port {port} of {host} cannot be used: {why}") from None
     watcher = FolderWatcher(options.root)
+    rebuild = BackgroundRebuild(session, progress, style)
+
+    def take_saves() -> None:
+        try:
+            follow(session, watcher, progress)
+        except BaseException as error:  # told by the main thread
+            rebuild.fail(error)
+
     sys.setswitchinterval(_SWITCH)
     try:
         session.start(progress)
@@ -64,10 +72,12 @@ def serve(
         server.start()
         watcher.start()
         _announce(server.links, browse=browse, draw=progress.live)
-        _work(session, watcher, BackgroundRebuild(session, options, progress, style), progress)
+        threading.Thread(target=take_saves, name="saves", daemon=True).start()
+        rebuild.follow()
     finally:
         watcher.stop()
         server.stop()
+        rebuild.close()
         session.close()
         options.store.close()
 
@@ -82,28 +92,3 @@ def _announce(links: list[str], *, browse: bool, draw: bool) -> None:
         segno.make(links[-1]).terminal(sys.stderr, compact=True)
     if browse:  # some wait until their window is there
         threading.Thread(target=webbrowser.open, args=(first,), name="open", daemon=True).start()
-
-
-def _work(
-    session: Session,
-    watcher: FolderWatcher,
-    rebuild: BackgroundRebuild,
-    progress: Progress,
-) -> NoReturn:
-    """Follow a course that was read; ends by an exception only."""
-
-    def saved(paths: frozenset[str], seconds: float) -> None:
-        names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
-        progress.say(f"changed: {names} ({1e3 * seconds:.0f} ms)")
-
-    def take_saves() -> None:
-        try:
-            follow(session, watcher, saved)
-        except BaseException as error:  # told by the main thread
-            rebuild.fail(error)
-
-    threading.Thread(target=take_saves, name="saves", daemon=True).start()
-    try:
-        rebuild.follow()
-    finally:
-        rebuild.close()

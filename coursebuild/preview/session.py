@@ -57,7 +57,7 @@ class Session:
 
     def __init__(self, options: Options, *, site: bool = True) -> None:
         """`site`: whether pages are drawn."""
-        self.root = options.root
+        self.options, self.root = options, options.root
         self.open_texts: Mapping[str, str] = {}
         """The texts of files that are open in an editor, which need not be saved, by path; another
         mapping with each change."""
@@ -97,13 +97,13 @@ class Session:
         self._again: dict[str, tuple[tuple[ScriptKey, str], str]] = {}
         """Of scripts that ran twice: what was run and what it printed, and then what it printed."""
         self._trials = PublishedTrials()
-        self._options = options
         self.files = Files(options, self._assets, self._documents, self._is_sound)
         self._site = site
 
     def start(self, progress: Progress) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
-        with Documents(self._options.store, self._options.jobs, progress.stage) as documents:
+        options = self.options
+        with Documents(options.store, options.jobs, progress.stage) as documents:
             self.read(documents)
 
     def close(self) -> None:

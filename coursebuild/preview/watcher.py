@@ -149,15 +149,11 @@ class FolderWatcher:
             yield frozenset(Path(path).relative_to(self._root).as_posix() for _, path in batch)
 
     def _is_source(self, path: str) -> bool:
-        try:
-            return is_source(Path(path).relative_to(self._root).as_posix())
-        except ValueError:
-            return False
-
-
-def is_source(path: str) -> bool:
-    """Whether a path, POSIX and relative to the course, is none of an editor's or of Python's."""
-    return bool(path) and not any(map(_is_dropping, path.split("/")))
+        """Whether a path is one of the course, and none of an editor's or of Python's."""
+        file = Path(path)
+        return file.is_relative_to(self._root) and not any(
+            map(_is_dropping, file.relative_to(self._root).parts)
+        )
 
 
 def _is_dropping(name: str) -> bool:

@@ -29,7 +29,7 @@ class Live:
         self.folder = folder
         options, quiet = Options(folder.root.resolve(), 2, True), Progress(quiet=True)
         self.session = Session(options)
-        self.rebuild = BackgroundRebuild(self.session, options, quiet, Style())
+        self.rebuild = BackgroundRebuild(self.session, quiet, Style())
         self.session.start(quiet)
 
     def save(self, *paths: str) -> bool:
