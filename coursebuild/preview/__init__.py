@@ -1,4 +1,4 @@
-"""`coursebuild serve`: the steps of a build in a process that stays, with one page demanded.
+"""`coursebuild serve`: the steps of a build in a process that stays; open pages come first.
 
 Entry point: `serve.serve`.
 

@@ -1,4 +1,4 @@
-"""What an address has: files of the site, and what the preview adds to pages.
+"""What is served at an address: files of the site, and what the preview adds to pages.
 
 Entry point: `Answers.find`. Files of the site come from a `Session`, which decides what there is.
 """
@@ -44,7 +44,7 @@ class Answers:
             f"{PREFIX}worker.js": page_script(bundled["js/preview-worker.js"]),
         }
         self.tool = digest(b"".join(self._own.values()))
-        """By which versions of the preview are told apart."""
+        """A digest of these files: pages reload when the preview's own scripts have changed."""
 
     def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
         """Status, content type and bytes of an address path."""
@@ -86,7 +86,7 @@ class Answers:
 
 
 def digest(data: bytes | None) -> str:
-    """By which two states of a page are told apart; empty where there is no page."""
+    """A digest of a page, another after each change; empty where there is no page."""
     return "" if data is None else hashlib.sha256(data).hexdigest()[:16]
 
 

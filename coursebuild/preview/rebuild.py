@@ -1,4 +1,4 @@
-"""What follows a save, in its own time: what a build does, as far as a page need not wait for it.
+"""The rest of a build, in the background after each save: all that a page need not wait for.
 
 Entry point: `BackgroundRebuild.follow()`, which the main thread runs, so that Ctrl-C ends whatever
 is running as it ends any other command.
@@ -64,13 +64,13 @@ class BackgroundRebuild:
         # A terminal also shows which scripts run, in a line that is erased when they have ended.
         self._stages = progress if progress.live else Progress(quiet=True)
         self._seen = -1
-        """The number of the state that was looked at last."""
+        """The session's `edits` when the work began last."""
         self._held: HeldLines = {}
-        """The lines by which bound numbers held, also before an output was accepted."""
+        """The lines that proved bound numbers, also before an output was accepted."""
         self._server = ScriptServer()
         self._style = style
         self._told: tuple[Diagnostic, ...] | None = None
-        """What was wrong when that was printed last."""
+        """The mistakes that were printed last."""
         self._failure: BaseException | None = None
 
     def close(self) -> None:
@@ -116,7 +116,11 @@ class BackgroundRebuild:
                     return
 
     def once(self) -> None:
-        """Everything, now, as far as nothing is saved meanwhile."""
+        """Do everything once.
+
+        Raises:
+            SupersededError, RunStoppedError: something was saved in the meantime.
+        """
         session = self._session
         self._seen = session.edits
         session.read()
@@ -142,7 +146,7 @@ class BackgroundRebuild:
             raise SupersededError
 
     def _done(self, trouble: str = "") -> None:
-        """All is known: say what is wrong, if it is news."""
+        """End the work: print what is wrong, if that is news."""
         session = self._session
         with session.changed:
             if session.edits != self._seen and not trouble:
@@ -154,7 +158,7 @@ class BackgroundRebuild:
             self._tell_changes(report_now(session))
 
     def _tell_changes(self, report: Report) -> None:
-        """Say what is wrong and was not before, and what is wrong no longer."""
+        """Print the mistakes that are new, and those that are gone."""
         now, before = report.diagnostics, self._told
         self._told = now
         new, gone = without(now, before or ()), without(before or (), now)
@@ -212,7 +216,7 @@ class BackgroundRebuild:
 
             there = functools.partial(serve, root, parallel=parallel, place=place)
             runs = there(todo, started=started, finished=ended)
-            # Whoever sees a new output need not wait for labs as well to accept it.
+            # Run again at once: an author who sees a new output can accept it before labs have run.
             drifted = session.drifted(runs)
             left = [job for job in todo if job.path in drifted]
             session.take_second_runs(there(left))
@@ -221,7 +225,7 @@ class BackgroundRebuild:
         return run_all
 
     def _run_unless_edited(self, course: Course) -> RunAll:
-        """What runs scripts until one that runs is another by now: nobody waits for its output."""
+        """What runs scripts until one of those that run is edited: its output is of no use."""
         session, edits, keys = self._session, self._seen, script_keys(course)
 
         def unwanted(running: frozenset[str]) -> bool:

@@ -2,10 +2,11 @@
 
 Entry point: `follow(session, watcher, progress)`, which a thread of its own runs.
 
-1. What one save of an editor comes to (an empty file that is written next, a new file that takes
-   the place of the old one) counts once: when nothing more happened for some milliseconds.
-2. Many files at once are a branch that is switched: there the wait is longer, but bounded.
-3. So it is for a document that is gone or empty, which it may be only for a moment.
+1. An editor may save in several steps: empty the file, then fill it; or write a new file, then put
+   it in the place of the old one. They count as one save, which is complete when nothing has
+   happened for some milliseconds.
+2. Many files at once, as when a branch is switched, are waited for longer.
+3. So is a file that is missing or empty, which it may be only between two steps.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ QUIET_MANY = 0.060
 QUIET_GONE = 0.100
 """The same where a file is not there or empty."""
 LONGEST = 0.250
-"""Seconds after which what there is counts, whatever still happens; with many files, four times."""
+"""Seconds after which a save is taken, whatever still happens; with many files, four times that."""
 
 
 def follow(session: Session, watcher: FolderWatcher, progress: Progress) -> None:

@@ -2,15 +2,15 @@
 
 Entry point: `PreviewServer`.
 
-1. Whom it answers `access` says. Without `--host` it listens on the loopback interface only.
+1. `access` decides who is answered. Without `--host` it listens on the loopback interface only.
 2. Files come from a `Session`, which decides what there is; nothing is read from disk here.
 3. Pages get one script and one style sheet more. The script listens to `/.coursebuild/events`:
-   `page` says which state of the page there is now, `news` what is to be said beside its text.
-   A listener is told how things stand when it begins, so that nothing is lost by one that was away.
-4. In the place of a published site's service worker there is one that goes: a browser may have met
+   `page` is a digest of the page as it is now, `news` what to say beside its text. Both are sent
+   whenever a page connects, so that one which was away misses nothing.
+4. A published site's service worker is replaced by one that removes itself: a browser may have seen
    such a site at this address before.
-5. What an author accepts in a page comes by `POST /.coursebuild/accept`, a place that is to be
-   opened in an editor by `POST /.coursebuild/open`.
+5. `POST /.coursebuild/accept` accepts an output, a figure or a number for the author;
+   `POST /.coursebuild/open` opens a place in the editor.
 """
 
 from __future__ import annotations
@@ -99,13 +99,13 @@ class PreviewServer(ThreadingHTTPServer):
         if changed.acquire(timeout=1.0):  # whoever holds it longer is no reason to wait
             changed.notify_all()
             changed.release()
-        if self._thread.ident is not None:  # otherwise nobody would hear of it
+        if self._thread.ident is not None:  # otherwise `shutdown` would wait forever
             self.shutdown()
         self.server_close()
 
 
 def _outer_address() -> list[str]:
-    """By what other machines reach this one, if they do; nothing is sent to find it."""
+    """The address at which other machines reach this one, if there is one; nothing is sent."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))
@@ -239,7 +239,7 @@ class _Handler(BaseHTTPRequestHandler):
                 return
             now = digest(session.find(page))
             if now != state:
-                state, news = now, None  # whoever takes the page is told again what belongs to it
+                state, news = now, None  # the news is sent again for the new page
                 self._tell("page", json.dumps(now))
             latest = page_news(session, page)
             if latest != news:

@@ -63,14 +63,14 @@ class Session:
         mapping with each change."""
         self.changed = threading.Condition(threading.RLock())
         self.version = 0
-        """Grows with everything that an open page may show."""
+        """Grows with each change of what an open page may show."""
         self.edits = 0
-        """Grows with everything that an author did."""
+        """Grows with each save."""
         self.calm = threading.Event()
         """Set as long as nobody is saving: background work makes room for a save."""
         self.calm.set()
         self.busy = "reading the course"
-        """What is still done in the background, in words; empty where everything is known."""
+        """What is being done in the background, in words; empty when all is done."""
         self.trouble = ""
         """Why background work could not be done, if it could not."""
         self._is_map_broken = False
@@ -80,7 +80,7 @@ class Session:
         """The course that was run last."""
         self.found_by_running: tuple[Diagnostic, ...] = ()
         self.all_due = True
-        """Whether more changed than documents, so that any script may do something else now."""
+        """Whether any script may print something new: files other than documents have changed."""
         self._documents = Documents(options.store, 1)
         self._reading = threading.Lock()
         """Held while documents are read: `Documents` knows one text of each."""
@@ -107,7 +107,7 @@ class Session:
             self.read(documents)
 
     def close(self) -> None:
-        """End what typesets formulas: a process that ends with it running may hang."""
+        """End what typesets formulas: with it running, the process may hang as it ends."""
         with self.changed:
             self._documents.close()
 
@@ -159,9 +159,9 @@ class Session:
     # --- the course
 
     def edit(self, paths: Collection[str], *, saved: bool = True) -> bool | None:
-        """Take saves of documents; whether anything is another now.
+        """Take saves of documents; whether anything has changed.
 
-        `None` where only reading everything tells. `saved`: if not, they are being typed, and
+        `None` where everything must be read to know. If not `saved`, they are being typed, and
         nothing runs yet.
         """
         with self._reading, self.changed:
@@ -182,7 +182,7 @@ class Session:
             return True
 
     def _saved(self, paths: Collection[str]) -> list[tuple[Owner, tuple[Diagnostic, ...]]] | None:
-        """The lessons and pages whose text is another now, and what is wrong in it by itself."""
+        """The lessons and pages whose text has changed, and what is wrong in it by itself."""
         if self.library is None or len(paths) > MOST:
             return None
         course = self.library.course
@@ -215,7 +215,7 @@ class Session:
         self.read()
 
     def read(self, documents: Documents | None = None, *, saved: bool = True) -> bool:
-        """Read the whole course; whether anything is another than it was thought to be.
+        """Read the whole course; whether anything has changed.
 
         `saved`: see `edit`.
         """
@@ -238,7 +238,7 @@ class Session:
                     return fresh
 
     def saved_course(self) -> Course | None:
-        """The course as it is on the disk, of which scripts run."""
+        """The course as it is on the disk, whose scripts are run."""
         texts = self.open_texts
         with self._reading:
             saved = read_sources(self.root, sorted(texts)).value
@@ -305,7 +305,7 @@ class Session:
         return {v.recording.script or "" for v in verdicts if v.status == "drift"}
 
     def known_runs(self, course: Course) -> dict[str, ScriptRun]:
-        """What a course's scripts did, by path; nothing where one is another than it was."""
+        """What a course's scripts did, by path; nothing where one has changed since."""
         with self.changed:
             same = script_keys(course) == self._ran
             return {run.path: run for run in self._results.runs} if same else {}

@@ -1,10 +1,9 @@
-"""Waiting for the author to save: changes of the course's files, as `watchfiles` tells of them.
+"""Watching the course's files, by `watchfiles`.
 
-Entry point: `FolderWatcher`. What reading a course leaves out (caches, editors' own files) is no
-change.
+Entry point: `FolderWatcher`. Caches and editors' own files do not count.
 
-The folders of the course are watched with all that is in them, also those that are made later.
-Pages may lie elsewhere (`docs/guide.md`, `README.md`): these files are looked at now and then.
+The course's folders are watched with everything in them, including folders that are made later.
+Pages may be elsewhere (`docs/guide.md`, `README.md`): these files are polled.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from coursebuild.core.files.errors import EffectError, reason
 
 FOLDERS = ("content", "features", "models", "mjcourse", "theme")
 LOOK = 0.200
-"""Seconds from one look for new and removed folders, and at files elsewhere, to the next."""
+"""Seconds between two looks for new and removed folders, and at files elsewhere."""
 _STEP = 2
-"""Milliseconds from one look for events to the next: a save is told of within two of them."""
+"""Milliseconds between two looks for events: a save is noticed within two of them."""
 
 
 class FolderWatcher:
@@ -90,8 +89,8 @@ class FolderWatcher:
         before: frozenset[str] | None = None
         while not self._stop.is_set():
             folders = self._folders()
-            # Told of once they are watched: a file may be put into a new one at any time, and into
-            # any while none was.
+            # Folders that are new, or were not watched for a moment, are told as changed once they
+            # are watched: files may have been put into them before.
             news = frozenset() if before is None else before | folders.keys()
             for changed in self._watch(tuple(self._root / f for f in folders)):
                 self._begun.set()

@@ -81,10 +81,7 @@ with open("a.svg", "w") as file:
         assert drawing["drawn"].startswith("data:image/svg+xml;base64,")
         assert data["name"] == "a.csv"
         for offered in (drawing, data):
-            body = json.dumps({"page": "lessons/1.1-one.html", "id": offered["offer"]}).encode()
-            origin = f"http://127.0.0.1:{preview.port}"
-            told = preview.accept(body, Origin=origin)
-            assert told == (200, {"message": ""})
+            assert preview.accept_offer(offered["offer"]) == (200, {"message": ""})
         events.settled()
         assert events.news["figures"] == []
     assert folder.text("content/lessons/a.csv") == "x\n1\n"
@@ -101,8 +98,7 @@ def test_what_changed_since_is_not_written(make: Make) -> None:
         folder.replace(folder.lesson(), "## Hello", "## Mine")
         mine = folder.read(folder.lesson())
         preview.process.send_signal(signal.SIGCONT)
-        body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
-        status, told = preview.accept(body, Origin=f"http://127.0.0.1:{preview.port}")
+        status, told = preview.accept_offer(id)
         assert status == 409
         assert told["message"] in (
             "content/lessons/1.1-one.md was changed in the meantime",
@@ -141,20 +137,14 @@ def test_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None
         "## Again\n\n`2.01 s`{out=examples/x.py} and `1.003`{out=examples/x.py}\n",
     )
     with serving(folder) as preview, preview.events() as events:
-        origin = f"http://127.0.0.1:{preview.port}"
-
-        def accept(id: str) -> None:
-            body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
-            assert preview.accept(body, Origin=origin) == (200, {"message": ""})
-
         events.until(lambda told: any(o.get("offer") for o in told.news["outputs"]))
         assert events.news["numbers"] == []  # what is recorded bears them out
-        accept(events.news["outputs"][0]["offer"])
+        assert preview.accept_offer(events.news["outputs"][0]["offer"]) == (200, {"message": ""})
         events.until(lambda told: bool(told.news["numbers"]))
         (number,) = events.news["numbers"]
         assert (number["text"], number["better"]) == ("2.006", "2.950")
         assert number["label"] == "2.95 is printed where 2.006 was"
-        accept(number["offer"])
+        assert preview.accept_offer(number["offer"]) == (200, {"message": ""})
         events.settled("binding-mismatch", "binding-mismatch")
         assert prose.replace("2.006", "2.950") in folder.text(folder.lesson())
         assert [problem["label"] for problem in events.news["problems"]] == [

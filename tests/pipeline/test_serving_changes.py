@@ -89,20 +89,10 @@ def test_terminal_tells_what_is_new_and_what_is_gone(make: Make) -> None:
             assert len(gone) == {"2 errors (1 new, 1 gone)": 1, "everything holds": 2}.get(said, 0)
 
 
-SAVES: dict[str, Callable[[Path, str], None]] = {}
-
-
-def saver(function: Callable[[Path, str], None]) -> Callable[[Path, str], None]:
-    SAVES[function.__name__] = function
-    return function
-
-
-@saver
 def in_place(path: Path, text: str) -> None:
     path.write_text(text)
 
 
-@saver
 def in_pieces(path: Path, text: str) -> None:
     """Emptied first, then written bit by bit."""
     with path.open("w") as file:
@@ -112,7 +102,6 @@ def in_pieces(path: Path, text: str) -> None:
             file.flush()
 
 
-@saver
 def with_a_backup(path: Path, text: str) -> None:
     """vim: the old file is moved away, a new one is written, the old one is removed."""
     backup = path.with_name(path.name + "~")
@@ -121,17 +110,18 @@ def with_a_backup(path: Path, text: str) -> None:
     backup.unlink()
 
 
-@saver
 def by_renaming(path: Path, text: str) -> None:
     fresh = path.with_name(f".#{path.name}.new")
     fresh.write_text(text)
     fresh.replace(path)
 
 
-@saver
 def gone_for_a_moment(path: Path, text: str) -> None:
     path.unlink()
     path.write_text(text)
+
+
+SAVES = (in_place, in_pieces, with_a_backup, by_renaming, gone_for_a_moment)
 
 
 def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make) -> None:
@@ -141,7 +131,8 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
         folder.write(path, '<svg xmlns="http://www.w3.org/2000/svg"/>')
     with serving(folder, code=PATIENT) as preview, preview.events() as events:
         events.settled()
-        for name, save in SAVES.items():
+        for save in SAVES:
+            name = save.__name__
             state, before = events.state, len(preview.said)
             save(folder.root / folder.lesson(), GOOD.replace("## Hello", f"## {name}"))
             events.until(lambda told, state=state: told.state != state)  # type: ignore[misc]

@@ -85,6 +85,11 @@ class Preview:
         status, _, data = self.get(f"{PREFIX}accept", "POST", body, **headers)
         return status, json.loads(data) if data.startswith(b"{") else data.decode()
 
+    def accept_offer(self, id: str) -> tuple[int, Any]:
+        """What the server says when the first lesson's page accepts an offer."""
+        body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
+        return self.accept(body, Origin=f"http://127.0.0.1:{self.port}")
+
     @contextlib.contextmanager
     def events(self, page: str = "lessons/1.1-one.html") -> Iterator[Events]:
         """What an open page is told."""

@@ -1,4 +1,4 @@
-"""A course's own look: what its map says of it, with the files that it names.
+"""The look of a course's site: what `[theme]` in its map says, with the files that it names.
 
 Entry point: `Theme`.
 """
@@ -48,7 +48,7 @@ class Accent(Struct, frozen=True):
 
 
 class Theme(Struct, frozen=True):
-    """All of it; what it does not have is that of the tool."""
+    """Logo, icons, colours, style sheets, fonts and templates; the tool's where there is none."""
 
     logo: ThemeFile | None = None
     logo_dark: ThemeFile | None = None

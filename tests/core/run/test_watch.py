@@ -127,20 +127,18 @@ def test_folders_that_go_and_come_back(root: Path, saves: FolderWatcher) -> None
     told_of_a_save(root, saves, LESSON)
 
 
-def test_another_folder_in_the_place_of_one(root: Path, saves: FolderWatcher) -> None:
-    shutil.copytree(root / "content", root / "new")
-    (root / "content").rename(root / "old")
-    (root / "new").rename(root / "content")
-    told(saves, {"content"})
-    told_of_a_save(root, saves, LESSON)
-
-
-def test_another_folder_elsewhere_in_the_place_of_one(root: Path, saves: FolderWatcher) -> None:
-    shutil.copytree(root / "docs", root / "new")
-    (root / "docs").rename(root / "old")
-    (root / "new").rename(root / "docs")
-    told(saves, {"docs/guide.md"})
-    told_of_a_save(root, saves, "docs/guide.md")
+@pytest.mark.parametrize(
+    ("folder", "news", "file"),
+    [("content", "content", LESSON), ("docs", "docs/guide.md", "docs/guide.md")],
+)
+def test_another_folder_in_the_place_of_one(
+    root: Path, saves: FolderWatcher, folder: str, news: str, file: str
+) -> None:
+    shutil.copytree(root / folder, root / "new")
+    (root / folder).rename(root / "old")
+    (root / "new").rename(root / folder)
+    told(saves, {news})
+    told_of_a_save(root, saves, file)
 
 
 def test_a_file_elsewhere_that_is_asked_for_later(root: Path, saves: FolderWatcher) -> None:
