@@ -7,7 +7,7 @@ Entry point: `Files`.
 2. A page that shows something else since is drawn when it is asked for. One whose document has a
    mistake stays as it was.
 
-Nothing here is locked, but for `make`: whoever calls sees to that.
+Callers hold the session's lock, but for `make`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class ServedPage(Struct, frozen=True):
     """The text of a page, and what it was made from."""
 
     frame: PageFrame
-    """Others where the course or what pages share is another."""
+    """Another one after each change of the course or of what pages share."""
     key: str
     page: DrawnPage
     text: bytes
@@ -81,12 +81,10 @@ class Files:
         if self._sites:
             self._set_frame()
         else:  # whatever characters pages will have
-            self._serve(self._maker(library).made((), whole_fonts=True))
+            self.serve(self._maker(library).made((), whole_fonts=True))
 
-    def make(
-        self, library: Library, broken: Collection[str], pause: Callable[[], None]
-    ) -> Callable[[], None]:
-        """All files of a site, and gives what serves them.
+    def make(self, library: Library, broken: Collection[str], pause: Callable[[], None]) -> Site:
+        """All files of a site.
 
         `broken` are paths of pages whose documents have mistakes. `pause` is called between pages.
         """
@@ -98,13 +96,13 @@ class Files:
                     pause()
                     yield entry
 
-        site = self._maker(library).made(entries(), last_good)
-        return lambda: self._serve(site)
+        return self._maker(library).made(entries(), last_good)
 
     def _maker(self, library: Library) -> SiteMaker:
         return SiteMaker(library, self._assets, self._documents, self._options)
 
-    def _serve(self, site: Site) -> None:
+    def serve(self, site: Site) -> None:
+        """Have the files of this site from now on."""
         files = {file.path: file for file in site.files}
         self._sites = [*self._sites[1 - _SITES :], (site, files)]
         self._last_good |= {p: key for p, key in site.keys.items() if p in self._entries}
@@ -115,7 +113,7 @@ class Files:
         assert self._library is not None and names is not None
         self._frame = PageFrame(self._library, names)
 
-    # --- what may be asked
+    # --- what there is
 
     @property
     def paths(self) -> tuple[str, ...]:

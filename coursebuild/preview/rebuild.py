@@ -111,8 +111,7 @@ class BackgroundRebuild:
             began = time.monotonic()
             while time.monotonic() < began + LONGEST:
                 edits = session.edits
-                session.changed.wait_for(lambda edits=edits: session.edits != edits, QUIET)  # type: ignore[misc]
-                if session.edits == edits:
+                if not session.changed.wait_for(lambda edits=edits: session.edits != edits, QUIET):  # type: ignore[misc]
                     return
 
     def once(self) -> None:

@@ -111,7 +111,7 @@ class Session:
         with self.changed:
             self._documents.close()
 
-    # --- what may be asked
+    # --- what is known
 
     @property
     def course(self) -> Course | None:
@@ -336,12 +336,12 @@ class Session:
             wrong = {path for path, found in self._static.items() if has_errors(found)}
             broken = {urls.owner_path(o) for o in owners(library.course) if o.path in wrong}
         try:
-            serve = self.files.make(library, broken, pause)
+            site = self.files.make(library, broken, pause)
         except TemplateFailure as failure:
             self._fail(failure)
             return
         with self.changed:
-            serve()
+            self.files.serve(site)
             self.tell()
 
     # --- files

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -73,34 +73,40 @@ def texts(page: Page, text: str) -> None:
 LESSON = "lessons/1.1-one.html"
 
 
-def test_what_the_author_did_not_touch_stays_as_it_is(make: Make, browser: Browser) -> None:
-    folder = make(RICH)
+@contextlib.contextmanager
+def lesson_page(folder: Folder, browser: Browser) -> Iterator[Page]:
+    """The page of a lesson, which stays the same document, with nothing that goes wrong in it."""
     with serving(folder) as preview:
         preview.heard("checked: ")
         with Open(browser, preview, LESSON) as opened:
-            page = opened.page
-            hint = page.locator("details.hint")
-            hint.locator("summary").click()
-            page.get_by_role("button", name="Copy").focus()
-            marked = page.locator("h2, .script, .hint, math").evaluate_all(
-                "elements => elements.map((element) => (element.mine = true)).length"
-            )
-            page.evaluate(
-                """() => {
-                  const text = document.querySelector('em').firstChild
-                  getSelection().setBaseAndExtent(text, 1, text, 5)
-                }"""
-            )
-            folder.replace(folder.lesson(), "Paragraph 3.", "Paragraph three, with $y$.")
-            texts(page, "Paragraph three")
-            expect(hint).to_have_attribute("open", "")
-            expect(page.get_by_role("button", name="Copy")).to_be_focused()
-            comes(page, lambda: page.evaluate("String(getSelection())") == "mpha")
-            kept = page.locator("h2, .script, .hint, math").evaluate_all(
-                "elements => elements.filter((element) => element.mine).length"
-            )
-            assert kept == marked
+            yield opened.page
             opened.unbroken()
+
+
+def test_what_the_author_did_not_touch_stays_as_it_is(make: Make, browser: Browser) -> None:
+    folder = make(RICH)
+    with lesson_page(folder, browser) as page:
+        hint = page.locator("details.hint")
+        hint.locator("summary").click()
+        page.get_by_role("button", name="Copy").focus()
+        marked = page.locator("h2, .script, .hint, math").evaluate_all(
+            "elements => elements.map((element) => (element.mine = true)).length"
+        )
+        page.evaluate(
+            """() => {
+              const text = document.querySelector('em').firstChild
+              getSelection().setBaseAndExtent(text, 1, text, 5)
+            }"""
+        )
+        folder.replace(folder.lesson(), "Paragraph 3.", "Paragraph three, with $y$.")
+        texts(page, "Paragraph three")
+        expect(hint).to_have_attribute("open", "")
+        expect(page.get_by_role("button", name="Copy")).to_be_focused()
+        comes(page, lambda: page.evaluate("String(getSelection())") == "mpha")
+        kept = page.locator("h2, .script, .hint, math").evaluate_all(
+            "elements => elements.filter((element) => element.mine).length"
+        )
+        assert kept == marked
 
 
 def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
@@ -150,23 +156,19 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
 
 def test_the_reader_stays_where_they_were(make: Make, browser: Browser) -> None:
     folder = make(RICH)
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, LESSON) as opened:
-            page = opened.page
-            place = page.locator("p", has_text="Paragraph 40.")
-            place.scroll_into_view_if_needed()
-            top = "element => element.getBoundingClientRect().top"
-            before = place.evaluate(top)
-            folder.replace(folder.lesson(), "## Quiz\n", f"{'Much more. ' * 400}\n\n## Quiz\n")
-            texts(page, "Much more.")
-            expect(page.locator("html")).to_have_css("overflow-anchor", "auto")
-            comes(page, lambda: abs(place.evaluate(top) - before) < 1)
-            folder.replace(folder.lesson(), "Paragraph 12.", "New above.\n\nParagraph 12.")
-            texts(page, "New above.")
-            expect(page.locator("html")).to_have_css("overflow-anchor", "auto")
-            comes(page, lambda: abs(place.evaluate(top) - before) < 1)
-            opened.unbroken()
+    with lesson_page(folder, browser) as page:
+        place = page.locator("p", has_text="Paragraph 40.")
+        place.scroll_into_view_if_needed()
+        top = "element => element.getBoundingClientRect().top"
+        before = place.evaluate(top)
+        folder.replace(folder.lesson(), "## Quiz\n", f"{'Much more. ' * 400}\n\n## Quiz\n")
+        texts(page, "Much more.")
+        expect(page.locator("html")).to_have_css("overflow-anchor", "auto")
+        comes(page, lambda: abs(place.evaluate(top) - before) < 1)
+        folder.replace(folder.lesson(), "Paragraph 12.", "New above.\n\nParagraph 12.")
+        texts(page, "New above.")
+        expect(page.locator("html")).to_have_css("overflow-anchor", "auto")
+        comes(page, lambda: abs(place.evaluate(top) - before) < 1)
 
 
 def test_mistakes_are_shown_and_clear_by_themselves(
@@ -228,34 +230,30 @@ def test_mistakes_are_shown_and_clear_by_themselves(
 
 def test_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) -> None:
     folder = make(GOOD + "About `3.14`{out}.\n")
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, LESSON) as opened:
-            page = opened.page
-            output = page.locator(".output")
-            expect(output.locator(".receipt")).to_have_class("receipt verified")
-            folder.replace(folder.lesson(), 'print("hello", 3.14159)', 'print("hello", 2.71828)')
-            box = output.get_by_role("group", name="Recorded output, and this run")
-            see(box)
-            expect(box.locator("del")).to_have_text("hello 3.14159")
-            expect(box.locator("ins")).to_have_text("hello 2.71828")
-            expect(box.locator("del mark")).to_have_text("3.14159")
-            expect(box.locator(".preview-row .preview-sign")).to_have_text(["−", "+"])
-            expect(output.locator("> pre")).to_be_hidden()
-            expect(page.get_by_role("region", name="Problems")).to_have_count(0)
-            page.get_by_role("button", name="Accept this output").click()
-            # Now the number in the prose is the one that does not hold.
-            number = page.get_by_role("group", name="A bound number that does not hold")
-            see(number)
-            expect(number.locator("ins")).to_have_text("2.72")
-            expect(box).to_have_count(0)
-            expect(output.locator(".receipt")).to_have_class("receipt verified")
-            expect(output.locator("samp")).to_contain_text("hello 2.71828")
-            number.get_by_role("button", name="Accept").click()
-            expect(number).to_have_count(0)
-            expect(page.locator(".bound")).to_have_text("2.72")
-            expect(page.locator(".preview-button")).to_be_hidden()
-            opened.unbroken()
+    with lesson_page(folder, browser) as page:
+        output = page.locator(".output")
+        expect(output.locator(".receipt")).to_have_class("receipt verified")
+        folder.replace(folder.lesson(), 'print("hello", 3.14159)', 'print("hello", 2.71828)')
+        box = output.get_by_role("group", name="Recorded output, and this run")
+        see(box)
+        expect(box.locator("del")).to_have_text("hello 3.14159")
+        expect(box.locator("ins")).to_have_text("hello 2.71828")
+        expect(box.locator("del mark")).to_have_text("3.14159")
+        expect(box.locator(".preview-row .preview-sign")).to_have_text(["−", "+"])
+        expect(output.locator("> pre")).to_be_hidden()
+        expect(page.get_by_role("region", name="Problems")).to_have_count(0)
+        page.get_by_role("button", name="Accept this output").click()
+        # Now the number in the prose is the one that does not hold.
+        number = page.get_by_role("group", name="A bound number that does not hold")
+        see(number)
+        expect(number.locator("ins")).to_have_text("2.72")
+        expect(box).to_have_count(0)
+        expect(output.locator(".receipt")).to_have_class("receipt verified")
+        expect(output.locator("samp")).to_contain_text("hello 2.71828")
+        number.get_by_role("button", name="Accept").click()
+        expect(number).to_have_count(0)
+        expect(page.locator(".bound")).to_have_text("2.72")
+        expect(page.locator(".preview-button")).to_be_hidden()
         text = GOOD.replace("3.14159", "2.71828") + "About `2.72`{out}.\n"
         assert folder.text(folder.lesson()) == text
 
@@ -275,50 +273,43 @@ with open("b.png", "wb") as file:
     drawn = block("a.py", code, info="figure=a.svg,a.csv,b.png")
     folder = make(f"## A\n\n{drawn}Figure: ![A line](a.svg)\n\nFigure: ![A box](b.png)\n")
     assert folder.run("update").status == 0
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, LESSON) as opened:
-            page = opened.page
-            folder.write(folder.lesson(), folder.text(folder.lesson()).replace("50", "40"))
-            for name in ("A line", "A box"):
-                shown = page.locator("figure.figure", has=page.get_by_alt_text(name, exact=True))
-                box = shown.get_by_role("group", name="Recorded figure, and this run").first
-                see(box)
-                see(box.get_by_alt_text(f"{name} (recorded)"))
-                see(box.get_by_alt_text(f"{name} (this run)"))
-                expect(shown.locator("> img").first).to_be_hidden()
-            expect(page.get_by_role("region", name="Problems")).to_have_count(0)
-            sizes = "images => images.map((one) => one.naturalWidth)"
-            assert box.locator("img").evaluate_all(sizes) == [50, 40]
-            for count in (2, 1, 0):
-                accept = page.get_by_role("button", name=re.compile("^Accept th"))
-                expect(accept).to_have_count(count + 1)
-                accept.first.click()
-            expect(page.locator(".preview-drift")).to_have_count(0)
-            see(page.get_by_alt_text("A box", exact=True))
-            assert page.get_by_alt_text("A box", exact=True).evaluate_all(sizes) == [40]
-            expect(page.locator(".preview-button")).to_be_hidden()
-            opened.unbroken()
+    with lesson_page(folder, browser) as page:
+        folder.write(folder.lesson(), folder.text(folder.lesson()).replace("50", "40"))
+        for name in ("A line", "A box"):
+            shown = page.locator("figure.figure", has=page.get_by_alt_text(name, exact=True))
+            box = shown.get_by_role("group", name="Recorded figure, and this run").first
+            see(box)
+            see(box.get_by_alt_text(f"{name} (recorded)"))
+            see(box.get_by_alt_text(f"{name} (this run)"))
+            expect(shown.locator("> img").first).to_be_hidden()
+        expect(page.get_by_role("region", name="Problems")).to_have_count(0)
+        sizes = "images => images.map((one) => one.naturalWidth)"
+        assert box.locator("img").evaluate_all(sizes) == [50, 40]
+        for count in (2, 1, 0):
+            accept = page.get_by_role("button", name=re.compile("^Accept th"))
+            expect(accept).to_have_count(count + 1)
+            accept.first.click()
+        expect(page.locator(".preview-drift")).to_have_count(0)
+        see(page.get_by_alt_text("A box", exact=True))
+        assert page.get_by_alt_text("A box", exact=True).evaluate_all(sizes) == [40]
+        expect(page.locator(".preview-button")).to_be_hidden()
         assert "H40" in folder.text("content/lessons/a.svg")
         assert folder.text("content/lessons/a.csv") == "end\n40\n"
 
 
 def test_script_that_runs_and_fails_is_marked(make: Make, browser: Browser) -> None:
     folder = make(GOOD)
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, LESSON) as opened:
-            slow = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)"
-            folder.replace(folder.lesson(), 'print("hello"', f'{slow}\nprint("hello"')
-            mark = opened.page.locator(".output").get_by_role("status")
-            expect(mark).to_have_text("The script is running.")
-            folder.write("go", "")
-            expect(mark).to_have_count(0)
-            folder.replace(folder.lesson(), "print(", "raise ValueError('no')\nprint(")
-            expect(mark).to_have_text("The script failed.")
-            panel = opened.page.get_by_role("region", name="Problems")
-            expect(panel).to_contain_text("ValueError: no")
-            opened.unbroken()
+    with lesson_page(folder, browser) as page:
+        slow = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)"
+        folder.replace(folder.lesson(), 'print("hello"', f'{slow}\nprint("hello"')
+        mark = page.locator(".output").get_by_role("status")
+        expect(mark).to_have_text("The script is running.")
+        folder.write("go", "")
+        expect(mark).to_have_count(0)
+        folder.replace(folder.lesson(), "print(", "raise ValueError('no')\nprint(")
+        expect(mark).to_have_text("The script failed.")
+        panel = page.get_by_role("region", name="Problems")
+        expect(panel).to_contain_text("ValueError: no")
 
 
 def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
