@@ -43,7 +43,7 @@ def differences() -> dict[int, str]:
 
 def rendered(markdown: str) -> str:
     source = Source("spec.md", markdown)
-    return str(plain_html(parse_document(source, frozenset(), lesson=False).value))
+    return str(plain_html(parse_document(source, frozenset(), lesson=True).value))
 
 
 def test_all_examples_are_read(examples: list[Example]) -> None:

@@ -39,9 +39,9 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     asked: list[str] = []
     real = mjcf.compile_all
 
-    def compile(root: Path, texts: list[tuple[str, str]]) -> object:
+    def compile(root: Path, texts: list[tuple[str, str]], **limits: int) -> object:
         asked.extend(text if path == mjcf.TEXT_PATH else Path(path).stem for path, text in texts)
-        return real(root, texts)
+        return real(root, texts, **limits)
 
     monkeypatch.setattr(mjcf, "compile_all", compile)
     return asked

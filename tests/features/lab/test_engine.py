@@ -191,7 +191,8 @@ def test_stopped_before_it_began(bench: Bench) -> None:
 
 def test_an_interrupt_ends_a_trial_and_the_process() -> None:
     code = (
-        "import sys; sys.path.insert(0, 'tests')\n"
+        "import atexit, gc, sys; sys.path.insert(0, 'tests')\n"
+        "atexit.register(gc.freeze)\n"  # as commands do
         "from pathlib import Path\n"
         "from support.lab_values import *\n"
         "bench = Bench(Path('.'))\n"

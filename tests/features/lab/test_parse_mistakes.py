@@ -107,14 +107,14 @@ GOAL = CLAIM.replace('"expect": [{%s}]', '"goal": {"text": "Up", "expr": "up", %
         (LAB % '"readouts": [{"label": "a", "expr": "b", "digits": 99}]',
          "2:67-69 field-value: `digits` must be at most 15, not 99"),
         (LAB % '"plots": [{"traces": []}]', "2:37-38 field-value: `traces` is empty"),
-        (LAB % '"plots": [{}]', "2:26-27 field-missing: `traces` is missing"),
+        (LAB % '"plots": [{}]', "2:26-27 field-missing: `traces` is missing [`traces`: its lines]"),
         (LAB % '"plots": [{"ymin": 1, "ymax": 1, "traces": [{"label": "a", "expr": "b"}]}]',
          "2:46-47 field-value: `ymax` must be greater than `ymin`, which is 1"),
         (LAB % '"plots": [{"traces": [{"label": "a", "expr": "b", "dash": "x"}]}]',
          "2:74-77 field-type: `dash` must be `true` or `false` or an array of numbers,"
          " not a string"),
         (LAB % '"plots": [{"refLines": [{"label": "a"}], "traces":'
-         ' [{"label": "a", "expr": "b"}]}]', "2:40-41 field-missing: `y` is missing"),
+         ' [{"label": "a", "expr": "b"}]}]', "2:40-41 field-missing: `y` is missing [`y`: its height]"),
         # claims
         (CLAIM % '"expr": "1", "min": 1',
          "3:12-13 field-missing: `t` is missing [`t`: simulated time in seconds]"),

@@ -57,7 +57,7 @@ class Context:
 
 
 def read(markdown: str) -> Document:
-    return parse_document(Source("a.md", markdown), frozenset({"note"}), lesson=False).value
+    return parse_document(Source("a.md", markdown), frozenset({"note"}), lesson=True).value
 
 
 def written(markdown: str) -> str:
