@@ -52,7 +52,7 @@ _BATCH_SECONDS = 20.0
 _SINGLE_SECONDS = 5.0
 _LONGEST_MESSAGE = 160
 _LOOK = 1.0
-"""Seconds between two looks at the heartbeat of a script."""
+"""Seconds between two looks at whether a script gets on."""
 _SLOWEST = 10.0
 """How many times longer than on an idle machine a script may take before it is ended."""
 
@@ -101,12 +101,12 @@ def _missing(error: Exception) -> EffectError:
 
 
 class Heartbeat(NamedTuple):
-    """How a script that is at work shows it."""
+    """What shows from outside that a script gets on."""
 
     beats: memoryview
     """Bytes that it changes."""
     patience: float
-    """Seconds for which they may stay the same."""
+    """Seconds for which they may stay as they are."""
 
 
 class Isolate:
@@ -147,16 +147,16 @@ class Isolate:
                 self._running.cancel()
 
     def call(
-        self, function: str, argument: str, seconds: float, heartbeat: Heartbeat | None = None
+        self, function: str, argument: str, seconds: float, progress: Heartbeat | None = None
     ) -> str:
         """Call a global function from string to string.
 
         Raises:
-            LimitError: it ran for more than `seconds`, or too long without a heartbeat, or took too
+            LimitError: it ran for more than `seconds`, or too long without progress, or took too
                 much memory.
             ScriptError: it threw.
         """
-        result = self._evaluate(f"{function}({json.dumps(argument)})", seconds, heartbeat)
+        result = self._evaluate(f"{function}({json.dumps(argument)})", seconds, progress)
         if not isinstance(result, str):
             raise TypeError(f"{function} returned no string")
         return result
@@ -173,13 +173,13 @@ class Isolate:
         assert isinstance(place, memoryview)
         place[:] = data
 
-    def _evaluate(self, code: str, seconds: float, heartbeat: Heartbeat | None = None) -> object:
+    def _evaluate(self, code: str, seconds: float, progress: Heartbeat | None = None) -> object:
         from py_mini_racer import JSEvalException, JSOOMException
 
         with self._lock:
             if self._is_stopped:
                 raise StoppedError
-            self._running = running = self._submit(self._in_time(code, seconds, heartbeat))
+            self._running = running = self._submit(self._in_time(code, seconds, progress))
         try:
             return running.result()
         except CancelledError:
@@ -195,22 +195,21 @@ class Isolate:
     def _submit(self, work: Coroutine[Any, Any, Any]) -> Future[Any]:
         return asyncio.run_coroutine_threadsafe(work, self._loop)
 
-    async def _in_time(self, code: str, seconds: float, heartbeat: Heartbeat | None) -> object:
+    async def _in_time(self, code: str, seconds: float, progress: Heartbeat | None) -> object:
         """The value of a script, in the loop's thread.
 
         Processor time is what counts, since other work on this machine must not end a good script;
         no more of it than has passed, as other threads of this process take some too.
         """
-        beats, patience = heartbeat or (b"", seconds)
         task = asyncio.ensure_future(self._racer.eval_cancelable(code))
         began, began_work = time.monotonic(), time.process_time()
         try:
-            spent, limit = 0.0, seconds
-            seen: bytes | None = None
+            spent, seen, limit = 0.0, b"", seconds
             while spent < limit:
-                if seen != (now := bytes(beats)):
-                    limit, seen = min(seconds, spent + patience), now
-                done, _ = await asyncio.wait((task,), timeout=min(max(limit - spent, 0.01), _LOOK))
+                if progress is not None and seen != (now := bytes(progress.beats)):
+                    seen, limit = now, min(seconds, spent + progress.patience)
+                left = min(limit - spent, _LOOK if progress is not None else seconds)
+                done, _ = await asyncio.wait((task,), timeout=max(left, 0.01))
                 if done:
                     return task.result()
                 passed = time.monotonic() - began
@@ -219,7 +218,8 @@ class Isolate:
             task.cancel()
         # Where the script came to its own end just now, V8 would end the next one in its place.
         await asyncio.gather(task, self._racer.eval_cancelable("0"), return_exceptions=True)
-        raise LimitError(f"ran for more than {min(seconds, patience):g} s")
+        held = seconds if progress is None else min(seconds, progress.patience)
+        raise LimitError(f"ran for more than {held:g} s")
 
 
 @contextlib.contextmanager

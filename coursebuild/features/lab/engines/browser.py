@@ -94,8 +94,8 @@ class LabEngine:
         isolate = self._ready()
         try:
             isolate.fill("mjb", mjb)
-            heartbeat = Heartbeat(isolate.buffer("beats"), self._patience)
-            text = isolate.call("trial", json.dumps(request), seconds, heartbeat)
+            progress = Heartbeat(isolate.buffer("beats"), self._patience)
+            text = isolate.call("trial", json.dumps(request), seconds, progress)
         except LimitError as error:
             return self._ended(isolate, "timeout", str(error))
         except ScriptError as error:  # lab code has broken what all share
