@@ -138,7 +138,9 @@ class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     text: Annotated[
         int, Meta(ge=1, le=100_000_000, description="characters of a lesson or page")
     ] = 250_000
-    scripts: Annotated[int, Meta(ge=1, le=1 << 20, description="MiB that a script may take")] = 16384
+    scripts: Annotated[int, Meta(ge=1, le=1 << 20, description="MiB that a script may take")] = (
+        16_384
+    )
     memory: Annotated[
         int, Meta(ge=1, le=1 << 20, description="MiB for compiling a model, and for trying a lab")
     ] = 1024

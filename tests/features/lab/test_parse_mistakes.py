@@ -114,7 +114,8 @@ GOAL = CLAIM.replace('"expect": [{%s}]', '"goal": {"text": "Up", "expr": "up", %
          "2:74-77 field-type: `dash` must be `true` or `false` or an array of numbers,"
          " not a string"),
         (LAB % '"plots": [{"refLines": [{"label": "a"}], "traces":'
-         ' [{"label": "a", "expr": "b"}]}]', "2:40-41 field-missing: `y` is missing [`y`: its height]"),
+         ' [{"label": "a", "expr": "b"}]}]',
+         "2:40-41 field-missing: `y` is missing [`y`: its height]"),
         # claims
         (CLAIM % '"expr": "1", "min": 1',
          "3:12-13 field-missing: `t` is missing [`t`: simulated time in seconds]"),
