@@ -194,6 +194,8 @@ def test_damaged_storage_is_put_aside_and_can_be_saved(
     page.evaluate("key => localStorage.setItem(key, '{\"coursebuild\"')", KEY)
     page.goto(site + PUSH_PAGE)
     page.get_by_role("button", name="Mark as read").click()
+    status = page.locator('[data-progress="lesson"]').get_by_role("status")
+    expect(status).to_have_text("You have read this lesson.")
     page.goto(site + "progress/")
     expect(page.locator('[data-progress="overall"]')).to_contain_text("1 of 3 lessons")
     part = page.locator(".aside-part")

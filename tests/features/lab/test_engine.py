@@ -99,23 +99,26 @@ def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
         assert told(bench.trial(make_lab())) == []
 
 
-def test_what_lab_code_may_do_to_the_engine(shared: Bench) -> None:
-    for code in (
-        "ctx.all = []; for (;;) ctx.all.push(new mj.DoubleBuffer(5000000))",
-        "ctx.all = []; for (;;) ctx.all.push(new ArrayBuffer(100000000))",
-        "(function f() { return f() + 1 })()",
-        "ctx.s = 'x'; for (;;) ctx.s += ctx.s",
-        "throw null",
-        "throw {toString() { throw 1 }}",
-        "Promise.reject(1); null.x",
-        "mj.MjModel.from_xml_string('<mujoco')",
-        "model.delete()",
-    ):
-        reply = shared.trial(make_lab(setup=code), seconds=300.0)
-        assert reply["main"] is None, code
-        kinds = {failure["kind"] for failure in reply["failures"]}
-        assert kinds and kinds <= {"throws", "engine"}, code
-        assert told(shared.trial(make_lab())) == [], code
+def test_what_lab_code_may_do_to_the_engine(tmp_path: Path) -> None:
+    # A busy machine may need longer than the usual patience to fill the memory.
+    bench = Bench(tmp_path, LabEngine(patience=300.0))
+    with bench.browser, bench.native:
+        for code in (
+            "ctx.all = []; for (;;) ctx.all.push(new mj.DoubleBuffer(5000000))",
+            "ctx.all = []; for (;;) ctx.all.push(new ArrayBuffer(100000000))",
+            "(function f() { return f() + 1 })()",
+            "ctx.s = 'x'; for (;;) ctx.s += ctx.s",
+            "throw null",
+            "throw {toString() { throw 1 }}",
+            "Promise.reject(1); null.x",
+            "mj.MjModel.from_xml_string('<mujoco')",
+            "model.delete()",
+        ):
+            reply = bench.trial(make_lab(setup=code), seconds=300.0)
+            assert reply["main"] is None, code
+            kinds = {failure["kind"] for failure in reply["failures"]}
+            assert kinds and kinds <= {"throws", "engine"}, code
+            assert told(bench.trial(make_lab())) == [], code
 
 
 def test_code_that_changes_what_all_share(shared: Bench) -> None:
