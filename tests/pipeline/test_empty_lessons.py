@@ -11,34 +11,6 @@ from support.scratch_course import GOOD, Folder
 pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
-NOTHING = {
-    "no bytes": b"",
-    "blanks": b" \n\t\n",
-    "other blanks": "\u00a0\n\u2003".encode(),
-    "a mark": b"\xef\xbb\xbf",
-    "a mark and a line end": b"\xef\xbb\xbf\r\n",
-    "comments": b"<!-- soon -->\n\n<!-- or\n\nlater -->\n",
-    "where links lead": b"[there]: https://example.org\n",
-}
-
-
-def test_complete_lesson_with_nothing_to_read_is_told_and_not_published(make: Make) -> None:
-    folder = make(GOOD, *NOTHING.values())
-    done = folder.main("build")
-    assert done.status == 1
-    for number, kind in enumerate(NOTHING, 2):
-        path = folder.lesson(number)
-        assert (
-            f"error[lesson-empty]: lesson 1.{number} is complete, and there is nothing to read in "
-            f"{path}\n  --> {path}:1:1\n"
-        ) in done.out, kind
-    help = (
-        '= help: write it, say `status = "draft"` in the map, '
-        'or say `status = "planned"` and remove the file\n'
-    )
-    assert done.out.count(help) == len(NOTHING)
-    assert done.out.endswith(f": {len(NOTHING)} errors\n")
-    assert not (folder.root / "public").exists()
 
 
 def test_what_counts_as_something_to_read(make: Make) -> None:
@@ -47,7 +19,13 @@ def test_what_counts_as_something_to_read(make: Make) -> None:
     done = folder.main("check")
     assert done.status == 0, done.out
     # Nobody else looks at prose, and what was found wrong is remembered.
-    for text, status in (("", 1), ("Other prose.\n", 0), ("<!-- x -->\n", 1)):
+    for text, status in (
+        ("", 1),
+        ("Other prose.\n", 0),
+        ("<!-- x -->\n\n<!-- y\n\nz -->\n", 1),
+        ("\u00a0\n\u2003", 1),
+        ("[there]: https://example.org\n", 1),
+    ):
         folder.write(folder.lesson(2), text)
         done = folder.main("check")
         assert (done.status, "error[lesson-empty]" in done.out) == (status, status == 1)

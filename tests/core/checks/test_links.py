@@ -72,20 +72,6 @@ def test_mentions_are_links_wherever_they_stand(text: str, expected: list[str]) 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("![a](plot.svg)\n", []),
-        ("![a](nope.svg)\n", ["link-file: nope.svg"]),
-        ("![a](https://example.org/a.png)\n", ["image-remote: https://example.org/a.png"]),
-        ("![a](//example.org/a.png)\n", ["image-remote: //example.org/a.png"]),
-        ("![a](//[)\n", ["image-remote: //["]),
-    ],
-)
-def test_images_are_files_of_the_course(text: str, expected: list[str]) -> None:
-    assert findings(text) == expected
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
         ('See <a href="#nowhere">it</a>.\n', ["link-anchor: #nowhere"]),
         ("<p>See <a class=x HREF=#nowhere>it</a></p>\n", ["link-anchor: #nowhere"]),
         ('<a id="here"></a> <a href="#here">it</a> [b](#here)\n', []),
@@ -144,11 +130,6 @@ def test_what_is_said_of_a_link_fits_why_it_leads_nowhere(text: str, message: st
     files = ["content/lessons/plot.svg"]
     course = make_course(text, SCRIPT, models={"box": BOX}, files=files)
     assert said(check_course(course)) == [message]
-
-
-def test_a_course_without_files_says_where_they_would_lie() -> None:
-    (found,) = check_course(make_course("![a](plot.svg)\n"))
-    assert found.help == "files that pages may use lie in content/"
 
 
 def test_declared_scenarios_have_anchors_on_the_page_of_their_model() -> None:

@@ -30,29 +30,9 @@ def ran(stdout: str, outcome: Outcome = Outcome.OK) -> ScriptRun:
     return ScriptRun("examples/x.py", outcome, 0, stdout, "", 0.0)
 
 
-def test_an_id_that_two_lessons_use_is_told_at_the_second() -> None:
-    (found,) = check_course(make_course(quiz("q"), quiz("p") + "\n" + quiz("q")))
-    assert (found.rule, found.span.path, found.span.text) == (
-        "quiz-id-repeated",
-        "content/lessons/1.2-second.md",
-        '"q"',
-    )
-    assert [n.span and n.span.path for n in found.notes] == ["content/lessons/1.1-first.md"]
-
-
 def test_three_quizzes_of_one_id_are_two_mistakes() -> None:
     found = check_course(make_course(quiz("q") + "\n" + quiz("q"), quiz("q")))
     assert told(found) == ['quiz-id-repeated: "q"'] * 2
-
-
-def test_a_heading_or_quiz_must_not_have_the_anchor_of_a_question() -> None:
-    course = make_course(f"## A {{#q.one}}\n\n## B {{#q.two}}\n\n{quiz('q')}")
-    (found,) = check_course(course)
-    assert (found.rule, found.span.text) == ("anchor-repeated", "## A {#q.one}")
-    assert [n.span and n.span.text for n in found.notes] == ['"q"']
-    both = check_course(make_course(quiz("q") + "\n" + quiz("q.one")))
-    assert told(both) == ['anchor-repeated: "q.one"']
-    assert told(check_course(make_course("## A {#q.one}\n", quiz("q")))) == []
 
 
 @pytest.mark.parametrize(

@@ -28,18 +28,3 @@ def test_a_course_has_the_kinds_of_its_own_scripts_beside_the_built_in_one() -> 
 )
 def test_a_lab_of_a_known_kind_with_a_known_model_is_good(fence: str) -> None:
     assert findings(fence) == []
-
-
-@pytest.mark.parametrize(
-    ("fence", "expected"),
-    [
-        (" pendulm\n{}", "lab-kind: pendulm; no kind of lab is called `pendulm`"
-         " [did you mean `pendulum`?]"),
-        (" hidden\n{}", "lab-kind: hidden; no kind of lab is called `hidden`"
-         " [known: `mjcf`, `pendulum`, `simlab`]"),
-        (' simlab\n{"model": "bix"}', 'lab-model: "bix"; no model `bix` in models/'
-         " [did you mean `box`?]"),
-    ],
-)  # fmt: skip
-def test_an_unknown_kind_or_model_is_told_at_its_name(fence: str, expected: str) -> None:
-    assert findings(fence) == [expected]
