@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from coursebuild.features.lab.picture.draw import Solid
-from coursebuild.features.lab.picture.light import light_of
 from coursebuild.features.lab.picture.scenery import scene_solids
 from coursebuild.features.lab.picture.static import _shown, draw_picture, lab_record
 from coursebuild.features.lab.reply import unpack_arrays
@@ -22,7 +21,6 @@ from support.png_files import read_png
 
 pytestmark = pytest.mark.engine
 
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 EVERYTHING = """
 <mujoco>
   <asset>
@@ -154,16 +152,6 @@ def test_a_flex_and_a_skin_are_drawn(bench: Bench) -> None:
     assert np.ptp(cloth[0].surface.vertices, axis=0)[:2] == pytest.approx((0.3, 0.3), abs=1e-6)
 
 
-def test_a_flex_of_lines_has_its_radius(bench: Bench) -> None:
-    xml = """<mujoco><asset><material name="m" rgba="0 0.5 1 1"/></asset><worldbody>
-      <flexcomp name="rope" type="grid" count="5 1 1" spacing=".1 .1 .1" radius=".02" dim="1"
-        pos="0 0 1" mass="1" material="m"><edge equality="true"/></flexcomp></worldbody></mujoco>"""
-    _, main = main_of(bench, xml=xml)
-    (rope,) = [s for s in solids(main) if s.open]
-    assert rope.rgba == (0, 0.5, 1, 1), "of its material"
-    assert np.ptp(rope.surface.vertices, axis=0) == pytest.approx((0.44, 0.04, 0.04), rel=0.05)
-
-
 SHINY = """<mujoco>
   <visual><headlight ambient="0.1 0.2 0.3" diffuse="0.4 0.4 0.4" specular="0.2 0.2 0.2"/></visual>
   <asset>
@@ -186,37 +174,6 @@ SHINY = """<mujoco>
     <geom size="0.2" pos="1 0 0" material="old"/>
   </worldbody>
 </mujoco>"""
-
-
-def test_materials_are_recorded_and_textures_made_small(bench: Bench) -> None:
-    _, main = main_of(bench, xml=SHINY)
-    sizes = [(t["width"], t["height"]) for t in main["scene"]["textures"]]
-    assert sizes == [(256, 256), (64, 384), (64, 384)]
-    floor, box, ball = solids(main)[:3]
-    assert floor.material.reflectance == 0.25 and not floor.material.physical
-    assert floor.texture is not None and floor.texture.endless
-    squares = floor.texture.texture.levels[0][0]
-    assert squares[:100, :100].min() == 1 and squares[:100, 200:].max() == 0, "still squares"
-    assert box.material.physical and box.material.metallic == 0.5
-    assert box.material.shininess == pytest.approx(2 / 0.5**4 - 2)
-    assert box.texture is not None and box.texture.texture.levels[0].shape == (6, 64, 64, 3)
-    assert (ball.material.shininess, ball.material.specular) == (32, 0.75)
-    assert ball.material.emission == 0.125 and ball.texture is None
-
-
-def test_the_light_is_that_of_the_model(bench: Bench) -> None:
-    _, main = main_of(bench, xml=SHINY)
-    scene, frame = unpack_arrays(main["scene"]), unpack_arrays(main["pictures"][0]["frame"])
-    forward = np.array((0.0, 1.0, 0.0))
-    light = light_of(scene, frame, forward)
-    spot, wide, head = light.point_lights
-    assert spot.colour == pytest.approx((0.6, 0.5, 0.4)), "the directional one is off"
-    assert spot.position == pytest.approx((0, 0, 3)) and spot.direction == pytest.approx((0, 0, -1))
-    half, inner = math.cos(math.radians(30)), math.cos(math.radians(15))
-    assert spot.cone == pytest.approx((half, inner))
-    assert wide.position == pytest.approx((1, 0, 3)) and wide.cone is None, "to all sides"
-    assert (head.position, head.direction.tolist()) == (None, [0, 1, 0])
-    assert light.ambient == pytest.approx((0.15, 0.2, 0.3))
 
 
 def test_an_endless_plane_is_around_what_the_camera_looks_at(bench: Bench) -> None:
@@ -281,24 +238,6 @@ def test_readouts_and_plots_belong_to_the_run(bench: Bench) -> None:
 )
 def test_values_as_text(value: Any, digits: int, text: str) -> None:
     assert _shown(value, digits) == text
-
-
-def test_arrays_come_back_as_they_were() -> None:
-    import base64
-
-    for kind, dtype in (
-        ("f64", "<f8"),
-        ("f32", "<f4"),
-        ("i32", "<i4"),
-        ("u32", "<u4"),
-        ("u8", "u1"),
-    ):
-        array = np.array([0, 1, 250], dtype=dtype)
-        packed = {"type": kind, "data": base64.b64encode(array.tobytes()).decode()}
-        found = unpack_arrays({"a": [packed], "type": 3, "data": packed})
-        assert np.array_equal(found["a"][0], array) and found["a"][0].dtype == array.dtype
-        assert np.array_equal(found["data"], array)
-    assert unpack_arrays({"type": 5, "data": 2}) == {"type": 5, "data": 2}
 
 
 def test_the_size_of_the_picture_follows_the_lab(tmp_path: Path) -> None:
