@@ -48,37 +48,6 @@ def test_files_are_written_once_and_removed_with_their_scripts(make: Make) -> No
     assert not (folder.root / "examples/sub").exists()
 
 
-def test_an_edited_file_is_never_overwritten(make: Make) -> None:
-    folder = make(TWO)
-    assert folder.main("build").status == 0
-    site, lesson = folder.tree("public"), folder.read(folder.lesson())
-    folder.write("examples/a.py", "print('a')  # by hand\n")
-    for command in ("extract", "check", "build", "update"):
-        done = folder.main(command)
-        assert done.status == 1
-        assert "error[example-edited]: examples/a.py was edited by hand" in done.out
-        assert "+print('a')  # by hand" in done.out
-        help = "`coursebuild extract --adopt` brings what the file holds into the lesson"
-        assert help in done.out
-        assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
-    assert (folder.tree("public"), folder.read(folder.lesson())) == (site, lesson)
-    folder.write(folder.lesson(), GOOD)  # its script is gone
-    done = folder.main("extract")
-    assert (done.status, "no lesson has this script any more" in done.out) == (1, True)
-    assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
-    (folder.root / "examples/a.py").unlink()  # which drops the edit
-    assert folder.main("extract").status == 0
-    folder.write(folder.lesson(), TWO)
-    folder.write("examples/a.py", "something of mine\n")
-    done = folder.main("extract")
-    assert (done.status, "examples/a.py does not hold this block" in done.out) == (
-        1,
-        True,
-    )
-    assert folder.read("examples/a.py") == b"something of mine\n"
-    assert folder.read("examples/sub/b.py") == b"print('b')\n"
-
-
 # --- adopting
 
 

@@ -181,19 +181,6 @@ def test_dry_run_shows_the_difference_and_writes_nothing(make: Make) -> None:
     assert folder.tree() == before
 
 
-def test_an_unstable_output_is_refused_and_the_others_are_written(make: Make) -> None:
-    unstable = "import os\nprint('steady')\nprint('pid', os.getpid())"
-    lesson = "## One\n\n" + block("a.py", unstable, "OLD") + block("b.py", "print(2)", "OLD")
-    folder = make(lesson)
-    done = folder.main("update")
-    assert done.status == 1
-    assert "error[output-unstable]: two runs of the script printed different lines" in done.out
-    assert "line 2: `pid " in done.out
-    assert folder.text(folder.lesson()) == lesson.replace("OLD\n```\n\n", "2\n```\n\n").replace(
-        "2\n```\n\n", "OLD\n```\n\n", 1
-    )
-
-
 def test_a_script_that_fails_is_told_at_its_line_as_it_is_now(make: Make) -> None:
     folder = make(
         "## One\n\n"

@@ -11,13 +11,9 @@ from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
-    Need,
     described,
     forgotten,
     input_changes,
-    looked_at,
-    sought,
-    sought_files,
     state_changes,
 )
 
@@ -28,48 +24,11 @@ PLACES: Places = (("course", "/home/me/course"), ("library", "/opt/tool"), ("hom
 NOTHING = Trace((), (), (), (), "")
 
 
-def state(need: Need) -> str:
-    return f"of {need.name}"
-
-
 def run(
     outcome: Outcome = Outcome.OK, trace: Trace | None = NOTHING, **fields: object
 ) -> ScriptRun:
     base = ScriptRun("examples/a.py", outcome, 0, "", "", 0.1, trace=trace)
     return replace(base, **fields)  # type: ignore[arg-type]
-
-
-def test_needs_of_a_run() -> None:
-    trace = Trace(
-        files=("models/a.xml", "models/b.xml"),
-        folders=("models",),
-        outside=("/etc/hosts", "/opt/tool/mjcourse/spatial.py", "/opt/tool/mjcourse/__init__.py"),
-        modules=("numpy",),
-        opaque="",
-        sought=("examples/{ast,json}",),
-    )
-    found = looked_at(run(trace=trace), ("scipy.optimize", "numpy"), PLACES, state)
-    assert found == (
-        Dependency(Kind.FILE, "models/a.xml", "of models/a.xml"),
-        Dependency(Kind.FILE, "models/b.xml", "of models/b.xml"),
-        Dependency(Kind.LISTING, "models", "of models"),
-        Dependency(Kind.MODULE, "mjcourse", "of mjcourse"),
-        Dependency(Kind.MODULE, "numpy", "of numpy"),
-        Dependency(Kind.MODULE, "scipy", "of scipy"),
-        Dependency(Kind.OUTSIDE, "/etc/hosts", "of /etc/hosts"),
-        Dependency(Kind.SOUGHT, "examples/{ast,json}", ""),  # it was not there, whatever is now
-    )
-    assert looked_at(run(trace=None), (), PLACES, state) == ()
-
-
-def test_who_prints_a_path_of_this_machine_depends_on_it() -> None:
-    def places(stdout: str, places: Places = PLACES, stderr: str = "") -> list[str]:
-        found = looked_at(run(stdout=stdout, stderr=stderr), (), places, state)
-        return [one.name for one in found if one.kind is Kind.PLACE]
-
-    assert places("read /home/me/course/models/a.xml\n") == ["course", "home"]
-    assert places("nothing\n", stderr="/home/me/course") == []
-    assert places("1/2 of it\n", (("course", "/"), ("library", "/opt/tool"), ("home", ""))) == []
 
 
 # --- what is not remembered
@@ -182,14 +141,3 @@ def test_dependencies_as_lines() -> None:
         "the files of the module mjcourse",
         "that /home/me is where it is: it printed that",
     ]
-
-
-def test_files_of_modules_that_were_sought() -> None:
-    assert sought("lib/x{y/{re}") == ("lib/x{y", ("re",))
-    assert sought_files("examples/{ast,json}") == (
-        "examples/ast.py",
-        "examples/ast/__init__.py",
-        "examples/json.py",
-        "examples/json/__init__.py",
-    )
-    assert sought_files("/{ast}") == ("ast.py", "ast/__init__.py")
