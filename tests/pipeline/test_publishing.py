@@ -109,17 +109,6 @@ def test_nothing_is_published_before_there_is_a_site(make: Make) -> None:
     ]
 
 
-def test_what_is_gone_from_the_course_is_gone_from_the_site(make: Make) -> None:
-    folder = make(GOOD, "## Two\n\n" + block("two.py", "print(2)", "2"))
-    assert folder.main("build").status == 0
-    assert (folder.root / "public/examples/two.py").is_file()
-    map_ = folder.text("content/course.toml")
-    folder.write("content/course.toml", map_[: map_.rindex("[[level.lesson]]")])
-    (folder.root / folder.lesson(2)).unlink()
-    assert folder.main("build").status == 0
-    assert not [path for path in folder.tree() if "two" in path]
-
-
 def test_files_of_somebody_else_are_never_removed(make: Make) -> None:
     folder = make(GOOD)
     folder.write("out/notes.txt", "mine")
@@ -155,10 +144,3 @@ def test_caches_that_are_gone_or_damaged_are_made_again(make: Make, stores: Path
     (folder.root / ".coursebuild/fonts").symlink_to(stores / "fonts")
     assert folder.main("build").status == 0
     assert folder.tree() == site
-
-
-def test_check_works_where_caches_cannot_be_written(make: Make) -> None:
-    folder = make(GOOD)
-    shutil.rmtree(folder.root / ".coursebuild")
-    (folder.root / ".coursebuild").write_text("a file in their place")
-    assert folder.main("check").status == 0

@@ -145,39 +145,6 @@ def test_build_and_update_begun_together_take_turns(make: Make) -> None:
     assert not [name for name in folder.beside() if "tmp" in name or ".new" in name]
 
 
-def test_site_stays_whole_while_three_builds_run(make: Make) -> None:
-    folder = make(GOOD)
-    assert folder.main("build").status == 0
-    site = folder.tree()
-    done = threading.Event()
-    torn: list[str] = []
-
-    def watch() -> None:
-        """The site is there and whole at every moment."""
-        index = folder.root / "public/index.html"
-        while not done.is_set():
-            try:
-                if index.read_bytes() != site["public/index.html"]:
-                    torn.append("changed")
-            except FileNotFoundError:
-                torn.append("gone")
-            time.sleep(0)
-
-    watcher = threading.Thread(target=watch)
-    watcher.start()
-    try:
-        builds = [folder.start("build", "-q", stdout=subprocess.DEVNULL) for _ in range(3)]
-        for build in builds:
-            with ended(build):
-                assert build.wait(600) == 0
-    finally:
-        done.set()
-        watcher.join()
-    assert torn == []
-    assert folder.tree() == site
-    assert not [name for name in folder.beside() if name.startswith(".public")]
-
-
 def test_a_build_does_not_wait_for_a_dead_one(make: Make) -> None:
     folder = make("## One\n\n" + block("x.py", HELD, "1"))
     first = folder.start("build", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

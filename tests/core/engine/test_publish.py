@@ -9,14 +9,13 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from coursebuild.core.engine import publish as publishing
 from coursebuild.core.engine.manifest import MARKER
-from coursebuild.core.engine.publish import check_out, exchange, publish
+from coursebuild.core.engine.publish import exchange, publish
 from coursebuild.core.files.errors import EffectError, PublishRefusedError
 from coursebuild.core.model.results import OutputFile
 
@@ -70,14 +69,6 @@ def test_this_system_exchanges_in_one_step(tmp_path: Path) -> None:
 
 
 class TestPublish:
-    @pytest.mark.usefixtures("way")
-    def test_first_and_again(self, root: Path) -> None:
-        out = root / "public"
-        for text in ("one", "two", "two", "three"):
-            publish(root, out, site(text))
-            assert tree(out) == as_tree(site(text))
-            assert names(root) == ["content", "models", "public"]
-
     def test_same_bytes_whatever_the_umask(self, root: Path) -> None:
         old = os.umask(0o077)
         try:
@@ -137,25 +128,6 @@ class TestPublish:
             patch.setattr(os, call, fail)
             with pytest.raises(EffectError, match="no space left on device"):
                 publish(root, root / "public", site("two"))
-        assert tree(root / "public") == as_tree(site("one"))
-        assert names(root) == ["content", "models", "public"]
-
-    def test_failure_while_the_site_is_made(self, root: Path) -> None:
-        publish(root, root / "public", site("one"))
-
-        def broken() -> Iterator[OutputFile]:
-            yield from site("two")
-            raise KeyboardInterrupt
-
-        with pytest.raises(KeyboardInterrupt):
-            publish(root, root / "public", broken())
-        assert tree(root / "public") == as_tree(site("one"))
-        assert names(root) == ["content", "models", "public"]
-
-    def test_killed_between_two_renames(self, root: Path) -> None:
-        publish(root, root / "public", site("one"))
-        (root / "public").rename(root / ".public.coursebuild-old")
-        check_out(root, root / "public")
         assert tree(root / "public") == as_tree(site("one"))
         assert names(root) == ["content", "models", "public"]
 

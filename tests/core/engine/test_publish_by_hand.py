@@ -102,16 +102,6 @@ def test_changes_by_hand(
     assert beside(spared) == ["public"]
 
 
-def test_an_edit_in_place_is_not_published_again(spared: Path, pages: Pages) -> None:
-    """The site and the spare have the same file: whoever edits one has edited the other."""
-    file, twin = (spared / where / "b/c.html" for where in ("public", SPARE))
-    assert os.path.samestat(file.stat(), twin.stat())
-    edit(file)
-    assert twin.read_text() != "b/c.html 1"
-    assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html", "b/c.html")
-    assert file.read_text() == "b/c.html 1"
-
-
 def test_what_is_unlinked_in_the_spare_stays_in_the_site(spared: Path, pages: Pages) -> None:
     with (spared / "public/b/c.html").open() as opened:
         publish(spared, spared / "public", pages(**MANY | {"b__c": "2"}))
