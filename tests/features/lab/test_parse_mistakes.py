@@ -1,4 +1,4 @@
-"""What is wrong between fields of a `lab` fence; one alone is told as in `fixtures/texts/fields`."""
+"""What is wrong between fields of a `lab` fence; one alone is told as `fixtures/texts/fields`."""
 
 from __future__ import annotations
 
