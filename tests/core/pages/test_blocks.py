@@ -23,46 +23,9 @@ two
 ```
 """
 
-BAR = (
-    '<figure class="script" id="a.py" data-script="examples/a.py">\n'
-    '<figcaption class="bar"><span class="bar-name">examples/a.py '
-    '<a class="anchor" href="#a.py" aria-label="Link to this listing">#</a></span>'
-    '<span class="bar-tools" data-copy><a href="../examples/a.py" download>Download</a></span>'
-    "</figcaption>\n"
-)
-CODE = (
-    '<pre data-first="1" tabindex="0" role="group" aria-label="Script examples/a.py">'
-    '<code class="language-python"><span id="a.L1">print(<span class="s">"&lt;one&gt;"</span>)'
-    "</span>\n</code></pre>\n"
-)
-RUN = (
-    '<p class="run"><span class="run-label">Run it yourself</span> '
-    "<code>python examples/a.py</code></p>\n"
-)
-
 
 def receipt(html: str) -> str:
     return html.split('<p class="receipt ')[1].split("</p>")[0].replace('">', ": ")
-
-
-def test_a_script_and_its_output_are_one_object(make: Make) -> None:
-    assert make(SCRIPT + OUTPUT).html() == (
-        BAR + CODE + RUN + '<div class="output" id="a.out">\n'
-        '<p class="output-caption">Output, in order: '
-        '<a class="anchor" href="#a.out" aria-label="Link to this output">#</a></p>\n'
-        '<pre tabindex="0" role="group" aria-label="Output of examples/a.py">'
-        "<samp>one  &lt;1&gt;\ntwo\n</samp></pre>\n"
-        '<p class="receipt verified">Verified with MuJoCo 3.14.0, Python 3.11.7: '
-        "the same text, character by character.</p>\n"
-        "</div>\n</figure>\n"
-    )
-
-
-def test_a_script_without_output_says_that_it_ran(make: Make) -> None:
-    assert make(SCRIPT).html() == (
-        BAR + CODE + RUN + '<p class="receipt verified">'
-        "Ran to its end with MuJoCo 3.14.0, Python 3.11.7.</p>\n</figure>\n"
-    )
 
 
 def test_an_output_apart_from_its_script_names_it(make: Make) -> None:
@@ -150,23 +113,6 @@ def test_the_receipt_of_a_script_that_was_not_run_says_why(
     assert receipt(made.html()) == expected
 
 
-def test_arguments_and_requirements_stand_in_the_command_line(make: Make) -> None:
-    keys = 'file=examples/a.py args="--n 3 <x>" requires=torch'
-    html = make(SCRIPT.replace("file=examples/a.py", keys)).html()
-    assert (
-        "<code>python examples/a.py --n 3 &#39;&lt;x&gt;&#39;</code>"
-        ' <span class="run-needs">needs torch</span></p>' in html
-    )
-
-
-def test_a_table_output_stays_a_table(make: Make) -> None:
-    html = make(f"{SCRIPT}\nOutput:\n\n| a | b |\n| --- | ---: |\n| one | 1 |\n").html()
-    assert '<a class="anchor" href="#a.out"' in html
-    assert '>#</a></p>\n<div class="table"' in html
-    assert '<td class="align-right">1</td>' in html
-    assert "<samp>" not in html
-
-
 def test_a_long_script_is_folded_and_loses_no_line(make: Make) -> None:
     body = '"""Doc."""\n\nimport math\nimport sys\n\nA = 1\nB = 2\nC = 3\n\n'
     body += "".join(f"def f{i}():\n" + "    return 1\n" * 12 + "\n\n" for i in range(8))
@@ -180,55 +126,6 @@ def test_a_long_script_is_folded_and_loses_no_line(make: Make) -> None:
 def test_control_characters_of_an_output_are_shown(make: Make) -> None:
     html = make(SCRIPT + OUTPUT.replace("two", "\x1b[31mtwo\x07")).html()
     assert "␛[31mtwo␇" in html
-
-
-def test_a_fragment_of_a_model_says_where_it_belongs_and_what_the_compiler_said(make: Make) -> None:
-    assert make("```mjcf fragment=worldbody\n<body/>\n```\n").html() == (
-        '<figure class="script mjcf">\n'
-        '<figcaption class="bar"><span class="bar-name">MJCF, inside &lt;worldbody&gt;</span>'
-        '<span class="bar-tools" data-copy></span></figcaption>\n'
-        '<pre tabindex="0" role="group" aria-label="MJCF"><code class="language-xml">'
-        '<span class="t">&lt;body/&gt;</span>\n</code></pre>\n'
-        '<p class="receipt verified">Compiles with MuJoCo 3.14.0.</p>\n</figure>\n'
-    )
-    html = make('```mjcf error="A + B >= C"\n<mujoco/>\n```\n').html()
-    assert (
-        '<p class="receipt verified">Does not compile, with MuJoCo 3.14.0; the message:'
-        " <code>A + B &gt;= C</code></p>" in html
-    )
-
-
-def test_a_callout_has_its_kind_title_and_fold(make: Make) -> None:
-    html = make('> [!established] A *title* with "quotes"\n> Text.\n').html()
-    assert html == (
-        '<div class="callout callout-established" role="note">\n'
-        '<p class="callout-head"><span class="callout-kind" title="Checked against the engine&#39;s'
-        ' documentation, or measured by a script of this course.">Established</span> '
-        '<span class="callout-title">A <em>title</em> with &quot;quotes&quot;</span></p>\n'
-        "<p>Text.</p>\n</div>\n"
-    )
-    folded = make("> [!try]-\n> Text.\n").html()
-    assert folded.startswith(
-        '<details class="callout callout-try">\n<summary class="callout-head">'
-    )
-    assert "Try it</span></summary>\n<p>Text.</p>\n</details>" in folded
-
-
-def test_an_io_card_is_a_list_of_three(make: Make) -> None:
-    text = "```io\nINPUT: a `box`\nPROCESS: spin it\n  for long\nOUTPUT: flips\n```\n"
-    assert make(text).html() == (
-        '<dl class="io">\n<div><dt>Input</dt><dd>a <code>box</code></dd></div>\n'
-        "<div><dt>Process</dt><dd>spin it\nfor long</dd></div>\n"
-        "<div><dt>Output</dt><dd>flips</dd></div>\n</dl>\n"
-    )
-
-
-def test_bound_numbers_name_their_script_and_have_a_real_minus(make: Make) -> None:
-    html = make(f"{SCRIPT}{OUTPUT}\nIt is `-6.0e-04 %`{{out=examples/a.py}}.\n").html()
-    assert (
-        '<p>It is <span class="bound" title="Printed by examples/a.py">−6.0e-04 %</span>.</p>'
-        in html
-    )
 
 
 def test_code_without_a_file_is_shown_with_its_language_escaped(make: Make) -> None:
