@@ -10,10 +10,9 @@ import pytest
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
-from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.scene import scenes
-from support.bench_runs import FAMILY, MODELS, of_problem, orders, row
+from support.bench_runs import FAMILY, MODELS, orders, row
 
 pytestmark = pytest.mark.site
 LONG = ("flips", "major")
@@ -72,25 +71,3 @@ def test_an_error_that_can_be_seen() -> None:
     assert coarse.attitude is not None and coarse.seen is not None and fine.seen is not None
     assert coarse.seen == pytest.approx(coarse.attitude[0] * 180 / 3.141592653589793)
     assert coarse.seen > 1 > fine.seen
-
-
-# ------------------------------------------------------------------------------------- hard cases
-
-
-def test_a_pendulum_from_90_degrees() -> None:
-    qpos = problem_named("pendulum-hinge-90").scenario.qpos
-    report = of_problem("pendulum-hinge-90", f"qpos = {list(qpos)}\nduration = 4\nsample = 0.2\n")
-    assert orders(report, "position")["RK4"] >= 3.8
-    assert orders(report, "velocity")["RK4"] >= 3.8
-    for name in FAMILY:
-        assert orders(report, "position")[name] == pytest.approx(1.0, abs=0.05)
-    assert {one.energy_drift is None for one in report.rows} == {False}
-    assert {one.momentum_drift for one in report.rows} == {None}, "the pin turns it"
-
-
-def test_orders_and_drifts_of_springs() -> None:
-    for name, conserved in (("damped-spring-0", True), ("damped-spring-0.1", False)):
-        report = of_problem(name, "qpos = [1]\nqvel = [5]\nduration = 1\nsample = 0.1\n")
-        for part in ("position", "velocity"):
-            assert orders(report, part)["RK4"] == pytest.approx(4.0, abs=0.1), name
-        assert {one.energy_drift is not None for one in report.rows} == {conserved}, name

@@ -50,20 +50,6 @@ def test_a_report_draws_its_page_and_no_other(course: Course) -> None:
     assert course.drawn() == {"index.html", PAGE, "models/cup.html", "models/arm/part.html"}
 
 
-def test_an_incremental_build_gives_what_a_clean_one_gives(
-    course: Course, make: Callable[..., Folder]
-) -> None:
-    course.build()
-    course.write_cases("it hangs")
-    course.write_diet("it is far away")
-    course.build()
-    clean = Course(make(GOOD, name="clean"))
-    for path, data in course.folder.tree("content").items():
-        clean.folder.write(f"content/{path}", data)
-    clean.build()
-    assert clean.folder.tree("public") == course.folder.tree("public")
-
-
 def stale(course: Course) -> str:
     told = course.build()
     assert 'class="work-precision"' not in course.page()
@@ -114,15 +100,6 @@ def test_damaged_reports_keep_nothing_from_being_published(course: Course) -> No
     told = stale(course)
     assert told.count("is damaged: ") == 2
     assert "notes.json" not in told
-
-
-def test_check_warns_of_stale_reports_unless_silenced(course: Course) -> None:
-    course.folder.write("models/box.xml", BOX.replace("<mujoco>", "<mujoco >"))
-    assert course.folder.main("check", "-q").out.count("warning[report-stale]") == 2
-    text = course.folder.text("content/course.toml")
-    silence = '\n[[silence]]\nrule = "report-stale"\nreason = "measured at night"\n'
-    course.folder.write("content/course.toml", text + silence)
-    assert course.folder.main("check", "-q").out == ""
 
 
 def test_the_preview_follows_a_report(course: Course) -> None:

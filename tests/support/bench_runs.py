@@ -5,12 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import mujoco
-
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
-from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.scene import scenes
 
@@ -25,16 +22,6 @@ def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[Scenar
         measure_scenario(model, one, quick=quick, clock=None)
         for one in scenes(model, parsed.value, quick=quick)
     )
-
-
-def of_problem(name: str, text: str) -> ScenarioReport:
-    """A hard case, as a model with a scenario."""
-    mjcf = problem_named(name).mjcf.replace("<mujoco>", '<mujoco><option timestep="0.004"/>')
-    (found,) = measured(
-        mujoco.MjModel.from_xml_string(mjcf),
-        f'[[scenario]]\nname = "a"\nreference = "closed:{name}"\n{text}',
-    )
-    return found
 
 
 def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisionRow:

@@ -11,11 +11,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from msgspec.structs import replace
 
 from coursebuild.cli import main
-from coursebuild.numerics.reports.records import BENCH
-from support.measured_course import BOX, PATH, TOML, bench_course, write
+from support.measured_course import TOML, bench_course, write
 from support.scratch_course import ROOT
 
 pytestmark = pytest.mark.site
@@ -51,28 +49,6 @@ def test_bench_prints_table_json_and_plot(course: Path, capsys: pytest.CaptureFi
     assert all(error is not None and error < 1e-3 for error in errors)
 
 
-@pytest.mark.slow
-def test_bench_check_compares_with_what_was_recorded(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write(course / "models" / "box.toml", TOML)
-    assert run(course, "--check", "-q") == 1
-    assert "make it with `coursebuild bench box --record`" in capsys.readouterr().out
-    assert run(course, "--record", "-q") == 0
-    assert capsys.readouterr().out.endswith(f"\nwrote {PATH}\n")
-    assert run(course, "--check", "-q") == 0
-    assert capsys.readouterr().out == f"box  as recorded in {PATH}\n"
-    path = course / PATH
-    report = BENCH.decode(path.read_bytes())
-    (one,) = report.scenarios
-    wrong = tuple(replace(r, velocity=(0.5, 0.5)) if r.own else r for r in one.rows)
-    path.write_bytes(BENCH.encode(replace(report, scenarios=(replace(one, rows=wrong),))))
-    assert run(course, "--check", "-q") == 1
-    out = capsys.readouterr().out
-    assert out.startswith(f"box  2 figures not as recorded in {PATH}\n\n  swing\n")
-    assert "error of velocity " in out and "0.5" in out and "± 5 %" in out
-
-
 def test_bench_with_wrong_arguments_gives_2(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -89,16 +65,6 @@ def test_bench_without_models_says_so(course: Path, capsys: pytest.CaptureFixtur
     (course / "models" / "box.xml").unlink()
     assert run(course, "-q") == 0
     assert capsys.readouterr().out == "there is no model to measure\n"
-
-
-def test_bench_of_broken_model_points_at_its_element(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write(course / "models" / "box.xml", BOX.replace("<joint", "<joynt"))
-    assert run(course, "-q") == 1
-    out = capsys.readouterr().out
-    assert out.startswith("error[model-error]: the model `box` does not compile: ")
-    assert " --> models/box.xml:5:7" in out
 
 
 @pytest.mark.slow

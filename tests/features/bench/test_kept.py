@@ -15,7 +15,6 @@ from msgspec.structs import replace
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.features.bench.commands.bench.run import bench
 from coursebuild.numerics.reports.bench import ScenarioReport
-from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import BOX, TOML, Fake, asked, bench_course, options, swing, write
@@ -47,13 +46,6 @@ def test_bench_measures_every_model_that_is_no_part_of_another(course: Path) -> 
     assert [s.model for s in bench(options(course), ("legs",), measuring=fake).reports] == ["legs"]
 
 
-def test_unknown_model_name_is_wrong_usage(course: Path) -> None:
-    with pytest.raises(UsageError, match="no model is called `bix`; did you mean `box`\\?"):
-        bench(options(course), ("bix",), measuring=Fake())
-    with pytest.raises(UsageError, match="no model is called `\\*`; known: `box`"):
-        bench(options(course), ("*",), measuring=Fake())
-
-
 def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: Path) -> None:
     write(course / "models" / "bad.xml", BOX.replace('size="0.1"', 'size="-1"'))
     write(course / "models" / "worse.xml", "<mujoco>\n  <worldbody>\n")
@@ -68,22 +60,6 @@ def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: 
         '<geom size="-1" pos="0 0 -1"/>',
     )
     assert second.span.path == "models/worse.xml"
-
-
-def test_mistakes_in_scenario_files_are_told(course: Path) -> None:
-    write(course / "models" / "box.toml", TOML + 'keyframe = "up"\n')
-    write(course / "models" / "arm.xml", BOX)
-    write(course / "models" / "arm.toml", "[[scenarjo]]\n")
-    write(course / "models" / "bocks.toml", TOML)
-    found = bench(options(course), measuring=Fake())
-    assert found.reports == ()
-    assert found.diagnostics[0].message.startswith("unknown")
-    assert "there is no model models/bocks.xml to which these scenarios belong" in {
-        d.message for d in found.diagnostics
-    }
-    assert "the model has no keyframe `up`" in {d.message for d in found.diagnostics}
-    one = bench(options(course), ("box",), measuring=Fake())
-    assert [d.span.path for d in one.diagnostics] == ["models/box.toml"]
 
 
 def test_a_scenario_that_cannot_be_measured_is_told(course: Path) -> None:
