@@ -103,18 +103,6 @@ for start in 0, 0.25:
         mujoco.mj_step(model, data)
     print(f"{data.qpos[1]:.9f}")
 """
-PENDULUMS = """
-import mujoco
-
-from mjcourse import model_path
-
-model = mujoco.MjModel.from_xml_path(str(model_path("double_pendulums")))
-data = mujoco.MjData(model)
-data.qpos[:] = 2.0, 2.0, 2.0, 2.001
-while data.time < SECONDS:
-    mujoco.mj_step(model, data)
-print("steps", round(data.time / 0.001))
-"""
 SWING = """
 import math
 

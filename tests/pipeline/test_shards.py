@@ -111,10 +111,6 @@ LESSON = "## A\n\n" + "".join(
 )
 
 
-def scripts_of(report: str) -> list[str]:
-    return sorted(script["path"] for script in json.loads(report)["scripts"])
-
-
 @pytest.mark.site
 def test_all_parts_together_are_the_course(make: Make) -> None:
     folder = make(LESSON + block("bad.py", "print(1)\n", "2"))

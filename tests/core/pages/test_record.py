@@ -42,27 +42,6 @@ def recorded(body: str) -> tuple[PageRecord, str]:
     return record(PageHead("x.html", "page", "Títle", ""), Markup(body), "")
 
 
-def glued(body: str) -> str:
-    """The same as `formulas.glue`, by its definition, where operators are tight already."""
-    formula = r"((?:<math>(?:(?!</math>).)*</math>)+)"
-    after = r"""((?:\xa0[^\s<&]{1,16})?[,.;:!?)\]’”"'…%]*)"""
-    touching = re.compile(rf"""([(\[“‘"']*){formula}{after}""", re.DOTALL)
-    return touching.sub(held, body)
-
-
-def held(match: re.Match[str]) -> str:
-    before, formula, after = match.groups()
-    cut = [m.end() for m in re.finditer(r"</math>(?=<math>)", formula)]
-    if not before and not after:
-        return match[0]
-    if not cut:
-        return f'<span class="held">{match[0]}</span>'
-    start, middle, end = formula[: cut[0]], formula[cut[0] : cut[-1]], formula[cut[-1] :]
-    start = f'<span class="held">{before}{start}</span>' if before else start
-    end = f'<span class="held">{end}{after}</span>' if after else end
-    return start + middle + end
-
-
 @given(html)
 def test_the_facts_of_a_page_are_its_characters(body: str) -> None:
     facts, body = recorded(body)
