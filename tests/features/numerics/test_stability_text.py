@@ -72,24 +72,24 @@ spring  case 5: A spring
   reference (closed, known to 1e-13, velocities to 1e-12): a textbook
   second: another
   begins at rest
-  largest stable  steps  tried         theory  difference  beyond       growth
-  200 ms          25     60 from 1 ms  0.2 s   +0.000 %    diverged                  Euler, implicit
-  250 ms          25     60 from 1 ms  0.2 s   +25.000 %   slow-growth  1.500000000  RK4
-  all to 10 s     25     60 from 1 ms  all                                           discrete
-  none from 1 ms  25                   none                diverged                  none
-  stable over 5 s; energy is not judged
-  RK4 is not monotone: some are stable again, from 400 ms to 500 ms
-  growth      exact  difference
+  Largest stable timesteps over 5 s
+  Largest stable timestep  Steps  Tried up to it  Theory  Difference  Beyond it    Growth a step
+  200 ms                   25     60 from 1 ms    0.2 s   +0.000 %    diverged                    Euler, implicit
+  250 ms                   25     60 from 1 ms    0.2 s   +25.000 %   slow-growth  1.500000000    RK4
+  all up to 10 s           25     60 from 1 ms    all                                             discrete
+  none from 1 ms on        25     60 from 1 ms    none                diverged                    none
+  RK4: some are stable again, from 400 ms to 500 ms
+  growth      Exact  Difference
   1.25 m      1 m    +2.5e-01    Euler
   not finite                     RK4
-  order of position       order of velocity
+  Order of position       Order of velocity
   1.00 ± 0.01, bend 0.02  1.00 ± 0.02, bend 0.10  Euler
   error of position (m or rad)       RK4     Euler
   500 ms                        diverged
   100 ms                                  1.00e-01
-  refsafe softens constraints at 0.5 s: that is another model
-  RK4 at 0.5 s: diverged: one; two
-"""
+  refsafe softens constraints, which makes another model: 500 ms.
+  RK4 at 500 ms: diverged; one; two.
+"""  # noqa: E501
 
 
 def test_text_puts_integrators_with_equal_figures_together() -> None:

@@ -5,13 +5,16 @@ Entry point: `stability_text`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from coursebuild.features.bench.commands.stable import (
+from coursebuild.features.bench.commands.grids import english
+from coursebuild.features.bench.scenarios import (
+    ORDERS,
     STABLE,
+    lost_runs,
     stable_again,
     stable_cells,
-    stable_meaning,
+    stable_title,
 )
 from coursebuild.numerics.reports.bench import FittedOrder
 from coursebuild.numerics.reports.case_plot import case_quantities
@@ -28,15 +31,20 @@ from coursebuild.numerics.reports.text import seconds_text
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,
-    RED,
     YELLOW,
     Column,
     Style,
     table,
 )
 
-_ORDERS = ("order of position", "order of attitude", "order of velocity")
-_BOUNDARY = (*STABLE, "theory", "difference", "beyond", "growth")
+_BOUNDARY = (
+    *STABLE,
+    "measured.theory",
+    "measured.difference",
+    "measured.beyond",
+    "measured.growth",
+)
+_KNOWN = ("numerics.exact", "measured.difference")
 
 
 def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
@@ -52,30 +60,28 @@ def _case(report: CaseReport, style: Style) -> str:
         lines.append(f"  {report.note}")
     if report.boundaries:
         rows = [(line.integrator, _boundary(line)) for line in report.boundaries]
-        lines += _table(_BOUNDARY, rows)
-        lines.append(f"  {style.paint(stable_meaning(report.boundaries[0]), FAINT)}")
-        lines += [f"  {style.paint(text, RED)}" for text in stable_again(report.boundaries)]
+        lines.append(f"  {style.paint(stable_title(english(), report.boundaries[0]), FAINT)}")
+        lines += _table(map(english(), _BOUNDARY), rows)
+        again = [(line.integrator, stable_again(english(), line)) for line in report.boundaries]
+        lines += [f"  {integrator}: {told}" for integrator, told in again if told]
     for name in dict.fromkeys(line.name for line in report.figures):
         found = [line for line in report.figures if line.name == name]
         rows = [(line.integrator, _figure(line)) for line in found]
-        lines += _table((name, "exact", "difference"), rows)
+        lines += _table((name, *map(english(), _KNOWN)), rows)
     fitted: list[tuple[str, Cells]] = [
         (o.integrator, (_order(o.position), _order(o.attitude), _order(o.velocity)))
         for o in report.orders
         if o.there
     ]
     if fitted:
-        lines += _table(_ORDERS, fitted)
+        lines += _table((english()(key) for _, key in ORDERS), fitted)
     lines += _errors(report)
     softened = sorted({line.timestep for line in report.errors if line.refsafe})
     if softened:
-        shown = ", ".join(f"{h:g}" for h in softened)
-        lines.append(f"  refsafe softens constraints at {shown} s: that is another model")
-    lost = [line for line in report.errors if line.status != "ok"]
-    for line in lost:
-        why = "; ".join(line.reasons)
-        told = f"  {line.integrator} at {line.timestep:g} s: {line.status}: {why}"
-        lines.append(style.paint(told, YELLOW))
+        times = ", ".join(map(seconds_text, softened))
+        lines.append(f"  {english()('measured.refsafe', settings=times)}")
+    runs = ((f"{one.integrator} at {seconds_text(one.timestep)}", one) for one in report.errors)
+    lines += [style.paint(f"  {told}", YELLOW) for told in lost_runs(runs)]
     return "\n".join(lines) + "\n"
 
 
@@ -113,7 +119,7 @@ def _boundary(line: BoundaryLine) -> Cells:
         theory = "all" if line.theory is None else "none"
     growth = "" if line.growth is None else f"{line.growth:.9f}"
     difference = "" if line.difference is None else f"{100 * line.difference:+.3f} %"
-    return *stable_cells(line), theory, difference, line.beyond, growth
+    return *stable_cells(english(), line), theory, difference, line.beyond, growth
 
 
 def _figure(line: FigureLine) -> Cells:
@@ -136,7 +142,7 @@ def _seconds(value: float) -> str:
     return f"{value:.6g} s"
 
 
-def _table(titles: Cells, rows: Sequence[tuple[str, Cells]]) -> list[str]:
+def _table(titles: Iterable[str], rows: Sequence[tuple[str, Cells]]) -> list[str]:
     """What is said of integrators under its titles, in columns; their names stand behind."""
     lines = [(*cells, names) for cells, names in merged(rows).items()]
     columns = zip((*titles, ""), zip(*lines, strict=True), strict=True)

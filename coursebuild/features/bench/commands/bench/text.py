@@ -3,40 +3,22 @@
 Entry point: `bench_text(scenes, style)`.
 
 1. For each scenario its reference, a table of the settings, the verdict, the fitted orders and the
-   largest stable timesteps; for each model the machine.
-2. A table has the columns that say something in this scenario, as many as there is room for; the
-   others are in the JSON.
+   largest stable timesteps, in the words of the model's page; for each model the machine.
+2. The table of settings has the columns that say something in this scenario, as many as there is
+   room for; the others are in the JSON.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from coursebuild.core.model.results import Machine
 from coursebuild.features.bench.commands.bench.columns import BETTER, FRONT, OWN, VISIBLE, columns
-from coursebuild.features.bench.commands.stable import (
-    STABLE,
-    stable_again,
-    stable_cells,
-    stable_meaning,
-)
-from coursebuild.numerics.reports.bench import (
-    FittedOrder,
-    MeasuredSetting,
-    OrderRow,
-    ScenarioReport,
-    SceneReport,
-    WorkPrecisionRow,
-)
+from coursebuild.features.bench.commands.grids import english, grid_lines, plain_text
+from coursebuild.features.bench.figures import power, where
+from coursebuild.features.bench.scenarios import scenario_view
+from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, cell, shown_figures
-from coursebuild.numerics.reports.text import (
-    FEWEST_STEPS,
-    is_cut_short,
-    seconds_text,
-    solving_parts,
-    status_text,
-    usual_setting,
-)
+from coursebuild.numerics.reports.text import status_text
 from coursebuild.report.terminal import (
     BOLD,
     FAINT,
@@ -64,7 +46,7 @@ def _scene(scene: SceneReport, style: Style) -> str:
     head = style.paint(visible(scene.model), BOLD)
     if scene.quick:
         head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
-    lines = [head, *style.wrap(_machine(scene.machine), _INDENT)]
+    lines = [head, *style.wrap(where(english(), scene.machine), _INDENT)]
     if not scene.scenarios:
         lines.append(f"{_INDENT}nothing can move in it, so that nothing was measured")
     for scenario in scene.scenarios:
@@ -74,26 +56,32 @@ def _scene(scene: SceneReport, style: Style) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _machine(machine: Machine) -> str:
-    versions = f"MuJoCo {machine.engine}, Python {machine.python}, NumPy {machine.numpy}"
-    return f"{versions}, {machine.hardware}"
-
-
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:
+    view = scenario_view(english(), report, "")
     title = f"  {visible(report.title)}" if report.title else ""
     lines = [_INDENT + style.paint(visible(report.name), BOLD) + title]
-    for text in (_times(report), *_usual(report), *_reference(report), *report.notes):
+    for text in (*map(plain_text, view.about), *_also(report), *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
-    lines.append("")
-    lines += _rows(report, style)
+    lines += ["", *_rows(report, style)]
     colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
     if report.verdict.text:
         lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]
-    for part in (_orders(report.orders), _stable(report, style)):
-        if part:
-            lines += ["", *part]
-    lines += _lost(report, style)
+    for grid in (view.orders, view.stable):
+        if grid is not None:
+            lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_lines(grid, style))]
+    if view.notes:
+        lines.append("")
+    for note in view.notes:
+        lines += style.wrap(note, 2 * _INDENT, YELLOW)
     return lines
+
+
+def _also(report: ScenarioReport) -> Iterator[str]:
+    """What a page says with its plot."""
+    if report.figure:
+        yield f"It measures {report.figure}."
+    if report.velocity_floor > report.floor:
+        yield f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}."
 
 
 def _sweep(sweep: SweepReport, style: Style) -> list[str]:
@@ -116,36 +104,6 @@ def _sweep(sweep: SweepReport, style: Style) -> list[str]:
     return [title, "", *(f"{2 * _INDENT}{line}".rstrip() for line in lines)]
 
 
-def _times(report: ScenarioReport) -> str:
-    text = seconds_text(report.duration)
-    if report.horizon < report.duration:
-        text += f", errors to {seconds_text(report.horizon)}"
-        if report.lyapunov is not None and report.horizons is not None:
-            first, last = map(seconds_text, report.horizons)
-            text += f" (chaotic: nudged runs part after {first} to {last}, "
-            text += f"Lyapunov exponent {report.lyapunov:.3g}/s)"
-    text += f", commands held for {seconds_text(report.hold)}" if report.hold else ""
-    return text + (f", measures {report.figure}" if report.figure else "")
-
-
-def _usual(report: ScenarioReport) -> list[str]:
-    """What every row has where it says nothing else."""
-    usual = usual_setting(report.rows)
-    parts = [] if usual is None else solving_parts(usual)
-    return [", ".join(parts)] if parts else []
-
-
-def _reference(report: ScenarioReport) -> list[str]:
-    known = f"known to {report.floor:.0e}"
-    if report.velocity_floor > report.floor:
-        known += f", velocities to {report.velocity_floor:.0e}"
-    said = [f"reference ({report.reference}, {known}): {report.source}"]
-    if report.second:
-        off = "" if report.agreement is None else f", which differs by {report.agreement:.1e}"
-        said.append(f"second: {report.second}{off}")
-    return said
-
-
 # --- the table
 
 
@@ -165,70 +123,3 @@ def _rows(report: ScenarioReport, style: Style) -> list[str]:
         f"{2 * _INDENT}{line}".rstrip()
         for line in (*painted, *(style.paint(text, FAINT) for text in below))
     ]
-
-
-# --- what stands below
-
-
-def _orders(orders: Sequence[OrderRow]) -> list[str]:
-    shown = [one for one in orders if one.there]
-    if not shown:
-        return []
-
-    def cells(name: str) -> tuple[str, ...]:
-        found: list[FittedOrder | None] = [getattr(one, name) for one in shown]
-        return tuple("" if fit is None else fit.text for fit in found)
-
-    parts = ("position", "attitude", "velocity")
-    columns = [Column("order of", tuple(one.integrator for one in shown), left=True)]
-    columns += [Column(part, cells(part)) for part in parts]
-    return [f"{2 * _INDENT}{line}".rstrip() for line in table(columns)]
-
-
-def _stable(report: ScenarioReport, style: Style) -> list[str]:
-    rows = report.stable
-    if not rows:
-        return []
-    columns = [Column("integrator", tuple(one.integrator for one in rows), left=True)]
-    cells = zip(*map(stable_cells, rows), strict=True)
-    columns += [Column(t, told, left=True) for t, told in zip(STABLE, cells, strict=True)]
-    lines = [f"{2 * _INDENT}{line}".rstrip() for line in table(columns)]
-    lines.append(2 * _INDENT + style.paint(stable_meaning(rows[0]), FAINT))
-    lines += [2 * _INDENT + style.paint(text, RED) for text in stable_again(rows)]
-    if is_cut_short(report) and any(one.largest is None for one in rows):
-        longest = seconds_text(report.duration / FEWEST_STEPS)
-        text = f"longer ones than {longest} were not tried: {FEWEST_STEPS} are the whole scenario"
-        lines.append(2 * _INDENT + style.paint(text, FAINT))
-    return lines
-
-
-def _lost(report: ScenarioReport, style: Style) -> list[str]:
-    """Why runs were lost, those with the same reasons together."""
-    usual = usual_setting(report.rows)
-    together: dict[tuple[str, tuple[str, ...]], list[WorkPrecisionRow]] = {}
-    for row in report.rows:
-        if row.status != "ok":
-            together.setdefault((status_text(row.status), row.reasons), []).append(row)
-    told = [
-        f"{_named(rows, usual)}: {'; '.join((status, *reasons))}"
-        for (status, reasons), rows in together.items()
-    ]
-    softened = [row for row in report.rows if row.refsafe]
-    if softened:
-        what = "refsafe softens constraints, which makes another model"
-        told.append(f"{what}: {_named(softened, usual)}")
-    lines = [line for text in told for line in style.wrap(text, 2 * _INDENT, YELLOW)]
-    return ["", *lines] if lines else []
-
-
-def _named(rows: Sequence[WorkPrecisionRow], usual: MeasuredSetting | None) -> str:
-    """Settings in words, those of an integrator together."""
-    together: dict[tuple[str, str], list[str]] = {}
-    for row in rows:
-        parts = ", ".join(solving_parts(row.setting, usual))
-        steps = together.setdefault((row.setting.integrator, parts), [])
-        steps.append(seconds_text(row.setting.timestep, 4))
-    return "; ".join(
-        f"{name} at {', '.join(steps)}{parts and f' with {parts}'}"
-        for (name, parts), steps in together.items()
-    )
