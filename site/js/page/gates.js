@@ -10,7 +10,7 @@ import { linkedLab } from './labs.js'
 import { decoded } from './unfold.js'
 
 const FLOW = '.prose > :not(.dock), .dock > * > *'
-const END = 'h2, h3, h4, h5, h6, hr, .footnotes'
+const END = 'h2, h3, h4, h5, h6, hr, .further, .footnotes'
 
 const closed = new Map() // id of a quiz → what opens its text
 const opened = new Set() // ids of those that were opened on this page

@@ -84,7 +84,7 @@ function heightOf(mark, origin) {
 function stretches(prose, list, note) {
   const origin = prose.getBoundingClientRect().top
   const { left, right } = note.getBoundingClientRect()
-  const boxes = [...prose.querySelectorAll(':scope > *, .formula')].filter((box) => box !== list)
+  const boxes = [...prose.querySelectorAll('.prose > :not(.further), .formula')].filter((box) => box !== list)
   return boxes
     .map((box) => box.getBoundingClientRect())
     .filter((box) => box.height > 0 && box.left < right && box.right > left)
