@@ -63,7 +63,7 @@ def run_command(directory: str | None, words: Sequence[str]) -> int:
         from coursebuild.core.text.diagnostics import did_you_mean
 
         help = did_you_mean(name, known_commands()) or "`coursebuild help` lists them"
-        raise UsageError(f"there is no command `{name}`; {help}")
+        raise UsageError(f"there is no command `{name}`", help=help)
     arguments = parser_of(command).parse_args(
         rest, argparse.Namespace(root=directory, words=tuple(words))
     )

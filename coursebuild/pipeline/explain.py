@@ -82,8 +82,8 @@ class _Explainer:
         whole = self._part_of(path)
         if not dependents and not whole and not (self.root / path).exists():
             near = nearest(name, [*self.scripts, *self.labs, *self.documents, *RULES])
-            help = f"; did you mean `{near}`?" if near is not None else ""
-            raise UsageError(f"nothing of this course is called `{name}`{help}")
+            help = f"did you mean `{near}`?" if near is not None else ""
+            raise UsageError(f"nothing of this course is called `{name}`", help=help)
         return self._file(path, "file", dependents)
 
     def _named(self, name: str) -> Explanation | None:

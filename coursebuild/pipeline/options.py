@@ -75,7 +75,7 @@ def find_course(directory: str | None) -> Path:
     try:
         root = find_root(None if directory is None else Path(directory), start)
     except EffectError as error:
-        raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
+        raise UsageError(error.message, help=error.help) from None
     check_path(root)
     undo_changes(root)
     return root
@@ -126,7 +126,7 @@ def open_store(
             key = environment.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")
             shared = shared_cache(where, key)
         except EffectError as error:
-            raise UsageError(error.message + (f"; {error.help}" if error.help else "")) from None
+            raise UsageError(error.message, help=error.help) from None
     return Memo(root, shared=shared, size=limit, fresh=fresh)
 
 
@@ -194,7 +194,7 @@ def _named(course: Course, name: str, root: Path) -> Lesson | Page:
         written = [lesson.id for lesson in course.lessons if lesson.status is not Status.PLANNED]
         known = did_you_mean("", [*written, *(page.id for page in course.pages)])
         help = f"did you mean `{near}`?" if near is not None else known
-        raise UsageError(f"no lesson or page is called `{name}`" + (f"; {help}" if help else ""))
+        raise UsageError(f"no lesson or page is called `{name}`", help=help)
     if isinstance(found, Lesson) and found.status is Status.PLANNED:
         raise UsageError(f"lesson {found.id} is planned, so there is nothing in it yet")
     return found

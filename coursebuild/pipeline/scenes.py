@@ -154,7 +154,7 @@ def _named(names: Sequence[str], models: dict[str, MjcfModel]) -> list[MjcfModel
         if found is None:
             near = nearest(bare.removesuffix(".xml"), models)
             help = f"did you mean `{near}`?" if near is not None else did_you_mean("", models)
-            raise UsageError(f"no model is called `{name}`" + (f"; {help}" if help else ""))
+            raise UsageError(f"no model is called `{name}`", help=help)
         wanted.add(found)
     return [models[name] for name in sorted(wanted)]
 

@@ -36,6 +36,9 @@ class PublishRefusedError(EffectError):
 class UsageError(Exception):
     """The command was called in a way that cannot be; its text is for the user. Exit status 2."""
 
+    def __init__(self, message: str, *, help: str = "") -> None:
+        super().__init__(f"{message}; {help}" if help else message)
+
 
 def reason(error: OSError) -> str:
     """The system's words for an error: `no space left on device`."""

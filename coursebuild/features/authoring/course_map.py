@@ -101,7 +101,7 @@ def _check_free(course: Course, id: str) -> None:
     levels = [level.id for level in course.levels]
     if _level_id(id) not in levels:
         help = did_you_mean("", levels)
-        raise UsageError(f"the map has no level for `{id}`" + (f"; {help}" if help else ""))
+        raise UsageError(f"the map has no level for `{id}`", help=help)
     for lesson in course.lessons:
         if lesson.id.casefold() == id.casefold():
             raise UsageError(f"there is a lesson {lesson.id} already: {lesson.title}")

@@ -99,8 +99,7 @@ def _new_model(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
 def _new_template(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     name, copies = arguments.name, template_copies()
     if name not in copies:
-        near = did_you_mean(name, copies)
-        raise UsageError(f"there is no template `{name}`" + (f"; {near}" if near else ""))
+        raise UsageError(f"there is no template `{name}`", help=did_you_mean(name, copies))
     return [FileChange(f"{TEMPLATES}{name}", None, copies[name].encode())]
 
 

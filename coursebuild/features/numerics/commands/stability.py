@@ -154,7 +154,7 @@ def _chosen(options: Options, names: tuple[str, ...]) -> tuple[list[str], tuple[
             near = nearest(name, known)
             all_of_them = "known: " + ", ".join(known)
             help = all_of_them if near is None else f"did you mean `{near}`?"
-            raise UsageError(f"no hard case is called `{name}`; {help}")
+            raise UsageError(f"no hard case is called `{name}`", help=help)
         wanted |= found
     return [one for one in problems if one in wanted], tuple(one for one in models if one in wanted)
 
