@@ -24,7 +24,7 @@ from coursebuild.core.model import (
     main_and_further,
 )
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.plainly import without_links
+from coursebuild.core.pages.link_texts import without_links
 from coursebuild.core.registry import kind_of_block
 
 

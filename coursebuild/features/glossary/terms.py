@@ -26,9 +26,9 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.pages import formulas
+from coursebuild.core.pages.link_texts import without_links
 from coursebuild.core.pages.markup import render_inlines
 from coursebuild.core.pages.plain import PLAIN, PlainContext
-from coursebuild.core.pages.plainly import without_links
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.features.glossary.sentences import runs_on, sentence_of
 

@@ -21,7 +21,7 @@ from coursebuild.core.checks.links import anchors
 from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.results import Formula, ModelFacts
 from coursebuild.core.pages.library import Library, Owner, models_named
-from coursebuild.core.pages.plainly import without_links
+from coursebuild.core.pages.link_texts import without_links
 from coursebuild.core.scripts.bindings import Printed
 from coursebuild.core.scripts.bound_numbers import Shown
 from coursebuild.core.syntax.decode import description
