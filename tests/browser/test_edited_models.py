@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
 from support.lab_course import PAGE
-from support.lab_page import EDITED, lab, until, watched
+from support.lab_page import EDITED, lab, press, until, watched
 
 pytestmark = pytest.mark.browser
 
@@ -33,10 +33,6 @@ def edited(page: Page) -> tuple[Locator, Locator]:
     """The lab with the lesson's model, and its text."""
     found = page.locator(".lab").nth(EDITED)
     return found, found.get_by_label("The model, as MJCF")
-
-
-def press(found: Locator, name: str) -> None:
-    found.get_by_role("button", name=name, exact=True).click()
 
 
 def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) -> None:

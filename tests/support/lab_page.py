@@ -97,6 +97,10 @@ def reach(page: Page, number: int, state: str) -> None:
     )
 
 
+def press(found: Locator, name: str) -> None:
+    found.get_by_role("button", name=name, exact=True).click()
+
+
 def readout(found: Locator, label: str) -> str:
     row = found.locator(".lab-live .lab-readouts > div").filter(has_text=label)
     return row.locator("dd").inner_text().strip().replace("−", "-")

@@ -1,0 +1,183 @@
+"""Labs with a page of their own: motion that is not welcome, goals, and what goes wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Route, expect
+
+from support.axe import violations
+from support.built_sites import Site
+from support.lab_course import PAGE
+from support.lab_page import (
+    AUTO,
+    MOUNT,
+    SWING,
+    comes,
+    floats,
+    lab,
+    parsed,
+    press,
+    reach,
+    readout,
+    served,
+    state_of,
+    time_of,
+    watched,
+)
+
+pytestmark = pytest.mark.browser
+
+
+def test_motion_that_is_not_welcome_begins_with_a_press_or_a_move(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    with browsers["webgl"].new_context(reduced_motion="reduce") as context:
+        page, _ = watched(context)
+        page.goto(base + PAGE)
+        found = lab(page, AUTO)
+        press(found, "One step")
+        # Had it run before, this were not its first step.
+        assert state_of(page, found)["n"] == 1
+        expect(found).to_have_attribute("data-state", "paused")
+        press(found, "Kick")
+        reach(page, AUTO, "playing")
+        swing = lab(page)
+        swing.get_by_label("gravity").fill("5")
+        reach(page, SWING, "playing")
+
+
+# ------------------------------------------------------------------------------- the goal
+
+
+def test_goal_is_reached_kept_and_its_motion_shown_to_others(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    with browsers["webgl"].new_context(has_touch=True) as context:
+        page, said = watched(context)
+        page.goto(base + PAGE)
+        swing = lab(page)
+        goal = swing.locator(".lab-live .lab-goal")
+        expect(goal).to_contain_text("Push it over the top.")
+        expect(goal).to_contain_text("0.00 s of 0.2 s")
+        swing.get_by_role("button", name="Push").tap()
+        page.keyboard.press("Enter")  # a second push
+        swing.get_by_role("button", name="Play").tap()
+        expect(goal).to_contain_text(re.compile(r"Reached at 0\.\d\d s\."))
+        expect(swing.locator(".lab-announce")).to_have_text(re.compile(r"^Reached at 0\."))
+        assert violations(page, ".lab") == []
+        press(swing, "Pause")
+        state = state_of(page, swing)
+        assert state["l"] == [[9.8, 2.5, None], [[0, 2], [0, 2]]]
+        link = page.evaluate("() => location.href")
+
+        other, also_said = watched(context)
+        other.goto(link)
+        again = lab(other)
+        expect(again.locator(".lab-live .lab-goal")).to_contain_text("Reached before.")
+        press(again, "Play the motion of this link")
+        reach(other, SWING, "playing")
+        reach(other, SWING, "paused")
+        shown = state_of(other, again)
+        assert (shown["n"], shown["l"]) == (state["n"], state["l"])
+        assert floats(shown).tobytes() == floats(state).tobytes()
+        other.goto(base + "progress/index.html")
+        expect(other.locator('[data-progress="overall"]')).to_contain_text("1 of 1 task done")
+        assert [*said, *also_said] == []
+
+
+def test_goal_that_was_shown_does_not_count(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    goal = swing.locator(".lab-live .lab-goal")
+    press(swing, "Show me")
+    comes(page, lambda: float(readout(swing, "angle")) > 4)
+    expect(goal).to_contain_text("Not counted: this run")
+    press(swing, "Reset")
+    expect(goal).to_contain_text("0.00 s of 0.2 s")
+    expect(goal).not_to_contain_text("Reached")
+
+
+# ------------------------------------------------------------------------- what goes wrong
+
+
+def test_state_too_large_for_a_link_is_told(context: BrowserContext, base: str) -> None:
+    page, said = watched(context)
+    page.goto(base + PAGE)
+    page.evaluate(MOUNT, SWING)
+    page.evaluate(
+        """async () => {
+          const physics = Float64Array.from({ length: 9000 }, Math.random)
+          await window.made.share({ values: [3, 0.5, null], steps: 7, time: 1, physics })
+        }"""
+    )
+    message = page.locator("#tried .lab-message")
+    expect(message).to_contain_text("lab.live.link_controls")
+    expect(message).to_have_class(re.compile(r"\blab-is-warning\b"))
+    state = parsed(page.evaluate("() => location.href"))
+    assert (state["v"], state["physics"]) == ([3, 0.5, None], b"")
+    assert said == []
+
+
+BAD_PUSH = """
+let pushed = 0
+controls[2].run = ({ data }) => {
+  if (pushed++ === 0) data.qvel[0] = 1e11
+  else throw new Error('no rope')
+}
+"""
+
+
+def test_divergence_and_errors_of_lab_code_are_told_and_it_goes_on(
+    context: BrowserContext, base: str
+) -> None:
+    def answer(route: Route) -> None:
+        route.fulfill(body=served(route) + BAD_PUSH, headers={"content-type": "text/javascript"})
+
+    context.route(re.compile(r"/labs/[^/]*lab-1\.[0-9a-f]+\.js$"), answer)
+    page, _ = watched(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    press(swing, "Play")
+    comes(page, lambda: time_of(swing) > 0)
+    press(swing, "Push")
+    message = swing.locator(".lab-message:visible")
+    expect(message).to_have_text(re.compile(r"^Diverged at t = \d+\.\d\d s: "))
+    reach(page, SWING, "paused")
+    press(swing, "Play")
+    reach(page, SWING, "playing")
+    expect(message).to_have_count(0)
+    press(swing, "Push")
+    expect(message).to_contain_text("controls[2].run (“Push”)")
+    expect(message).to_contain_text("no rope")
+
+
+def test_without_webgl_everything_else_works(browsers: Mapping[str, Browser], base: str) -> None:
+    with browsers["plain"].new_context() as context:
+        page = context.new_page()
+        page.goto(base + PAGE)
+        swing = lab(page)
+        expect(swing.locator(".lab-view")).to_contain_text("no WebGL")
+        press(swing, "Play")
+        expect(swing.locator(".lab-live dd").first).not_to_contain_text("2.500")
+        comes(page, lambda: time_of(swing) > 0)
+
+
+def test_from_disk_the_recorded_form_stays(context: BrowserContext, course: Site) -> None:
+    page, said = watched(context)
+    page.goto((course.public / PAGE).as_uri())
+    swing = page.locator(".lab").first
+    expect(swing.locator(".lab-message")).to_contain_text("http.server")
+    expect(swing.locator(".lab-static")).to_be_visible()
+    assert said == []
+
+
+def test_missing_file_is_told(context: BrowserContext, base: str) -> None:
+    page, _ = watched(context)
+    context.route("**/*.mjb", lambda route: route.fulfill(status=404, body=""))
+    page.goto(base + PAGE)
+    swing = lab(page, SWING, "ended")
+    expect(swing.locator(".lab-message:visible")).to_contain_text("404")
