@@ -62,9 +62,9 @@ export class Pictures {
     this.geoms = new SceneGeoms(this.scene, this.data)
     this.layout = layoutOf(this.model, sampler.capacity)
     const { map } = this.model.vis
-    if (config.forceScale) map.force = config.forceScale
+    const perNewton = config.forceScale ?? config.arrows?.forces
     // MuJoCo divides by the mean mass, and half of what comes out is drawn.
-    else if (config.arrows?.forces) map.force = 2 * this.model.stat.meanmass * config.arrows.forces
+    if (perNewton) map.force = 2 * this.model.stat.meanmass * perNewton
     // Geoms, sites, skins and flexes are drawn from the model; the visualizer adds the rest.
     for (const group of ['geomgroup', 'sitegroup', 'skingroup', 'flexgroup']) this.option[group].fill(0)
     this.option.flags[engine.k.vis.PERTFORCE] = 1
