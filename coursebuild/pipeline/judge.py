@@ -27,6 +27,8 @@ _OF_RUNS = (
     "script-silent",
     "script-diverged",
     "script-penetration",
+    "script-writes",
+    "script-connects",
 )
 """Only scripts that were to be run have these; they may point at a line of another lesson."""
 

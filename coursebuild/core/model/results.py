@@ -96,6 +96,25 @@ EndState: TypeAlias = Annotated[
 ]
 
 
+class EffectKind(enum.Enum):
+    """What a script does that reaches beyond it."""
+
+    WRITE = "w"
+    """Outside its temporary folder, where it may not."""
+    CONNECTION = "c"
+
+
+class Effect(Struct, frozen=True):
+    """Something that a line of a script does to what is around it."""
+
+    kind: EffectKind
+    what: str
+    """The path that is written, of a file of the project relative to it; or the address."""
+    path: str
+    """The file of the project with the line; empty where it is not known."""
+    line: int
+
+
 class Trace(Struct, frozen=True):
     """What a script looked at while it ran: all that its result depends on, beside its text.
 
@@ -124,6 +143,8 @@ class Trace(Struct, frozen=True):
     """Of such a run, for each `MjData` in words: its number in the order of their first use, the
     length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest since
     its simulation began), and the `qpos` and `qvel` that it ended with, as hexadecimal numbers."""
+    effects: tuple[Effect, ...] = ()
+    """What it wrote outside its temporary folder, and whom it asked, once for each line."""
     sought: tuple[str, ...] = ()
     """Modules that it looked for in vain in a folder of the project, such as those that would have
     been imported instead of Python's own: `folder/{one,two}`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 
-from coursebuild.core.model.results import Divergence, Sign, Trace
+from coursebuild.core.model.results import Divergence, Effect, EffectKind, Sign, Trace
 
 _FIELDS = 6
 """Of a record that says that a simulation was lost."""
@@ -34,6 +34,7 @@ def read_notes(records: bytes, root: str, script: str) -> Trace:
         modules=tuple(sorted(collected.modules)),
         opaque=collected.opaque,
         divergences=tuple(dict.fromkeys(collected.divergences)),
+        effects=tuple(collected.effects),
         moved=collected.moved,
         states=tuple(collected.states),
         sought=tuple(
@@ -52,6 +53,7 @@ class _Collected:
         self.sought: dict[str, set[str]] = {}
         self.opaque = ""
         self.divergences: list[Divergence] = []
+        self.effects: list[Effect] = []
         self.moved = False
         self.states: list[str] = []
         self._root = root.rstrip("/") + "/"
@@ -69,6 +71,9 @@ class _Collected:
             self.sought.setdefault(self._inside(folder), set()).update(names.split(","))
         elif kind == "d":
             self._divergence(about.split("\t"))
+        elif kind in "wc":
+            what, file, line = about.rsplit("\t", 2)
+            self.effects.append(Effect(EffectKind(kind), what, file, int(line)))
         elif kind == "p":
             self.moved = True
         elif kind == "s":

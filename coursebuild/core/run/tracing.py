@@ -18,6 +18,8 @@ A record is a letter and what it is about, in bytes:
 - `v`, a folder of the project, a tab and names: modules that were looked for there in vain, or were
   imported before the script began, which would have found them there first
 - `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
+- `w` and a path, `c` and an address, each with a file of the project and a line between tabs: the
+  line writes outside its temporary folder, or uses the network
 - `p`: an initial state was moved, or a step halved; `s` and numbers: a state at its end (see
   `initial_state_perturbation`)
 - `o` and words: why there may be more
@@ -213,8 +215,9 @@ class Tracer:
         if at is None:
             return
         self._written.add(at)
-        if not f"{at}/".startswith(self._writable or ("\0",)) and not self.by_import():
-            self.opaque(WRITES if at.startswith(self.root) else WRITES_OUTSIDE)
+        if not f"{at}/".startswith(self._writable or ("\0",)):
+            inside = at.startswith(self.root)
+            self._effect("w", at.removeprefix(self.root), WRITES if inside else WRITES_OUTSIDE)
 
     def library(self, path: object) -> None:
         """Native code was loaded from a file, or from all in a folder."""
@@ -236,19 +239,36 @@ class Tracer:
         """There may be more than is noted."""
         self._note(f"o{why}")
 
+    def _effect(self, kind: str, what: str, why: str) -> None:
+        """Something beyond the script is changed or asked, unless a package does while imported."""
+        line = self._line()
+        if line is None:
+            return
+        self.opaque(why)
+        if f"{kind}{line}" not in self._noted:  # once for each line
+            self._noted.add(f"{kind}{line}")
+            self._note(f"{kind}{what}\t{line}")
+
     def by_import(self) -> bool:
         """Whether what happens is done by a package while it is imported, not by the script."""
+        return self._line() is None
+
+    def _line(self) -> str | None:
+        """The innermost line of the project that is being executed: its file, a tab, its number.
+
+        `None` where a package is being imported.
+        """
         frame: FrameType | None = sys._getframe(1)
         while frame is not None and frame.f_code.co_filename == __file__:
             frame = frame.f_back  # in the tool's own repository it is a file of the course
         while frame is not None:
             name = frame.f_code.co_filename
             if name == _BOOTSTRAP:
-                return True
+                return None
             if name.startswith(self.root) and not name.startswith(self._inside or ("\0",)):
-                return False
+                return f"{name.removeprefix(self.root)}\t{frame.f_lineno}"
             frame = frame.f_back
-        return False
+        return "\t0"
 
     # --- events
 
@@ -304,14 +324,16 @@ class Tracer:
             self.opaque(PROGRAMS)
 
     def _network(self, args: tuple[object, ...]) -> None:
-        address = args[1] if len(args) > 1 else None
+        named = len(args) < 2 or isinstance(args[0], str | bytes | None)
+        address = args[0] if named else args[1]  # a name that is looked up, or that of a socket
         if isinstance(address, bytes):
             address = address.decode("utf-8", "surrogateescape")
         # A socket in its own folder, or with a name that the system made up, is for its children.
         if isinstance(address, str) and address.startswith((self.temporary, "\0")):
             return
-        if not self.by_import():
-            self.opaque(NETWORK)
+        if isinstance(address, tuple):
+            address = ":".join(map(str, address[:2]))
+        self._effect("c", str(address or ""), NETWORK)
 
     def _load(self, args: tuple[object, ...]) -> None:
         name = args[0]

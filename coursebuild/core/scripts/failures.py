@@ -1,7 +1,7 @@
 """What to say about a script that did not run to its end, or in which a simulation was lost.
 
 Entry points: `failure` (a run), `silence` (an output is recorded and nothing was printed),
-`divergence` (simulations), `is_lost`.
+`divergence` (simulations), `is_lost`, `effects` (what it does to what is around it).
 
 1. A traceback's frames are read out of the standard error: each line of an extracted file is the
    line of a lesson, and the innermost such line is what the diagnostic points at. Of a script that
@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import assert_never
 
 from coursebuild.core.model import Recording
-from coursebuild.core.model.results import Divergence, Outcome, ScriptRun, Sign
+from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
@@ -219,6 +219,20 @@ _DEEP = (
     "where they start; if they are to, say so by `deep` on its fence"
 )
 
+_EFFECTS = {
+    EffectKind.WRITE: (
+        "script-writes",
+        "writes outside its temporary folder",
+        "write into `tempfile.mkdtemp()`, or name a folder of the course by `writes=` on its fence",
+    ),
+    EffectKind.CONNECTION: (
+        "script-connects",
+        "uses the network",
+        "keep what it asks for in the course, where it stays the same",
+    ),
+}
+"""The rule, what is said, and what mends it."""
+
 
 def is_lost(extraction: Extraction, run: ScriptRun) -> bool:
     """Whether a simulation was lost, without the script's saying so."""
@@ -249,6 +263,16 @@ def divergence(
         yield _found("script-penetration", extraction, deep, extractions, said, _DEEP)
 
 
+def effects(
+    extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
+) -> Iterator[Diagnostic]:
+    """That a script wrote outside its temporary folder, or used the network."""
+    found = () if run.trace is None else run.trace.effects
+    for kind, (rule, said, help) in _EFFECTS.items():
+        if these := [each for each in found if each.kind is kind]:
+            yield _found(rule, extraction, these, extractions, f"`{run.path}` {said}", help)
+
+
 def _lost(run: ScriptRun) -> tuple[Divergence, ...]:
     found = () if run.trace is None else run.trace.divergences
     return tuple(each for each in found if each.sign is not Sign.CONTACT)
@@ -263,7 +287,7 @@ def _unlike(extraction: Extraction, rule: str, key: str, what: str) -> Diagnosti
 def _found(
     rule: str,
     extraction: Extraction,
-    found: Sequence[Divergence],
+    found: Sequence[Divergence | Effect],
     extractions: Iterable[Extraction],
     said: str,
     help: str,
@@ -281,15 +305,17 @@ def _found(
     return diagnose(rule, place, f"{said}: {_noticed(found[0])}", help=help, notes=notes)
 
 
-def _place(found: Divergence, by_path: Mapping[str, Extraction]) -> Span | None:
+def _place(found: Divergence | Effect, by_path: Mapping[str, Extraction]) -> Span | None:
     """The lesson's line where it was noticed."""
     where = by_path.get(found.path)
     span = None if where is None else where.line_span(found.line)
     return None if span is None else without_indentation(span)
 
 
-def _noticed(found: Divergence) -> str:
+def _noticed(found: Divergence | Effect) -> str:
     """What was noticed, in words."""
+    if isinstance(found, Effect):
+        return f"`{found.what}`"
     of = f" of model `{found.model}`" if found.model else ""
     at = f" at t = {found.time} s" if found.time else ""
     match found.sign:

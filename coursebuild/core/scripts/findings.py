@@ -22,7 +22,7 @@ from coursebuild.core.scripts.bound_numbers import Shown, shows
 from coursebuild.core.scripts.compare import compare, is_silent
 from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.extract import Extraction, extract, owners
-from coursebuild.core.scripts.failures import divergence, failure, silence
+from coursebuild.core.scripts.failures import divergence, effects, failure, silence
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.numbers import scan
 from coursebuild.core.scripts.repeat import unstable
@@ -59,6 +59,7 @@ def script_findings(
             failed = failure(extraction, run, everything)
             found += [] if failed is None else [failed]
             found += divergence(extraction, run, everything)
+            found += effects(extraction, run, everything)
     printed = Printed(verdicts, runs, [extraction.path for extraction in everything])
     owner_of = {document.source.path: owner for owner, document in owners(course)}
     for verdict in verdicts:

@@ -231,6 +231,8 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "warning",
         "Bodies of a script's simulation lie deep in each other, which MuJoCo does not warn of.",
     ),
+    ("script-writes", "warning", "A script writes outside its temporary folder."),
+    ("script-connects", "warning", "A script uses the network."),
     ("script-shallow", "error", "A script says `deep`, and no bodies lay deep in each other."),
     (
         "recorded-run",

@@ -255,6 +255,25 @@ class TestOpaque:
         trace = traced(f"open({str(tmp_path / 'o')!r}, 'w')")
         assert trace.opaque == "it writes files outside its temporary folder"
         assert trace.outside == ()
+        place = f"{tmp_path / 'o'}", "examples/x.py", 1
+        assert [(each.what, each.path, each.line) for each in trace.effects] == [place]
+
+    def test_effects_are_told_once_for_each_line(self, traced: Traced, root: Path) -> None:
+        (root / "examples/sibling.py").write_text("\ndef write(): open('data/c', 'w')\n")
+        trace = traced(
+            "import os, sibling, socket\n"
+            "for n in range(9): os.mkdir(f'data/{n}')\n"
+            "socket.getaddrinfo('localhost', 1)\n"
+            "if not os.fork(): sibling.write(); os._exit(0)\n"
+            "os.wait()\n"
+            "socket.socket().bind(('127.0.0.1', 0))\n"
+        )
+        assert sorted((each.what, each.path, each.line) for each in trace.effects) == [
+            ("127.0.0.1:0", "examples/x.py", 6),
+            ("data/0", "examples/x.py", 2),
+            ("data/c", "examples/sibling.py", 2),
+            ("localhost", "examples/x.py", 3),
+        ]
 
     @pytest.mark.parametrize(
         "code",
