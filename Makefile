@@ -140,11 +140,12 @@ $(VENV)/.dev: $(VENV)/.made requirements-dev.txt $(BUILD_INPUTS)
 npm: $(VENV)/.dev
 	@$(BIN)/python site/bundle.py packages
 
-# The browser and the Java runtime (for the HTML checker) that tests use.
+# The browser, the Java runtime (for the HTML checker) and the sandbox that tests use.
 system:
 	@missing=''; \
 	command -v chromium >/dev/null || missing='chromium'; \
 	java -version >/dev/null 2>&1 || missing="$$missing default-jre-headless"; \
+	command -v bwrap >/dev/null || missing="$$missing bubblewrap"; \
 	[ -n "$$missing" ] || exit 0; \
 	if [ "$$(id -u)" = 0 ]; then root=''; else root='sudo -n'; fi; \
 	if command -v apt-get >/dev/null && $$root true 2>/dev/null; then \
@@ -153,6 +154,6 @@ system:
 	  $$root apt-get update -qq && $$root apt-get install -y -qq --no-install-recommends $$missing; \
 	else \
 	  echo "the tests need Debian's packages (or the like of your system): $$missing" >&2; \
-	  echo "install them, with the commands chromium and java on PATH, and run make test again" >&2; \
+	  echo "install them, with the commands chromium, java and bwrap on PATH, and run make test again" >&2; \
 	  exit 1; \
 	fi

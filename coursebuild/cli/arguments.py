@@ -24,8 +24,13 @@ def options_of(arguments: argparse.Namespace) -> Options:
     if hasattr(arguments, "cache"):
         fresh = arguments.no_cache
         store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
+    sandbox = None
+    if getattr(arguments, "sandbox", False):
+        from coursebuild.core.run.sandbox import find_sandbox
+
+        sandbox = find_sandbox(root)
     quiet, long, verbose = (getattr(arguments, n, False) for n in ("quiet", "long", "verbose"))
-    return Options(root, jobs, quiet, store, long, verbose)
+    return Options(root, jobs, quiet, store, long, verbose, sandbox=sandbox)
 
 
 def available_cores() -> int:
@@ -76,6 +81,15 @@ def add_running(parser: argparse.ArgumentParser) -> None:
         help="scripts at a time (default: one per core)",
     )
     add_cache(parser)
+
+
+def add_sandbox(parser: argparse.ArgumentParser) -> None:
+    """Whether the course is trusted."""
+    parser.add_argument(
+        "--sandbox",
+        action="store_true",
+        help="run each script without network, and with nothing to write or to see but the course",
+    )
 
 
 def _jobs(text: str) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.arguments import add_running
+from coursebuild.cli.arguments import add_running, add_sandbox
 from coursebuild.cli.unchanged import run_unless_unchanged
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
@@ -22,6 +22,7 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""
     add_running(parser)
+    add_sandbox(parser)
     parser.add_argument(
         "--out",
         default="public",

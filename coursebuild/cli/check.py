@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 
-from coursebuild.cli.arguments import add_format, add_lessons, add_long, add_running, options_of
+from coursebuild.cli.arguments import (
+    add_format,
+    add_lessons,
+    add_long,
+    add_running,
+    add_sandbox,
+    options_of,
+)
 from coursebuild.cli.output import CLEAN, print_report, style_of, write
 from coursebuild.cli.unchanged import run_unless_unchanged
 
@@ -20,6 +27,7 @@ examples:
   coursebuild check 4.2                  one lesson
   coursebuild check -v                   why each script runs
   coursebuild check --format github      annotations in GitHub Actions
+  coursebuild check --sandbox            somebody else's branch
   coursebuild check --against 3.13.0     what another version of MuJoCo changes
 """
 
@@ -45,6 +53,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--write-timings", metavar="FILE", help="write how long each takes into this file"
     )
     add_long(parser)
+    add_sandbox(parser)
     parser.add_argument(
         "--sensitivity",
         action="store_true",
@@ -102,6 +111,7 @@ def _against(arguments: argparse.Namespace) -> int:
         (arguments.write_timings, "--write-timings"),
         (arguments.sensitivity, "--sensitivity"),
         (arguments.truth, "--truth"),
+        (arguments.sandbox, "--sandbox"),
     ):
         if given:
             raise UsageError(f"--against cannot be combined with {what}")

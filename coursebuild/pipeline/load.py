@@ -20,7 +20,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import scenarios_of_no_model
 from coursebuild.core.files.course_features import load_course_features
-from coursebuild.core.files.errors import UsageError
+from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.read import read_course, read_sources
 from coursebuild.core.model import (
     Course,
@@ -84,9 +84,19 @@ class Parser:
         return check_course(course)
 
 
-def load(root: Path, parser: Parser | None = None, open_texts: Mapping[str, str] = {}) -> Loaded:
-    """Read and parse everything below `root`; `open_texts` as in `read_course`."""
-    loader = _Loader(root, Parser() if parser is None else parser, open_texts)
+def load(
+    root: Path,
+    parser: Parser | None = None,
+    open_texts: Mapping[str, str] = {},
+    *,
+    trusted: bool = True,
+) -> Loaded:
+    """Read and parse everything below `root`; `open_texts` as in `read_course`.
+
+    Raises:
+        EffectError: the course brings code that would run here, and is not `trusted`.
+    """
+    loader = _Loader(root, Parser() if parser is None else parser, open_texts, trusted=trusted)
     course = loader.course(loader.declared())
     return Loaded(course, tuple(loader.found))
 
@@ -106,10 +116,13 @@ def load_course(root: Path) -> Course:
 class _Loader:
     """The state of one loading: what was read, and what was found wrong."""
 
-    def __init__(self, root: Path, parser: Parser, open_texts: Mapping[str, str]) -> None:
+    def __init__(
+        self, root: Path, parser: Parser, open_texts: Mapping[str, str], *, trusted: bool
+    ) -> None:
         read = read_course(root, open_texts)
         self.root = root
         self.open_texts = open_texts
+        self.trusted = trusted
         self.parser = parser
         self.files = read.value
         self.found = list(read.diagnostics)
@@ -209,6 +222,8 @@ class _Loader:
         parsed = self.parser.course_map(self.files.map)
         self.found += parsed.diagnostics
         if parsed.value is not None:
+            if not self.trusted:
+                _refuse_code(self.root, parsed.value)
             self.found += load_course_features(self.root, parsed.value)
         return parsed.value
 
@@ -312,6 +327,16 @@ class _Loader:
         models = (f"models/{model.name}.xml" for model in self.files.models)
         taken = {MAP, *self.sources, *(page.path for page in course.pages), *models}
         return tuple(path for path in self.files.files if path not in taken)
+
+
+def _refuse_code(root: Path, course: Course) -> None:
+    own = [named.path for named in course.features]
+    own += [TEMPLATES] if (root / TEMPLATES).exists() else []
+    if own:
+        raise EffectError(
+            f"`--sandbox` is around scripts alone, and `{own[0]}` is code that the tool would run",
+            help="look at what it does, and run the command without `--sandbox`",
+        )
 
 
 def _check_engine(course: Course, place: OtherEnvironment | None) -> list[Diagnostic]:

@@ -26,6 +26,7 @@ from coursebuild.core.text.diagnostics import did_you_mean, nearest
 
 if TYPE_CHECKING:
     from coursebuild.core.run.runner import RunAll
+    from coursebuild.core.run.sandbox import Sandbox
     from coursebuild.core.run.surroundings import OtherEnvironment
 
 
@@ -47,6 +48,8 @@ class Options(Struct, frozen=True):
     """What runs scripts, where it is not `run_scripts`: a server stays warm from run to run."""
     place: OtherEnvironment | None = None
     """Where scripts run, where that is not here; see `for_course`."""
+    sandbox: Sandbox | None = None
+    """What is around each script; then no other code of the course runs."""
 
     @property
     def store(self) -> Memo:

@@ -8,6 +8,7 @@ longest first, of which no result is remembered that still holds.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from msgspec import Struct
@@ -163,7 +164,7 @@ def _run(
             if job.path in inputs:
                 progress.say(f"{job.path}: {'; '.join(memory.reasons(inputs[job.path]))}")
     memory.begin()
-    run_all = options.run_all or run_scripts
+    run_all = options.run_all or functools.partial(run_scripts, sandbox=options.sandbox)
     with progress.stage(stage, count):
         return run_all(
             options.root,

@@ -80,7 +80,7 @@ def _runs(
     if not scripts:
         return found
     memory = options.memory()
-    with ScriptServer() as server:
+    with ScriptServer(sandbox=options.sandbox) as server:
         served = replace(options, run_all=server.run)
         for number in numbers:
             halving = number == HALVED

@@ -1,8 +1,8 @@
 """Workflows of GitHub, run step by step on this machine.
 
 Entry points: `Runner`; `git` and `commit`. What the actions of others do is done here in a few
-lines; `pip`, `npx` and `rsync` are programs that only note how they were called. An action or an
-expression that is not known fails the test.
+lines; `pip`, `npx`, `rsync` and `sudo` are programs that only note how they were called. An action
+or an expression that is not known fails the test.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ class Runner:
     def __post_init__(self) -> None:
         for name in ("bin", "home", "tmp", "sent", "artifacts", "pages"):
             (self.folder / name).mkdir(parents=True)
-        programs = dict.fromkeys(("pip", "npx", "rsync"), _NOTED) | {"coursebuild": _COURSEBUILD}
+        programs = dict.fromkeys(("pip", "npx", "rsync", "sudo"), _NOTED) | {
+            "coursebuild": _COURSEBUILD
+        }
         for name, text in programs.items():
             (self.folder / "bin" / name).write_text(text)
             (self.folder / "bin" / name).chmod(0o755)

@@ -1,7 +1,7 @@
 """Runs what a course holds: scripts in processes, formulas in V8, models in MuJoCo.
 
 - `runner`: the lessons' scripts. Its processes, seen from it, are in `workers`; what scripts find
-  around them is in `surroundings`
+  around them is in `surroundings`, and around those of strangers a `sandbox`
 - what these processes do: `supervisor` (with `watching`), `script_process`; both are one program,
   `worker_main`
 - what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`), made a trace of by

@@ -5,7 +5,8 @@ Entry points: `run_scripts`; `ScriptServer`, which stays warm between runs.
 1. `parallel` supervisors are started. They are given one script after another, and run each as a
    copy of themselves, or in an interpreter of its own (see `supervisor`); the results are the same.
 2. What they report becomes a `ScriptRun` each: UTF-8 is decoded, CRLF becomes LF.
-3. However this ends, a KeyboardInterrupt included, the supervisors see their input close, kill what
+3. In a `Sandbox`, a supervisor runs only one script, and nothing that it says is taken for granted.
+4. However this ends, a KeyboardInterrupt included, the supervisors see their input close, kill what
    they run and exit.
 
 A script's environment is made here and says nothing of who runs it, but for what finding programs,
@@ -15,14 +16,18 @@ libraries and graphics needs.
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import selectors
 import signal
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Self, TypeAlias
+
+from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.temporary import temporary_folder
@@ -30,11 +35,12 @@ from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import supervisor
 from coursebuild.core.run.notes import read_notes
 from coursebuild.core.run.packages import site_folders
+from coursebuild.core.run.sandbox import Sandbox, copied_folders, difference, visible
 from coursebuild.core.run.script_process import Job
 from coursebuild.core.run.surroundings import OtherEnvironment, library_folder, wanted_packages
 from coursebuild.core.run.surroundings import clean_environment as clean_environment
 from coursebuild.core.run.watching import STDERR_KEPT
-from coursebuild.core.run.workers import Worker
+from coursebuild.core.run.workers import Enclose, Worker
 
 Started: TypeAlias = Callable[[str], object]
 """Is told of the path of a script that begins."""
@@ -54,6 +60,8 @@ def _ignore(what: object) -> None:
 
 _PATIENCE = 0.1
 """Seconds after which it is asked again whether a run is still wanted."""
+_GRACE = 60.0
+"""Seconds after its script's time in which a supervisor in a sandbox has to report."""
 
 _LOG = "MUJOCO_LOG.TXT"
 """What MuJoCo writes where it runs when it warns, in a process that a script has started."""
@@ -67,6 +75,7 @@ def run_scripts(
     started: Started = _ignore,
     finished: Finished = _ignore,
     place: OtherEnvironment | None = None,
+    sandbox: Sandbox | None = None,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts; those marked `norun` are not, and nothing is told of them.
 
@@ -77,6 +86,7 @@ def run_scripts(
         started: is called in this thread; what it raises ends the run.
         finished: likewise.
         place: another interpreter that is to run them.
+        sandbox: what is to be around each.
 
     Returns:
         What each did, in the order of the jobs.
@@ -84,7 +94,7 @@ def run_scripts(
     Raises:
         EffectError: there is no place for temporary files, or the interpreter is none.
     """
-    with ScriptServer() as server:
+    with ScriptServer(sandbox=sandbox) as server:
         return server.run(
             root, jobs, parallel=parallel, started=started, finished=finished, place=place
         )
@@ -98,10 +108,12 @@ class ScriptServer:
 
     Args:
         fork: let scripts be copies of their supervisor, where they can.
+        sandbox: what is to be around each script; then none is left warm.
     """
 
-    def __init__(self, *, fork: bool = True) -> None:
+    def __init__(self, *, fork: bool = True, sandbox: Sandbox | None = None) -> None:
         self._fork = fork and sys.platform == "linux"
+        self._sandbox = sandbox
         self._idle: list[Worker] = []
         """Supervisors that wait for the next run."""
         self._installed: tuple[object, ...] = ()
@@ -138,7 +150,7 @@ class ScriptServer:
         Raises:
             RunStoppedError: it said so.
         """
-        work = _Work(root.resolve(), jobs, started, finished, place)
+        work = _Work(root.resolve(), jobs, started, finished, place, self._sandbox)
         if not work.waiting:
             return work.results()
         with temporary_folder() as work.scratch:
@@ -151,6 +163,7 @@ class ScriptServer:
         busy: set[Worker] = set()
         if work.place is not None:
             work.library = _library_alone(work.scratch)
+        work.look_around()
         log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
@@ -158,8 +171,12 @@ class ScriptServer:
                 for _ in range(min(max(parallel, 1), len(work.waiting))):
                     self._start(busy, selector, work)
                 while busy:
-                    for key, _ in selector.select(None if unwanted is None else _PATIENCE):
+                    asks = unwanted is not None or self._sandbox is not None
+                    for key, _ in selector.select(_PATIENCE if asks else None):
                         self._hear(key.data, busy, selector, work)
+                    for worker in busy:
+                        if time.monotonic() > worker.deadline:
+                            worker.kill()
                     if unwanted is not None and unwanted(work.running(busy)):
                         raise RunStoppedError
         finally:
@@ -173,7 +190,7 @@ class ScriptServer:
                     log.unlink()
 
     def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
-        worker = self._worker(work.environment, work.place)
+        worker = self._worker(work)
         busy.add(worker)
         selector.register(worker, selectors.EVENT_READ, worker)
         work.next(worker)
@@ -186,27 +203,27 @@ class ScriptServer:
             return
         selector.unregister(worker)
         busy.remove(worker)
-        if there:
+        if there and self._sandbox is None:
             self._idle.append(worker)
             return
         worker.close()
         if work.waiting:
             self._start(busy, selector, work)
 
-    def _worker(self, environment: Mapping[str, str], place: OtherEnvironment | None) -> Worker:
+    def _worker(self, work: _Work) -> Worker:
         """A supervisor that waits for a job: one that is left, or a new one."""
-        installed = _installed(place)
+        installed = _installed(work.place)
         if installed != self._installed:
             self.close()
             self._installed = installed
         while self._idle:
             worker = self._idle.pop()
             worker.rested = True
-            if worker.environment == environment and worker.is_there():
+            if worker.environment == work.environment and worker.is_there():
                 return worker
             worker.close()
-        python = sys.executable if place is None else place.python
-        return Worker(environment, python, fork=self._fork)
+        python = sys.executable if work.place is None else work.place.python
+        return Worker(work.environment, python, fork=self._fork, enclose=work.enclose)
 
 
 class _Work:
@@ -219,6 +236,7 @@ class _Work:
         started: Started,
         finished: Finished,
         place: OtherEnvironment | None,
+        sandbox: Sandbox | None,
     ) -> None:
         self.root = root
         self.jobs = jobs
@@ -227,6 +245,10 @@ class _Work:
         self.environment = _environment(place) | dict(jobs[0].environment if jobs else ())
         self.library = library_folder()
         self.place = place
+        self.sandbox = sandbox
+        self.enclose: Enclose | None = None
+        self.shown: dict[str, str] = {}
+        self.copied: list[tuple[str, str]] = []
         self.scratch = ""
         self.runs: dict[int, ScriptRun] = {
             i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
@@ -241,6 +263,14 @@ class _Work:
         files += [self.root / jobs[index].path for index in self.waiting]
         self.packages = wanted_packages(files) if self.waiting else ()
 
+    def look_around(self) -> None:
+        """Know what a sandbox is to show, now that there is a temporary folder."""
+        if self.sandbox is not None:
+            self.shown = visible(str(self.root), self.library, self.place)
+            self.copied = copied_folders(str(self.root), self.jobs, self.scratch)
+            command = self.sandbox.command
+            self.enclose = functools.partial(command, shown=self.shown, copied=self.copied)
+
     def next(self, worker: Worker) -> None:
         """Hand over the next job, if there is one."""
         if not self.waiting:
@@ -250,6 +280,8 @@ class _Work:
             self.told.add(index)
             self.started(self.jobs[index].path)
         worker.give(index, self._message(self.jobs[index]))
+        if self.sandbox is not None:  # a script can stop who supervises it
+            worker.deadline = time.monotonic() + self.jobs[index].timeout + _GRACE
 
     def hear(self, worker: Worker) -> bool:
         """Take what a supervisor says; `False` when it is gone."""
@@ -261,14 +293,31 @@ class _Work:
                     return False
                 if self.place is not None and worker.status() > 0:
                     raise EffectError(f"{self.place.python} cannot run scripts")
-                self._finish(index, _lost(self.jobs[index].path, worker.status()))
+                status = worker.status() if self.sandbox is None else -signal.SIGKILL
+                self._finish(index, _lost(self.jobs[index].path, status))
             return False
-        if worker.job is not None and (report := worker.take_report()) is not None:
-            index, worker.job = worker.job, None
-            worker.rested = False
-            self._finish(index, _script_run(str(self.root), self.jobs[index], *report))
-            self.next(worker)
+        if worker.job is not None:
+            try:
+                self._take(worker, worker.job)
+            except ValueError:
+                if self.sandbox is None:
+                    raise
+                worker.kill()  # the script has it say anything
         return True
+
+    def _take(self, worker: Worker, index: int) -> None:
+        """Take the report on a job, if it is here."""
+        report = worker.take_report()
+        if report is None:
+            return
+        run = _script_run(str(self.root), self.jobs[index], *report)
+        if self.sandbox is not None and run.trace is not None:
+            why = run.trace.opaque or difference(self.jobs[index], run.trace, self.shown)
+            run = replace(run, trace=replace(run.trace, opaque=why))
+        worker.job, worker.rested = None, False
+        self._finish(index, run)
+        if self.sandbox is None:
+            self.next(worker)
 
     def running(self, busy: Iterable[Worker]) -> frozenset[str]:
         """The paths of what these supervisors run."""
@@ -290,6 +339,7 @@ class _Work:
             "library": self.library,
             "folders": [f"{self.root}/{folder}" for folder in job.packages],
             "writes": [f"{self.root}/{folder}" for folder in job.writes],
+            "copied": self.copied,
             "figures": list(job.figures),
             "perturbation": job.perturbation,
             "memory": job.memory,
@@ -319,7 +369,8 @@ def _script_run(
     root: str, job: ScriptJob, report: supervisor.ChildReport, parts: Sequence[bytes | None]
 ) -> ScriptRun:
     out, err, trace, *figures = parts
-    assert out is not None and err is not None
+    if out is None or err is None:
+        raise ValueError("a report without output")
     stdout, is_text = _decode(out)
     outcome = Outcome(report["outcome"])
     if outcome is Outcome.OK and not is_text:

@@ -58,6 +58,8 @@ class Job(TypedDict):
     """Folders of the project to import from before."""
     writes: list[str]
     """Folders of the project that the script may write into."""
+    copied: list[tuple[str, str]]
+    """In a sandbox, these folders, and where what they are to hold is to be copied from."""
     figures: list[str]
     """Names of files that it draws, in its working directory."""
     memory: int

@@ -179,6 +179,8 @@ class _Supervisor:
         start = time.monotonic()
         try:
             try:
+                for written, place in job["copied"]:
+                    shutil.copytree(place, written, symlinks=True, dirs_exist_ok=True)
                 folder = _temporary(job["scratch"])
                 parent = os.getppid()  # now, since a script may end it as soon as it runs
                 launched = self._launch(job, environment | {"TMPDIR": folder})
@@ -283,7 +285,8 @@ def _notes(shared: mmap.mmap | None, overflow: str) -> bytes:
     with contextlib.suppress(OSError):
         for path in sorted(Path(overflow).iterdir()):
             with contextlib.suppress(OSError):
-                parts.append(path.read_bytes())
+                if path.is_file():
+                    parts.append(path.read_bytes())
     return b"\0".join(parts)
 
 
@@ -332,7 +335,7 @@ def _temporary(scratch: str) -> str:
             continue
         except FileNotFoundError:
             with contextlib.suppress(FileExistsError):
-                Path(scratch).mkdir(mode=0o700)
+                Path(scratch).mkdir(mode=0o700, parents=True)
 
 
 def _drawn(folder: str, names: Sequence[str]) -> list[bytes | None]:
@@ -343,11 +346,12 @@ def _drawn(folder: str, names: Sequence[str]) -> list[bytes | None]:
     found: list[bytes | None] = []
     for name in names:
         path = Path(figure_path(folder, name))
-        try:
-            with path.open("rb") as file:
-                found.append(file.read(FIGURE_LIMIT + 1) if path.is_file() else None)
-        except OSError:
-            found.append(None)
+        data = None
+        with contextlib.suppress(OSError):
+            if path.is_file():  # to open a pipe may take for ever
+                with path.open("rb") as file:
+                    data = file.read(FIGURE_LIMIT + 1)
+        found.append(data)
     return found
 
 

@@ -7,15 +7,22 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import os
 import select
 import selectors
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+import msgspec
 
 from coursebuild.core.run import supervisor
+
+Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], list[str]]
+"""Of a command and an environment, the command that runs that in a sandbox."""
+_MOST = 256 << 20
+"""Bytes that a report may have."""
 
 
 class Worker:
@@ -25,22 +32,29 @@ class Worker:
         environment: what scripts find around them.
         python: the interpreter that runs them.
         fork: whether they may be copies of the supervisor.
+        enclose: gives the command that runs another one in a sandbox.
 
     Raises:
         OSError: there is no place for another process.
     """
 
-    def __init__(self, environment: Mapping[str, str], python: str, *, fork: bool) -> None:
+    def __init__(
+        self, environment: Mapping[str, str], python: str, *, fork: bool, enclose: Enclose | None
+    ) -> None:
         self.environment = environment
         self.job: int | None = None
         """What it works on: the index of a job."""
         self.rested = False
         """Whether it is as it was left by an earlier run, and has reported nothing since."""
+        self.deadline = float("inf")
+        """When it must have reported, by `time.monotonic`."""
         self._buffer = bytearray()
         theirs, jobs = os.pipe()
         self.reports, theirs_too = os.pipe()
         self.jobs: int | None = jobs
         command = [python, supervisor.PROGRAM, str(theirs), str(theirs_too), str(int(fork))]
+        if enclose is not None:  # nothing that a course sets is for who makes the sandbox
+            command, environment = enclose(command, environment), {}
         try:
             self._process = subprocess.Popen(
                 command,
@@ -75,6 +89,10 @@ class Worker:
             while rest:
                 rest = rest[os.write(self.jobs, rest) :]
 
+    def kill(self) -> None:
+        """End it at once; on Linux, what it runs with it."""
+        self._process.kill()
+
     def is_there(self) -> bool:
         """Whether it waits for a job: while it does it says nothing, unless it ends."""
         return self.job is None and not select.select([self.reports], [], [], 0)[0]
@@ -92,16 +110,25 @@ class Worker:
         return bool(data)
 
     def take_report(self) -> tuple[supervisor.ChildReport, list[bytes | None]] | None:
-        """A whole report with its parts, if it is here."""
+        """A whole report with its parts, if it is here.
+
+        Raises:
+            ValueError: it is none.
+        """
         size = supervisor.LENGTH.size
         if len(self._buffer) < size:
             return None
         (length,) = supervisor.LENGTH.unpack(self._buffer[:size])
         at = size + length
+        if at > _MOST:
+            raise ValueError("too long")
         if len(self._buffer) < at:
             return None
-        report: supervisor.ChildReport = json.loads(self._buffer[size:at])
-        if len(self._buffer) < at + sum(max(length, 0) for length in report["lengths"]):
+        report = msgspec.json.decode(self._buffer[size:at], type=supervisor.ChildReport)
+        whole = at + sum(max(length, 0) for length in report["lengths"])
+        if whole > _MOST:
+            raise ValueError("too long")
+        if len(self._buffer) < whole:
             return None
         rest = io.BytesIO(self._buffer[at:])
         self._buffer.clear()
@@ -119,7 +146,7 @@ class Worker:
                 self._wait(10.0)
         finally:
             os.close(self.reports)
-            self._process.kill()  # if it is still there; on Linux the script dies with it
+            self.kill()  # if it is still there
             self._process.wait()
 
     def _wait(self, seconds: float) -> None:

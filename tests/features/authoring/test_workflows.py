@@ -18,6 +18,7 @@ from coursebuild import __version__
 from coursebuild.cli.commands import known_commands, parser_of
 from coursebuild.core.run.versions import engine_version
 from support.markdown_files import DOCS, ROOT, fences
+from support.sandboxes import require_sandbox
 from support.scratch_course import FIRST, SECOND, Folder
 from support.workflows import Runner, Step, commit, git
 
@@ -28,6 +29,10 @@ COURSE = ".github/workflows/course.yml"
 WEEKLY = ".github/workflows/weekly.yml"
 PINNED = re.compile(
     r"actions/[a-z/-]+@(v\d+|[0-9a-f]{40})|\./|OWNER/coursebuild@v" + re.escape(__version__)
+)
+SUDO = (
+    "sudo apt-get install --quiet --yes bubblewrap",
+    "sudo sysctl kernel.apparmor_restrict_unprivileged_userns=0",
 )
 HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
@@ -166,6 +171,7 @@ def statuses(steps: list[Step]) -> list[int]:
 def test_only_main_is_published_and_a_pull_request_is_told_what_it_does(
     course: Folder, runner: Runner
 ) -> None:
+    require_sandbox(course.root)
     done = push(runner)
     assert {name: statuses(steps) for name, steps in done.items()} == {
         "build": [0, 0],
@@ -177,8 +183,8 @@ def test_only_main_is_published_and_a_pull_request_is_told_what_it_does(
     assert kept == [f"course-{git(course.root, 'rev-parse', 'main')}"]
 
     wrong = propose(runner, course, SECOND.replace("```text\n2", "```text\n3"))
-    assert statuses(wrong) == [0, 1, 0], "without a build, and with a report"
-    assert wrong[1].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
+    assert statuses(wrong) == [0, 0, 1, 0], "without a build, and with a report"
+    assert wrong[2].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
     assert "| `examples/two.py` | 1.2 | numeric: 1 (relative, up to 5.0e-01) |" in runner.summary
     assert "-2\n+3\n" in runner.summary
     assert runner.summary.endswith("Not compared: there is no site in `preview`.\n")
@@ -186,12 +192,13 @@ def test_only_main_is_published_and_a_pull_request_is_told_what_it_does(
     right = propose(
         runner, course, SECOND.replace("print(2)", "print(12)").replace("\n2\n", "\n12\n")
     )
-    assert statuses(right) == [0, 0, 0, 0], right
-    assert "running scripts (1)\n" in right[1].err, "the other one is kept"
+    assert statuses(right) == [0] * 5, right
+    assert "running scripts (1)\n" in right[2].err, "the other one is kept"
     assert "\n| the whole site | " in runner.summary
     assert [*runner.caches] == kept
     assert ">12</" not in page.read_text()
-    assert runner.notes == [f"pip install coursebuild=={__version__}"] * 3
+    pip, *sudo = f"pip install coursebuild=={__version__}", *SUDO
+    assert runner.notes == [pip, pip, *sudo, pip, *sudo]
 
 
 @pytest.mark.site

@@ -1,0 +1,348 @@
+"""Scripts in the sandbox try to get out of it.
+
+Where a machine can have no sandbox, each of these tests looks at how it is refused, and says so.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.core.run.runner import run_scripts
+from coursebuild.core.run.sandbox import find_sandbox
+from support.runners import gone
+from support.sandboxes import require_sandbox
+
+pytestmark = pytest.mark.site
+
+Confine = Callable[..., list[ScriptRun]]
+TRY = """
+import os, sys
+def attempt(what):
+    try:
+        print(what())
+    except BaseException as error:
+        print(type(error).__name__, error)
+"""
+"""Says what came of an attempt, whatever that is."""
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "secret").write_text("hush")
+    monkeypatch.setenv("HOME", str(home))
+    return home
+
+
+@pytest.fixture
+def confine(root: Path, home: Path) -> Confine:
+    """Runs scripts in the sandbox, one after the other."""
+
+    def confine(*codes: str, **options: object) -> list[ScriptRun]:
+        jobs = []
+        for number, code in enumerate(codes):
+            (root / f"examples/x{number}.py").write_text(TRY + code)
+            jobs.append(ScriptJob(f"examples/x{number}.py", (), 60.0, (), False, **options))  # type: ignore[arg-type]
+        return list(run_scripts(root, jobs, parallel=1, sandbox=require_sandbox(root)))
+
+    return confine
+
+
+@pytest.fixture
+def neighbour() -> Iterator[int]:
+    """Another process of the same user, with a secret in its environment."""
+    program = [sys.executable, "-c", "print(flush=True); import time; time.sleep(600)"]
+    environment = {**os.environ, "SECRET": "hush"}
+    with subprocess.Popen(program, env=environment, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stdout.readline()
+        yield process.pid
+        process.kill()
+
+
+class TestAttempts:
+    def test_the_network_by_address_and_by_name(self, confine: Confine) -> None:
+        with (
+            socket.create_server(("127.0.0.1", 0)) as tcp,
+            socket.socket(socket.AF_UNIX) as abstract,
+        ):
+            name = f"\0coursebuild-{os.getpid()}"
+            abstract.bind(name)
+            abstract.listen()
+            port = tcp.getsockname()[1]
+            (run,) = confine(
+                "import socket\n"
+                f"attempt(lambda: socket.create_connection(('127.0.0.1', {port}), 5))\n"
+                "attempt(lambda: socket.create_connection(('192.0.2.1', 80), 5))\n"
+                f"attempt(lambda: socket.create_connection(('localhost', {port}), 5))\n"
+                "attempt(lambda: socket.getaddrinfo('example.org', 80))\n"
+                f"attempt(lambda: socket.socket(socket.AF_UNIX).connect({name!r}))\n"
+            )
+            tcp.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                tcp.accept()
+        said = run.stdout.splitlines()
+        assert [line.split()[0] for line in said] == [
+            "ConnectionRefusedError",
+            "OSError",
+            said[2].split()[0],
+            "gaierror",
+            "ConnectionRefusedError",
+        ]
+        assert said[2].split()[0] in ("ConnectionRefusedError", "gaierror", "OSError")
+        assert run.trace is not None
+        assert [each.what for each in run.trace.effects] == [
+            *("127.0.0.1", "192.0.2.1", "localhost", "example.org"),
+        ]
+
+    def test_writing_to_the_course(self, confine: Confine, root: Path) -> None:
+        (root / "lesson.md").write_text("as it was")
+        (run,) = confine(
+            "attempt(lambda: open('lesson.md', 'a'))\n"
+            "attempt(lambda: open('new', 'w'))\n"
+            "attempt(lambda: os.mkdir('folder'))\n"
+            "attempt(lambda: os.remove('lesson.md'))\n"
+            "attempt(lambda: os.rename('lesson.md', '/tmp/moved'))\n"
+            "attempt(lambda: os.chmod('lesson.md', 0o777))\n"
+            "attempt(lambda: os.symlink('/etc/passwd', 'examples/y.py'))\n"
+            "import ctypes\n"
+            "libc = ctypes.CDLL(None)\n"
+            "attempt(lambda: libc.mount(b'', os.fsencode(os.getcwd()), b'', 4128, None))\n"
+            "attempt(lambda: libc.umount2(os.fsencode(os.getcwd()), 2))\n"
+        )
+        said = run.stdout.splitlines()
+        assert [line for line in said if not line.startswith("OSError [Errno ")] == ["-1", "-1"]
+        assert len(said) == 9
+        assert (root / "lesson.md").read_text() == "as it was"
+        assert sorted(path.name for path in root.iterdir()) == ["examples", "lesson.md"]
+
+    def test_the_folder_of_the_user(self, confine: Confine, home: Path) -> None:
+        (run,) = confine(
+            "attempt(lambda: open(os.path.expanduser('~/secret')).read())\n"
+            "os.makedirs(os.path.expanduser('~/.config'), exist_ok=True)\n"
+            "open(os.path.expanduser('~/.profile'), 'w').write('evil')\n"
+        )
+        assert run.outcome is Outcome.OK, run.stderr
+        assert run.stdout.startswith("FileNotFoundError")
+        assert [path.name for path in home.iterdir()] == ["secret"]
+
+    def test_other_processes_and_their_environments(
+        self, confine: Confine, neighbour: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("GITHUB_TOKEN", "hush")
+        (run,) = confine(
+            "import glob\n"
+            "for path in glob.glob('/proc/[0-9]*/environ') + glob.glob('/proc/[0-9]*/cmdline'):\n"
+            "    attempt(lambda: open(path).read())\n"
+            "attempt(lambda: sorted(os.environ))\n"
+            "attempt(lambda: all(int(n) < 9 for n in os.listdir('/proc') if n.isdigit()))\n"
+        )
+        assert "hush" not in run.stdout
+        assert "GITHUB_TOKEN" not in run.stdout
+        assert run.stdout.endswith("True\n")
+
+    def test_signals_and_tracing(self, confine: Confine, neighbour: int) -> None:
+        code = (
+            f"others = {neighbour}, {os.getpid()}, {os.getppid()}\n"
+            "import ctypes\n"
+            "libc = ctypes.CDLL(None)\n"
+            "for pid in others:\n"
+            "    attempt(lambda: os.kill(pid, 9))\n"
+            "    attempt(lambda: libc.ptrace(16, pid, 0, 0))\n"
+            "    attempt(lambda: os.sched_setaffinity(pid, {0}))\n"
+            "sys.stdout.flush()\n"
+            "os.kill(os.getppid(), 15)\n"
+            "os.kill(-1, 9)\n"
+        )
+        first, second = confine(code, "print('as before')")
+        assert first.outcome is Outcome.KILLED
+        assert (second.outcome, second.stdout) == (Outcome.OK, "as before\n")
+        (run,) = confine(code.partition("sys.stdout")[0])
+        for one, two, three in zip(*[iter(run.stdout.splitlines())] * 3, strict=True):
+            assert (one.split()[0], two, three.split()[0]) == (
+                "ProcessLookupError",
+                "-1",
+                "ProcessLookupError",
+            )
+        assert Path(f"/proc/{neighbour}").exists()
+
+    def test_descriptors(self, confine: Confine, home: Path) -> None:
+        with (home / "secret").open() as held:
+            os.set_inheritable(held.fileno(), True)
+            (run,) = confine(
+                "import glob\n"
+                "for path in glob.glob('/proc/[0-9]*/fd/*'):\n"
+                "    attempt(lambda: os.readlink(path))\n"
+            )
+        assert "secret" not in run.stdout and "/dev/null" in run.stdout
+
+    def test_speaking_for_another_script(self, confine: Confine) -> None:
+        forge = (
+            "import glob\n"
+            "parent = os.getppid()\n"
+            "for path in glob.glob(f'/proc/{parent}/fd/*'):\n"
+            "    try:\n"
+            "        with open(path, 'wb', buffering=0) as pipe: pipe.write(%r)\n"
+            "    except OSError: pass\n"
+        )
+        texts = (b"\xff" * 64, b"\0\0\0\2{}", b'\0\0\0\x0e{"lengths":[]}' + b"x" * 9)
+        *forged, last = confine(*(forge % text for text in texts), "print('mine')")
+        assert all(run.outcome in (Outcome.KILLED, Outcome.OK) for run in forged)
+        assert (last.outcome, last.stdout) == (Outcome.OK, "mine\n")
+
+    def test_a_process_that_stays(self, confine: Confine) -> None:
+        mark = f"600.{os.getpid()}"
+        (run,) = confine(
+            "if not os.fork():\n"
+            "    os.setsid()\n"
+            "    if os.fork(): os._exit(0)\n"
+            "    null = os.open('/dev/null', os.O_RDWR)\n"
+            "    for fd in 0, 1, 2: os.dup2(null, fd)\n"
+            f"    os.execv('/bin/sleep', ['sleep', '{mark}'])\n"
+            "os.wait()\n"
+        )
+        assert run.outcome is Outcome.OK, run.stderr
+        for path in Path("/proc").glob("[0-9]*/cmdline"):
+            try:
+                found = mark.encode() in path.read_bytes()
+            except OSError:
+                continue
+            assert not found or gone(int(path.parent.name))
+
+    def test_filling_the_disk(self, confine: Confine, root: Path) -> None:
+        (run,) = confine(
+            "home = os.path.expanduser('~')\n"
+            "for folder in os.environ['TMPDIR'], home, '/dev/shm', 'runs', '/':\n"
+            "    os.makedirs(folder, exist_ok=True)\n"
+            "    with open(folder + '/large', 'wb') as file:\n"
+            "        attempt(lambda: os.posix_fallocate(file.fileno(), 0, 2 << 30))\n",
+            writes=("runs",),
+        )
+        assert run.stdout.splitlines() == ["OSError [Errno 28] No space left on device"] * 5
+        assert not list(root.glob("runs/*"))
+
+    def test_links_that_the_tool_would_follow(
+        self, confine: Confine, root: Path, home: Path
+    ) -> None:
+        secret = str(home / "secret")
+        (root / "linked").symlink_to(home)
+        (run,) = confine(
+            "folder = os.environ['TMPDIR'] + '/figures-of-this-script'\n"
+            f"os.symlink({secret!r}, folder + '/a.csv')\n"
+            "os.mkfifo(folder + '/b.csv')\n"
+            f"os.symlink({secret!r}, 'runs/c.csv')\n"
+            "attempt(lambda: os.listdir('linked'))\n",
+            figures=("a.csv", "b.csv"),
+            writes=("runs", "linked"),
+        )
+        assert run.outcome is Outcome.OK, run.stderr
+        assert run.figures == ()
+        assert run.stdout.startswith("FileNotFoundError")
+        assert not list(root.glob("runs/*"))
+        assert [path.name for path in home.iterdir()] == ["secret"]
+
+    def test_the_system(self, confine: Confine) -> None:
+        (run,) = confine(
+            "attempt(lambda: open('/proc/sys/kernel/core_pattern', 'w'))\n"
+            "attempt(lambda: open('/proc/sysrq-trigger', 'w'))\n"
+            "attempt(lambda: open('/usr/evil', 'w'))\n"
+            "attempt(lambda: open(sys.executable, 'a'))\n"
+            "attempt(lambda: open('/dev/evil', 'w'))\n"
+            "attempt(lambda: open('/etc/shadow').read())\n"
+            "attempt(lambda: os.listdir('/run'))\n"
+            "import ctypes\n"
+            "attempt(lambda: ctypes.CDLL(None).unshare(0x10000000))\n"
+        )
+        said = run.stdout.splitlines()
+        assert len(said) == 8 and said.pop() == "-1"
+        assert all(line.startswith(("OSError", "FileNotFound", "Permission")) for line in said)
+
+    @pytest.mark.slow
+    def test_stopping_who_supervises(self, confine: Confine) -> None:
+        first, second = confine("os.kill(os.getppid(), 19)\n" * 3, "print('as before')")
+        assert first.outcome is Outcome.KILLED
+        assert second.stdout == "as before\n"
+
+
+class TestResults:
+    """What behaves well does the same as outside."""
+
+    CODE = """
+import numpy, mujoco, helper
+from mjcourse import spatial
+from pathlib import Path
+with open("a.csv", "w") as file:
+    file.write("1,2\\n")
+model = mujoco.MjModel.from_xml_path("models/a.xml")
+old = Path("runs/old.csv").read_text()
+print(model.ngeom, helper.VALUE, old, os.getcwd(), os.path.expanduser("~"))
+"""
+
+    @pytest.fixture(autouse=True)
+    def course(self, root: Path) -> None:
+        for path, text in {
+            "models/a.xml": "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>",
+            "examples/helper.py": "VALUE = 3",
+            "runs/old.csv": "old",
+        }.items():
+            (root / path).parent.mkdir(exist_ok=True)
+            (root / path).write_text(text)
+
+    def test_they_are_the_same(self, confine: Confine, root: Path) -> None:
+        (inside,) = confine(self.CODE, figures=("a.csv",))
+        job = ScriptJob("examples/x0.py", (), 60.0, (), False, figures=("a.csv",))
+        (outside,) = run_scripts(root, [job], parallel=1)
+        assert outside.outcome is Outcome.OK, outside.stderr
+        for name in ("outcome", "stdout", "stderr", "figures", "trace"):
+            assert getattr(inside, name) == getattr(outside, name)
+
+    def test_what_is_written_is_seen_and_goes(self, confine: Confine, root: Path) -> None:
+        code = "open('runs/new', 'w').write(open('runs/old.csv').read())\nprint(os.listdir('runs'))"
+        (run,) = confine(f"open('runs/old.csv', 'a').write('er')\n{code}", writes=("runs",))
+        assert run.stdout == "['old.csv', 'new']\n" or run.stdout == "['new', 'old.csv']\n"
+        assert run.trace is not None
+        assert run.trace.opaque == "what it wrote went with its sandbox"
+        assert [path.name for path in root.glob("runs/*")] == ["old.csv"]
+        assert (root / "runs/old.csv").read_text() == "old"
+
+    def test_what_is_not_shown_is_no_result(self, confine: Confine, home: Path) -> None:
+        (run,) = confine("attempt(lambda: open(os.path.expanduser('~/secret')))")
+        assert run.trace is not None
+        assert run.trace.opaque == f"its sandbox does not show {home}/secret"
+
+
+class TestRefusals:
+    @pytest.fixture
+    def programs(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+        """The only folder on PATH."""
+        folder = tmp_path / "programs"
+        folder.mkdir()
+        monkeypatch.setenv("PATH", str(folder))
+        return folder
+
+    def test_without_bubblewrap(self, programs: Path, root: Path) -> None:
+        with pytest.raises(EffectError) as refused:
+            find_sandbox(root)
+        assert refused.value.message == (
+            "`--sandbox` needs Bubblewrap, and there is no program `bwrap`"
+        )
+        assert refused.value.help == "install it, as by `apt-get install bubblewrap`"
+
+    def test_without_user_namespaces(self, programs: Path, root: Path) -> None:
+        shell, said = shutil.which("sh", path="/bin:/usr/bin"), "setting up uid map: not permitted"
+        (programs / "bwrap").write_text(f"#!{shell}\necho 'bwrap: {said}' >&2\nexit 1\n")
+        (programs / "bwrap").chmod(0o755)
+        with pytest.raises(EffectError) as refused:
+            find_sandbox(root)
+        assert refused.value.message == (f"`--sandbox` does not work here, Bubblewrap says: {said}")
+        assert "kernel.apparmor_restrict_unprivileged_userns" in refused.value.help
