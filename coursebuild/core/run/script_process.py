@@ -16,6 +16,7 @@ import ctypes
 import importlib
 import io
 import os
+import site
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,7 @@ from coursebuild.core.run import (
     mujoco_tracing,
     mujoco_watching,
 )
-from coursebuild.core.run.tracing import Sink, Tracer, installed_folders, library_folders
+from coursebuild.core.run.tracing import Sink, Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
 """What is imported for a package. None does anything that a script could see."""
@@ -232,12 +233,28 @@ class ScriptProcess:
         sys.path.insert(0, os.path.dirname(self.path))  # noqa: PTH120
 
     def _tracer(self) -> Tracer:
-        installed = installed_folders()
+        installed = _installed_folders()
         if "PYTHONPATH" in self._environment:
-            installed += library_folders(self.job["root"], self.job["library"])
+            installed += _library_folders(self.job["root"], self.job["library"])
         root, temporary = self.job["root"], self._environment["TMPDIR"]
         writable = self.job["writes"]
         return Tracer(root, temporary, installed, self._notes, self._sink, writable)
+
+
+def _library_folders(root: str, library: str) -> list[str]:
+    """Where `mjcourse` is when it is not installed; nothing where the project itself holds it."""
+    if f"{library}/".startswith(f"{root}/"):
+        return []
+    return [f"{library}/mjcourse"]
+
+
+def _installed_folders() -> list[str]:
+    """The folders of Python's own modules and of installed packages, also as they really are."""
+    found = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
+    found.update(f for f in sys.path if f.endswith(("/site-packages", "/dist-packages")))
+    if site.ENABLE_USER_SITE:
+        found.add(site.getusersitepackages())
+    return sorted({f for folder in found for f in (folder, os.path.realpath(folder))})
 
 
 def figure_path(temporary: str, name: str) -> str:

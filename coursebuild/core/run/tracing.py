@@ -32,9 +32,7 @@ from __future__ import annotations
 
 import _imp
 import contextlib
-import os
 import posix
-import site
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib.machinery import PathFinder
@@ -441,19 +439,3 @@ def _exists(path: str) -> bool:
     except (OSError, ValueError):
         return False
     return True
-
-
-def library_folders(root: str, library: str) -> list[str]:
-    """Where `mjcourse` is when it is not installed; nothing where the project itself holds it."""
-    if f"{library}/".startswith(f"{root}/"):
-        return []
-    return [f"{library}/mjcourse"]
-
-
-def installed_folders() -> list[str]:
-    """The folders of Python's own modules and of installed packages, also as they really are."""
-    found = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
-    found.update(f for f in sys.path if f.endswith(("/site-packages", "/dist-packages")))
-    if site.ENABLE_USER_SITE:
-        found.add(site.getusersitepackages())
-    return sorted({f for folder in found for f in (folder, os.path.realpath(folder))})
