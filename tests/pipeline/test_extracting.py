@@ -142,22 +142,6 @@ def test_of_two_edits_neither_is_lost(make: Make) -> None:
     assert folder.main("extract").status == 0
 
 
-def test_where_a_lesson_is_read_only_none_is_changed(make: Make) -> None:
-    folder = make(TWO, "## Three\n\n" + block("c.py", "print('c')", "c"))
-    folder.main("extract")
-    folder.write("examples/a.py", "print('edited')\n")
-    folder.write("examples/c.py", "print('edited')\n")
-    (folder.root / folder.lesson(2)).chmod(0o444)
-    done = folder.main("extract", "--adopt")
-    assert done.status == 1
-    assert f"{folder.lesson(2)} is read-only" in done.out + done.err
-    assert folder.text(folder.lesson()) == TWO
-    (folder.root / folder.lesson(2)).chmod(0o644)
-    assert folder.main("extract", "--adopt").status == 0
-    assert "print('edited')" in folder.text(folder.lesson())
-    assert "print('edited')" in folder.text(folder.lesson(2))
-
-
 def test_a_read_only_example_is_adopted_and_settled(make: Make) -> None:
     """It is derived, so it is made anew whatever its mode."""
     folder = make(TWO)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 
 import pytest
@@ -88,32 +87,6 @@ else:
     assert folder.main("check", "--jobs", "2").status == 0
 
 
-def test_json_report_of_drift(make: Make) -> None:
-    folder = make(DRIFTED + block("skipped.py", "pass", info="requires=no_such_module"))
-    done = folder.main("check", "--format", "json")
-    assert done.status == 1
-    found = json.loads(done.out)
-    assert {"diagnostics", "scripts", "summary"} <= found.keys()
-    [drift] = found["diagnostics"]
-    keys = "rule severity path line column end_line end_column message help notes"
-    assert set(keys.split()) <= set(drift)
-    line = folder.text(folder.lesson()).splitlines().index("value 1.35") + 1
-    assert drift["rule"] == "output-drift"
-    assert drift["severity"] == "error"
-    assert drift["path"] == folder.lesson()
-    assert (drift["line"], drift["column"]) == (line, 7)
-    assert (drift["end_line"], drift["end_column"]) == (line, 11)
-    assert drift["message"] and drift["help"] and isinstance(drift["notes"], list)
-    ran, skipped = found["scripts"]
-    assert list(ran) == ["path", "lesson", "status", "seconds", "cached", "missing"]
-    assert (ran["path"], ran["lesson"], ran["status"]) == ("examples/one.py", "1.1", "drift")
-    assert ran["seconds"] > 0 and ran["cached"] is False
-    assert skipped["status"] == "skipped"
-    summary = found["summary"]
-    assert (summary["ok"], summary["errors"], summary["ran"]) == (False, 1, 1)
-    assert (summary["lessons"], summary["scripts"], summary["skipped"]) == (1, 2, 1)
-
-
 def test_json_of_a_clean_course_tells_what_ran_and_of_a_broken_map_the_mistake(make: Make) -> None:
     folder = make(GOOD)
     for ran, cached in ((1, 0), (0, 1)):
@@ -136,52 +109,3 @@ def test_json_is_utf8_whatever_the_locale(make: Make) -> None:
     assert done.status == 1
     assert "examples/größe.py" in done.out
     assert json.loads(done.out)["scripts"][0]["path"] == "examples/größe.py"
-
-
-def test_other_forms_of_a_report_of_drift(make: Make) -> None:
-    folder = make(DRIFTED)
-
-    def shown(form: str) -> str:
-        done = folder.main("check", "--format", form)
-        assert done.status == 1
-        return done.out
-
-    suite = ET.fromstring(shown("junit"))[0]
-    assert {key: suite.get(key) for key in ("tests", "failures")} == {"tests": "2", "failures": "2"}
-    [script, lesson] = suite
-    assert script.get("name") == "examples/one.py"
-    failure = lesson.find("failure")
-    assert failure is not None and failure.get("type") == "output-drift"
-    [run] = json.loads(shown("sarif"))["runs"]
-    [result] = run["results"]
-    assert result["ruleId"] == "output-drift"
-    place = result["locations"][0]["physicalLocation"]
-    assert place["artifactLocation"]["uri"] == folder.lesson()
-    assert place["region"]["startColumn"] == 7
-    [line] = shown("github").splitlines()
-    assert line.startswith(f"::error file={folder.lesson()},line=")
-    folder.write(folder.lesson(), GOOD)
-    assert folder.main("check", "--format", "github").out == ""
-
-
-def test_everything_wrong_is_told_at_once(make: Make) -> None:
-    folder = make(
-        DRIFTED + "> [!nosuch]\n> Text.\n\n$\\frac{1$\n",
-        "# Two\n\n" + block("two.py", "raise SystemExit(3)") + "[x](lesson:8.8)\n",
-    )
-    folder.write("models/m.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
-    folder.write("content/lessons/9.9-stray.md", "## Stray\n\n```io\nINPUT: x\nPROCESS: y\n```\n")
-    done = folder.main("check", "--format", "json")
-    assert done.status == 1
-    found = json.loads(done.out)["diagnostics"]
-    assert [(d["path"].rpartition("/")[2], d["rule"]) for d in found] == [
-        ("1.1-one.md", "output-drift"),
-        ("1.1-one.md", "callout-unknown"),
-        ("1.1-one.md", "math-syntax"),
-        ("1.2-two.md", "heading-top"),
-        ("1.2-two.md", "script-failed"),
-        ("1.2-two.md", "link-lesson"),
-        ("9.9-stray.md", "lesson-unlisted"),
-        ("9.9-stray.md", "io-missing"),
-        ("m.xml", "model-error"),
-    ]

@@ -196,60 +196,6 @@ def test_a_script_that_fails_is_told_at_its_line_as_it_is_now(make: Make) -> Non
     assert "up to date" not in done.out
 
 
-def test_what_is_printed_in_the_place_of_a_number_is_told(make: Make) -> None:
-    """And not what is nearest: of another quantity, it would make the sentence false."""
-    code = "print('period  ', 2.95, 's')\nprint('half    ', 1.975, 's')"
-    folder = make(
-        "## One\n\n"
-        + block("x.py", code, "period   2.006 s\nhalf     1.003 s")
-        + "The period is `2.006 s`{out}.\n\n| half |\n| --- |\n| `1.0`{out} |\n",
-        "## Two\n\nIt was `2.01`{out=examples/x.py}, or `8.1`{out=examples/x.py}.\n",
-    )
-    assert "error[output-drift]" in folder.main("check").out
-    done = folder.main("update")
-    assert (done.status, done.out.count("error[binding-mismatch]")) == (1, 4)
-    assert "period   2.95 s\n" in folder.text(folder.lesson())
-    assert "`2.006 s`{out}" in folder.text(folder.lesson())
-    told = [line.strip() for line in done.out.splitlines() if "^^" in line or "= help" in line]
-    assert [line.partition("^ ")[2] or line for line in told] == [
-        "2.95 is printed where 2.006 was",
-        "= help: write `2.950 s`",
-        "1.975 is printed where 1.003 was",
-        "= help: write `2.0`",
-        "2.95 is printed where 2.006 was",
-        "= help: write `2.95`",
-        "the nearest printed value is 2.95",
-    ]
-
-
-UNRECORDED = [
-    ("print('a\\n```\\nb')", "", "the output has a line that would close this fence"),
-    ("print('a\\0b')", "", "NUL character"),
-    ("pass", "", "printed nothing"),
-    ("print('new', 1)", "ellipsis", "cannot be brought up to date here"),
-    (
-        "from pathlib import Path\nonce = Path('once')\nprint(1)\n"
-        "if once.exists():\n    1/0\nonce.touch()",
-        "",
-        "error[script-failed]",  # only the second time
-    ),
-]
-
-
-def test_output_that_cannot_be_recorded_is_told_and_nothing_written(make: Make) -> None:
-    scripts = [
-        block(f"x{number}.py", code, "old ... line\nother", how)
-        for number, (code, how, _) in enumerate(UNRECORDED)
-    ]
-    lesson = "## One\n\n" + "".join(scripts)
-    folder = make(lesson)
-    done = folder.main("update")
-    assert done.status == 1
-    assert [says for _, _, says in UNRECORDED if says not in done.out] == []
-    assert "up to date:" not in done.out
-    assert folder.text(folder.lesson()) == lesson
-
-
 def test_an_update_of_a_course_with_other_mistakes(make: Make) -> None:
     latin = b"## One\n\ncaf\xe9\n\n" + block("x.py", "print(1)", "OLD").encode()
     folder = make(latin, GOOD.replace("hello 3.14159\n", "OLD\n") + "[gone](lesson:7.7)\n")

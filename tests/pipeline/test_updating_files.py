@@ -7,10 +7,8 @@ import os
 import signal
 import stat
 import subprocess
-import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -156,31 +154,3 @@ def test_a_build_does_not_wait_for_a_dead_one(make: Make) -> None:
         first.wait()
     folder.write("go", "")
     assert folder.main("build").status == 0
-
-
-def test_update_never_overwrites_what_an_editor_saves_meanwhile(make: Make, tmp_path: Path) -> None:
-    """Whatever the moment of a save, its text is what stands in the lesson afterwards."""
-    folder = make("## One\n\n" + block("x.py", "print(1)", "OLD"))
-    stop = threading.Event()
-    saved: list[bytes] = []
-
-    def save() -> None:
-        number = 0
-        while not stop.wait(0.002):
-            number += 1
-            text = "## One\n\n" + block("x.py", "print(1)", "OLD") + f"Edit {number}.\n"
-            fresh = tmp_path / "fresh"
-            fresh.write_text(text)
-            saved.append(text.encode())
-            fresh.replace(folder.root / folder.lesson())
-
-    editor = threading.Thread(target=save)
-    editor.start()
-    try:
-        statuses = {folder.main("update").status for _ in range(4)}
-    finally:
-        stop.set()
-        editor.join()
-    left = folder.read(folder.lesson())
-    assert statuses <= {0, 1}
-    assert left.replace(b"\n1\n", b"\nOLD\n") == saved[-1]
