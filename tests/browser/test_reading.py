@@ -141,14 +141,18 @@ def test_a_long_line_is_shown_from_its_beginning(open_page: OpenPage) -> None:
     becomes(page, lambda: box.evaluate(shown), [True, 0])
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("Callouts", "text=Of the kind established."), ("Links lead in here", "#inside")],
+)
 def test_a_link_opens_the_section_that_it_leads_into(
-    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site], name: str, text: str
 ) -> None:
     page = browsers["plain"].new_page(viewport={"width": 1440, "height": 900})
     page.goto(sites["full"].url("lessons/1.1-text.html") + "#prose")
-    inside = page.locator("#inside")
+    inside = page.locator(text)
     expect(inside).not_to_be_visible()
-    page.locator(".toc").get_by_role("link", name="Links lead in here").click()
+    page.locator(".toc").get_by_role("link", name=name, exact=True).click()
     expect(inside).to_be_in_viewport()
     page.close()
 

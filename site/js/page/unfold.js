@@ -7,12 +7,13 @@ export function unfold(element) {
   for (let fold = element.closest(FOLD); fold; fold = fold.closest(FOLD)) fold.open = true
 }
 
-/** Open the folds around what the address names, now and whenever it changes. */
+/** Open the folds around what the address names, or under its heading, now and when it changes. */
 export function unfoldLinked(window) {
   const open = () => {
     const target = window.document.getElementById(decoded(window.location.hash.slice(1)))
-    if (!target?.closest(FOLD)) return
-    unfold(target)
+    const text = target?.matches('.further > :first-child') ? target.nextElementSibling : target
+    if (!text?.closest(FOLD)) return
+    unfold(text)
     target.scrollIntoView()
   }
   open()
