@@ -42,6 +42,8 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, near
 from coursebuild.core.text.source import Source
 
 MAP = "content/course.toml"
+MAP_TEXT = 1_000_000
+"""Characters of the course map, which says how long all other texts may be."""
 
 
 class Loaded(Struct, frozen=True):
@@ -97,7 +99,7 @@ def load(
         EffectError: the course brings code that would run here, and is not `trusted`.
     """
     loader = _Loader(root, Parser() if parser is None else parser, open_texts, trusted=trusted)
-    course = loader.course(loader.declared())
+    course = loader.course()
     return Loaded(course, tuple(loader.found))
 
 
@@ -132,13 +134,21 @@ class _Loader:
         """Lesson files that the map does not name, by path; one that was surely meant is taken out.
         """
 
-    def course(self, declared: tuple[Declarations, ...]) -> Course | None:
+    def course(self) -> Course | None:
         """The whole course, or `None` where there is no usable map."""
         course = self._map()
         limit = (Limits() if course is None else course.limits).text
         lessons = self._within(limit, self.files.lessons)
         texts = self._within(limit, self.files.pages)
-        self.files = replace(self.files, lessons=lessons, pages=texts)
+        short = self._within(limit, (model.source for model in self.files.models))
+        self.files = replace(
+            self.files,
+            lessons=lessons,
+            pages=texts,
+            models=tuple(model for model in self.files.models if model.source in short),
+            declarations=self._within(limit, self.files.declarations),
+        )
+        declared = self._declared()
         self.sources = {source.path: source for source in (*lessons, *texts)}
         if course is None:
             if self.files.map is not None:
@@ -188,7 +198,10 @@ class _Loader:
                 found.append(source)
                 continue
             message = f"{source.path} has {len(source.text):_} characters, and may have {limit:_}"
-            help = "make more lessons of it, or set `text` in `[limits]` of the map"
+            help = "make more courses of it"
+            if source.path != MAP:
+                shorter = "make more lessons of it" if source.path.endswith(".md") else "shorten it"
+                help = f"{shorter}, or set `text` in `[limits]` of the map"
             self.found.append(
                 diagnose("text-long", source.span(limit, limit + 1), message, help=help)
             )
@@ -217,7 +230,7 @@ class _Loader:
             return None
 
     def _map(self) -> Course | None:
-        if self.files.map is None:
+        if self.files.map is None or not self._within(MAP_TEXT, [self.files.map]):
             return None
         parsed = self.parser.course_map(self.files.map)
         self.found += parsed.diagnostics
@@ -227,7 +240,7 @@ class _Loader:
             self.found += load_course_features(self.root, parsed.value)
         return parsed.value
 
-    def declared(self) -> tuple[Declarations, ...]:
+    def _declared(self) -> tuple[Declarations, ...]:
         """What stands beside the models; a file without a model is a mistake."""
         models = {model.name for model in self.files.models}
         found: list[Declarations] = []

@@ -25,6 +25,27 @@ def test_a_line_of_megabytes_is_told_and_not_read(make: Make) -> None:
     assert folder.main("check").status == 0
 
 
+def test_a_map_or_model_that_is_too_long_is_told_and_not_read(make: Make) -> None:
+    folder = make(GOOD)
+    short, long = "<mujoco/>\n", "<mujoco>\n" + "<!-- -->\n" * 30_000 + "</mujoco>\n"
+    folder.write("models/a.xml", short)
+    folder.write("models/b.xml", long)
+    folder.write("models/a.toml", "# nothing\n" * 30_000)
+    done = folder.main("check")
+    assert done.status == 1
+    assert "models/b.xml has 270_019 characters, and may have 250_000" in done.out
+    assert "models/b.xml:27778:" in done.out and "help: shorten it, or set `text`" in done.out
+    assert "models/a.toml has 300_000 characters" in done.out
+    assert "2 errors" in done.out
+    folder.write(MAP, folder.text(MAP) + "\n[limits]\ntext = 400_000\n")
+    assert folder.main("check").status == 0
+    folder.write(MAP, folder.text(MAP) + "# and more\n" * 100_000)
+    done = folder.main("check")
+    assert done.status == 1
+    assert "course.toml has 1_100_" in done.out and "and may have 1_000_000" in done.out
+    assert "make more courses of it" in done.out
+
+
 def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
     folder = make("## A\n\n" + block("big.py", "print(len(bytearray(300 << 20)))\n", "314572800"))
     assert folder.main("check").status == 0

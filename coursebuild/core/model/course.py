@@ -136,7 +136,7 @@ class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     """What reading and trying the course may take."""
 
     text: Annotated[
-        int, Meta(ge=1, le=100_000_000, description="characters of a lesson or page")
+        int, Meta(ge=1, le=100_000_000, description="characters of a lesson, page or model")
     ] = 250_000
     scripts: Annotated[int, Meta(ge=1, le=1 << 20, description="MiB that a script may take")] = (
         16_384

@@ -31,7 +31,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "A file of the course cannot be read, or is reached through a link out of the project.",
     ),
-    ("text-long", "error", "A lesson or page is longer than the course allows."),
+    ("text-long", "error", "A text is longer than the course allows."),
     # the course map
     ("map-missing", "error", "There is no content/course.toml."),
     ("map-syntax", "error", "course.toml is not valid TOML."),
