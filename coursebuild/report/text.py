@@ -130,7 +130,8 @@ def _frame(span: Span, room: int) -> tuple[str, int, int]:
 
 def _window(line: str, start: int, end: int, room: int) -> tuple[int, int]:
     """The part of the line to show: all of it where it fits, else a stretch around the marks."""
-    if cells(line[: room + 1]) <= room:
+    # Any number of characters may have no width.
+    if len(line) <= 2 * room and cells(line) <= room:
         return 0, len(line)
     around = line[max(0, start - room) : start + room]
     room //= 2 if cells(around) > len(around) else 1

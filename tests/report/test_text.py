@@ -81,6 +81,12 @@ def test_a_long_line_is_cut_around_the_marked_part() -> None:
     assert lines[3].endswith("y…")
 
 
+def test_a_long_line_without_width_is_cut_too() -> None:
+    source, a, b = at("a" + "\u200d" * 3000 + "WRONG", "WRONG")
+    lines = shown(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")
+    assert len(lines[3]) < 200 and lines[3].endswith("WRONG")
+
+
 def test_a_file_without_text_has_no_frame() -> None:
     diagnostic = diagnose(
         "map-missing", Source("content/course.toml", "").span(), "there is no content/course.toml"
