@@ -18,7 +18,7 @@ from __future__ import annotations
 import atexit
 import sys
 
-from coursebuild.cli.output import CLEAN, INTERRUPTED, USAGE, say, write
+from coursebuild.cli.output import CLEAN, INTERRUPTED, USAGE, WRONG, say, write
 from coursebuild.cli.unchanged import said_before, split_directory
 
 TYPE_CHECKING = False
@@ -44,6 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from coursebuild.cli.running import run
     except KeyboardInterrupt:
         return say(INTERRUPTED, "interrupted")
+    except MemoryError:
+        return say(WRONG, "coursebuild: there is not enough memory to begin")
+    except OSError as error:
+        return say(WRONG, f"coursebuild: it cannot be loaded: {error}")
     return _end(run(directory, words, alone=arguments is None), alone=arguments is None)
 
 

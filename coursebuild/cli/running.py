@@ -12,7 +12,12 @@ import resource
 from coursebuild.cli.commands import run_command
 from coursebuild.cli.interrupts import Terminated, heeded
 from coursebuild.cli.output import INTERRUPTED, TERMINATED, USAGE, WRONG, fail, say
-from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError
+from coursebuild.core.files.errors import (
+    EffectError,
+    PublishRefusedError,
+    UsageError,
+    lacking,
+)
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
@@ -55,6 +60,11 @@ def _run(directory: str | None, words: Sequence[str]) -> int:
         return fail(USAGE, error.message, error.help)
     except EffectError as error:
         return fail(WRONG, error.message, error.help)
+    except (MemoryError, OSError, RuntimeError) as error:
+        lack = lacking(error)
+        if lack is None:
+            raise
+        return fail(WRONG, lack.message, lack.help)
     except Terminated:
         return say(TERMINATED, "terminated")
     except KeyboardInterrupt:

@@ -10,7 +10,6 @@ import functools
 import hashlib
 import importlib
 import importlib.util
-import pkgutil
 import re
 from collections.abc import Iterable
 from importlib.metadata import EntryPoint, entry_points
@@ -228,7 +227,9 @@ def installed_features() -> tuple[Feature, ...]:
         RuntimeError: two of them cannot be used together, or one is broken.
     """
     package = importlib.import_module("coursebuild.features")
-    modules = (module.name for module in pkgutil.iter_modules(package.__path__))
+    # Not by `pkgutil`, to which a folder that cannot be read is an empty one.
+    folders = Path(package.__path__[0]).iterdir()
+    modules = sorted(path.name for path in folders if (path / "__init__.py").is_file())
     found = [importlib.import_module(f"{package.__name__}.{name}").FEATURE for name in modules]
     for point in _entry_points():
         feature = point.load()

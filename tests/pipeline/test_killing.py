@@ -35,14 +35,19 @@ class Mortals:
         self.process = process
         self.exchanges = True
         """Whether two folders can be swapped in one step."""
+        self.said = ""
+        """What the last one wrote for its user."""
 
-    def run(self, folder: Folder, *arguments: str, fatal: int = 0) -> tuple[int, list[str]]:
+    def run(
+        self, folder: Folder, *arguments: str, fatal: int = 0, fault: str = ""
+    ) -> tuple[int, list[str]]:
         """The exit status, and the names of the calls where it got through."""
         assert self.process.stdin is not None and self.process.stdout is not None
         request = {"folder": str(folder.root), "arguments": arguments, "fatal": fatal}
-        request["exchanges"] = self.exchanges
+        request |= {"exchanges": self.exchanges, "fault": fault}
         print(json.dumps(request), file=self.process.stdin, flush=True)
         reply = json.loads(self.process.stdout.readline())
+        self.said = reply["said"]
         return reply["status"], reply["calls"]
 
     def die(self, folder: Folder, *arguments: str, fatal: int) -> None:
@@ -160,6 +165,42 @@ def test_build_killed_at_any_call_leaves_old_or_new_site(
         assert mortals.run(folder, "build", "-q")[0] == 0, where
         assert folder.tree() == new, where
         assert leftovers(folder) == [], where
+
+
+@pytest.mark.parametrize("fault", ["files", pytest.param("memory", marks=pytest.mark.slow)])
+def test_build_without_files_or_memory_says_so_and_leaves_old_or_new_site(
+    make: Make, mortals: Mortals, tmp_path: Path, fault: str
+) -> None:
+    """From any call on no more can be opened or started; the next build is a whole one.
+
+    asyncio prints an exception itself where it gets no sockets.
+    """
+    template = make(OLD + "$a_{23}$\n")
+    assert mortals.run(template, "build", "-q")[0] == 0
+    old = template.tree()
+    template.write(template.lesson(), NEW + "$a_{24}$\n")
+    folder = Folder(tmp_path / "mortal")
+    again(template, folder)
+    status, calls = mortals.run(folder, "build", "-q", fault=fault)
+    assert status == 0
+    new = folder.tree()
+    places = dict(zip(reversed(calls), range(len(calls), 0, -1), strict=True))
+    assert len(places) > 30
+    told = ("too many open files", "cannot allocate memory", "not enough memory", "new thread")
+    for where, fatal in places.items():
+        again(template, folder)
+        status, _ = mortals.run(folder, "build", "-q", fault=fault, fatal=fatal)
+        assert status in (0, 1), where
+        assert status == 0 or any(words in mortals.said.lower() for words in told), where
+        assert "Traceback" not in mortals.said or where.startswith("socket.__new__@core/run/v8"), (
+            where,
+            mortals.said,
+        )
+        left = folder.tree()
+        assert part(left, "content/") == part(new, "content/"), where
+        assert part(left, "public/") in (part(old, "public/"), part(new, "public/")), where
+        assert mortals.run(folder, "build", "-q")[0] == 0, where
+        assert (folder.tree(), leftovers(folder)) == (new, []), where
 
 
 def part(tree: dict[str, bytes], top: str) -> dict[str, bytes]:

@@ -1,29 +1,40 @@
-"""Runs commands in forked children that end themselves at a given call of the system.
+"""Runs commands in forked children that meet their end, or a fault, at a given call of the system.
 
     python killed_commands.py < requests > replies
 
-A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N, "exchanges": …}`. The
-child runs the command in this folder and ends itself, without any cleaning up, just before its call
-number N that changes something in the folder; a write that is hit writes half. With `"fatal": 0` it
-gets through. `exchanges`: whether the system can swap two folders in one step.
-A reply is `{"status": …, "calls": [names]}`; there are no names where it died.
+A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N, "fault": …, "exchanges":
+…}`. The child runs the command in this folder. Without a fault it ends itself, without any cleaning
+up, just before its call number N that changes something in the folder; a write that is hit writes
+half. With `"fault": "files"` or `"memory"` call number N that opens something or starts a process
+or a thread fails instead, and so does each that follows, as where no more files may be open, or no
+memory is left. With `"fatal": 0` it gets through. `exchanges`: whether the system can swap two
+folders in one step.
+A reply is `{"status": …, "calls": [names], "said": …}`, with all that was written for the user;
+there are no names where it died. The name of a call that may fail tells where it is made.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import coursebuild
 from coursebuild.cli import main
 from coursebuild.core.engine import publish as publishing
 
 BY_PATH = ("open", "rename", "replace", "link", "unlink", "rmdir", "mkdir")
 BY_FD = ("write", "fsync", "ftruncate", "fchmod")
 DIED = 137
+TOOL = str(Path(coursebuild.__file__).parent)
+OPENING = frozenset({"open", "os.scandir", "os.listdir", "socket.__new__", "os.pipe"})
+STARTING = frozenset({"os.fork", "os.posix_spawn", "subprocess.Popen"})
+THREAD = "_thread.start_new_thread"
 
 
 class Doom:
@@ -64,47 +75,100 @@ class Doom:
 
         return call
 
+    def install(self) -> None:
+        for name in (*BY_PATH, *BY_FD):
+            setattr(os, name, self.wrap(name, getattr(os, name)))
+        really = publishing.exchange
+
+        def exchange(a: Path, b: Path) -> bool:
+            if self.meets("exchange"):
+                os._exit(DIED)
+            return really(a, b)
+
+        publishing.exchange = exchange
+
+
+class Fault(Doom):
+    """Counts the calls of this process that may fail, and fails those from the fatal one on."""
+
+    def __init__(self, folder: Path, fatal: int, kind: str) -> None:
+        super().__init__(folder, fatal)
+        self.kind = kind
+        self.process = os.getpid()
+
+    def __call__(self, event: str, _arguments: object = None) -> None:
+        """Hear of a call before it is made."""
+        if event not in OPENING | STARTING | {THREAD} or os.getpid() != self.process:
+            return
+        self.meets(f"{event}@{self.caller()}")
+        if not self.fatal or len(self.calls) < self.fatal:
+            return
+        if event == THREAD:
+            raise RuntimeError("can't start new thread")
+        if self.kind == "memory" and event in OPENING:
+            raise MemoryError
+        number = errno.EMFILE if event in OPENING else errno.ENOMEM
+        raise OSError(number, os.strerror(number))
+
+    def caller(self) -> str:
+        """The place in the tool that makes a call."""
+        frame = sys._getframe(2)
+        while not frame.f_code.co_filename.startswith(TOOL):
+            if "importlib" in frame.f_code.co_filename or frame.f_back is None:
+                return "import"
+            frame = frame.f_back
+        return f"{frame.f_code.co_filename[len(TOOL) + 1 :]}:{frame.f_lineno}"
+
+    def install(self) -> None:
+        really = os.pipe
+
+        def pipe() -> tuple[int, int]:
+            self("os.pipe")
+            return really()
+
+        os.pipe = pipe
+        sys.addaudithook(self)
+
 
 def serve() -> None:
     for line in sys.stdin:
         request = json.loads(line)
         read, write = os.pipe()
-        child = os.fork()
-        if child == 0:
-            os.close(read)
-            if not request["exchanges"]:
-                publishing.exchange = lambda a, b: False
-            run(Path(request["folder"]), request["arguments"], request["fatal"], write)
-        os.close(write)
-        with os.fdopen(read) as pipe:
-            calls = pipe.read()
-        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        print(json.dumps({"status": status, "calls": calls.split()}), flush=True)
+        with tempfile.TemporaryFile() as errors:
+            child = os.fork()
+            if child == 0:
+                os.close(read)
+                os.dup2(errors.fileno(), 1)
+                os.dup2(errors.fileno(), 2)
+                run(request, write)
+            os.close(write)
+            with os.fdopen(read) as pipe:
+                calls = pipe.read()
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            errors.seek(0)
+            said = errors.read().decode()
+        print(json.dumps({"status": status, "calls": calls.split(), "said": said}), flush=True)
 
 
-def run(folder: Path, arguments: list[str], fatal: int, report: int) -> None:
+def run(request: dict[str, Any], report: int) -> None:
     """Be the child."""
+    folder = Path(request["folder"])
+    if not request["exchanges"]:
+        publishing.exchange = lambda a, b: False
     null = os.open(os.devnull, os.O_RDWR)
     os.dup2(null, 0)
-    os.dup2(null, 1)
     os.chdir(folder)
-    doom = Doom(folder, fatal)
-    for name in (*BY_PATH, *BY_FD):
-        setattr(os, name, doom.wrap(name, getattr(os, name)))
-    really = publishing.exchange
-
-    def exchange(a: Path, b: Path) -> bool:
-        if doom.meets("exchange"):
-            os._exit(DIED)
-        return really(a, b)
-
-    publishing.exchange = exchange
+    doom = Doom(folder, request["fatal"])
+    if request["fault"]:
+        doom = Fault(folder, request["fatal"], request["fault"])
+    doom.install()
     status = 70
     try:
-        status = main(arguments)
+        status = main(request["arguments"])
     finally:
-        with os.fdopen(report, "w") as pipe:
-            pipe.write(" ".join(doom.calls))
+        if sys.exc_info()[0] is not None:
+            sys.excepthook(*sys.exc_info())
+        os.write(report, " ".join(doom.calls).encode())
         os._exit(status)
 
 

@@ -6,6 +6,7 @@ bug of the tool, and never a mistake inside a lesson (those are diagnostics).
 
 from __future__ import annotations
 
+import errno
 import os
 
 
@@ -44,3 +45,26 @@ def reason(error: OSError) -> str:
     """The system's words for an error: `no space left on device`."""
     text = os.strerror(error.errno) if error.errno else str(error)
     return text[:1].lower() + text[1:]
+
+
+def lacking(error: MemoryError | OSError | RuntimeError) -> EffectError | None:
+    """What the machine has no more of; `None` where the error is another."""
+    if isinstance(error, MemoryError):
+        return EffectError("there is not enough memory")
+    if isinstance(error, OSError) and error.errno in _HELP:
+        return EffectError(reason(error), help=_HELP[error.errno])
+    if str(error) == "can't start new thread":
+        return EffectError(str(error), help=_HELP[errno.EAGAIN])
+    return None
+
+
+_HELP = {
+    errno.EMFILE: "`ulimit -n 256` raises the limit",
+    errno.ENFILE: "",
+    errno.ENOMEM: "",
+    errno.EAGAIN: "`ulimit -u` says how many processes there may be",
+    errno.ENOSPC: "",
+    errno.EDQUOT: "",
+    errno.EFBIG: "`ulimit -f` says how large a file may be",
+}
+"""What there can be too little of, and how to get more."""

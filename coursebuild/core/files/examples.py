@@ -25,7 +25,13 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError, reason
+from coursebuild.core.files.errors import (
+    EffectError,
+    FileChangedError,
+    OutsideProjectError,
+    lacking,
+    reason,
+)
 from coursebuild.core.files.write import remove_leftovers, resolve_inside, write_atomic
 
 FOLDER = "examples"
@@ -277,7 +283,11 @@ def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
     try:
         files = json.loads((root / MANIFEST).read_bytes())["files"]
         manifest = {path: tuple(hashes) for path, hashes in files.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except OSError as error:
+        if lacking(error):  # without it all files would seem to be edited by hand, also later on
+            raise
+        return {}
+    except (ValueError, KeyError, TypeError, AttributeError):
         return {}
     sound = all(
         path.startswith(f"{FOLDER}/")

@@ -87,8 +87,13 @@ def _bundled(folder: Path) -> Iterator[tuple[str, Path]]:
 def _paths(folder: Path) -> Iterator[str]:
     """The files below a folder by path relative to it, sorted."""
     top = len(f"{folder}/")
-    found = (f"{at}/{name}"[top:] for at, _, names in os.walk(folder) for name in names)
+    walked = os.walk(folder, onerror=_refuse)
+    found = (f"{at}/{name}"[top:] for at, _, names in walked for name in names)
     return iter(sorted(found, key=lambda path: path.split("/")))
+
+
+def _refuse(error: OSError) -> None:
+    raise error
 
 
 def template_texts() -> tuple[tuple[str, str], ...]:
