@@ -1,12 +1,14 @@
 # make site    the environment, the tool and the course in public/
 # make quick   the tests that need no browser, no lab engine and no whole site
 # make test    all set-up, then every test of a change
+# make fuzz    inputs that nobody wrote, for TIME seconds
 # make lock    the versions of all packages, and their hashes
 # make help    the rest
 
 PYTHON ?= python3
 WORKERS ?= 2
 PYTEST_ARGS ?=
+TIME ?= 600
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -30,7 +32,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site serve quick test test-slow test-oldest lint format types dist vscode lock npm system clean distclean
+.PHONY: help site serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
 
 help:
 	@echo 'make site       make the environment, install, build the course into public/'
@@ -39,6 +41,7 @@ help:
 	@echo 'make test       do all set-up and run every test (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
 	@echo 'make test-slow  measure pages, look for leaks, try random cases that are new each time'
 	@echo 'make test-oldest  run the quick tests with the oldest packages that the tool may be used with'
+	@echo 'make fuzz       try inputs that nobody wrote for TIME=600 seconds; an hour before a release'
 	@echo 'make lint       check style and formatting; make format mends what can be mended'
 	@echo 'make types      check types'
 	@echo 'make vscode     try and make the extension for Visual Studio Code, in editors/vscode/dist/'
@@ -79,6 +82,9 @@ test-oldest: $(VENV)/.dev npm
 	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[lsp]'
 	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(OLDEST)/bin/python -m pytest $(QUICK) \
 	  $(addprefix --deselect ,$(OF_THIS_ENGINE))
+
+fuzz: $(VENV)/.dev
+	@PYTHONPATH=tests $(BIN)/python -m fuzz --seconds $(TIME)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check

@@ -1,0 +1,130 @@
+"""`python -m fuzz`: the targets one after the other; exit status 1 where something was found."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from fuzz.targets import ROOT, TARGETS, WORDS
+
+CORPUS = Path(__file__).parent / "corpus"
+KEPT = 40
+"""Inputs that the corpus of a target may have."""
+HANGS, MEMORY = 60, 2048
+"""Seconds and MiB of an input that ends its worker."""
+_EXECUTED = re.compile(r"stat::number_of_executed_units: (\d+)")
+_COVERED = re.compile(r" cov: (\d+)")
+
+
+class Tried(NamedTuple):
+    """What became of a target."""
+
+    inputs: int
+    edges: int
+    """Of the code that were reached."""
+    found: list[str]
+
+
+class Bench:
+    """The folder of a target: `seeds`, `corpus`, and what was found."""
+
+    def __init__(self, name: str, top: Path) -> None:
+        self.name = name
+        self.folder = top / name
+        shutil.rmtree(self.folder, ignore_errors=True)
+        for part in ("seeds", "corpus"):
+            (self.folder / part).mkdir(parents=True)
+        for number, seed in enumerate([*TARGETS[name].seeds(), *kept(name)]):
+            (self.folder / f"seeds/{number:04d}").write_bytes(seed)
+        words = ("".join(f"\\x{byte:02x}" for byte in word) for word in WORDS)
+        (self.folder / "words").write_text("".join(f'"{word}"\n' for word in words))
+
+    def attempt(self, seconds: int, runs: int, seed: int) -> Tried:
+        """Try inputs for so long, or so many; a worker that was ended is followed by another."""
+        until = time.monotonic() + seconds
+        inputs = edges = 0
+        while (left := until - time.monotonic()) > 0 and (not runs or inputs < runs):
+            more = f"-runs={runs - inputs}" if runs else f"-max_total_time={left:.0f}"
+            status, said = self.worker(more, f"-seed={seed + inputs}", "corpus", "seeds")
+            executed = _EXECUTED.findall(said)
+            if not executed:
+                raise SystemExit(f"{said[-3000:]}\nthe worker of `{self.name}` ended: {status}")
+            inputs += max(int(executed[-1]), 1)
+            edges = max([edges, *map(int, _COVERED.findall(said))])
+            if status == 0:
+                break
+        return Tried(inputs, edges, self.found())
+
+    def worker(self, *options: str) -> tuple[int, str]:
+        command = [sys.executable, "-m", "fuzz.worker", self.name, ".", "-dict=words"]
+        command += [f"-timeout={HANGS}", f"-rss_limit_mb={MEMORY}", "-max_len=4096"]
+        command += ["-print_final_stats=1", "-verbosity=1", *options]
+        paths = {"PYTHONPATH": f"{ROOT}:{ROOT / 'tests'}", "PATH": ""}
+        done = subprocess.run(
+            command, cwd=self.folder, env=paths, capture_output=True, text=True, errors="replace"
+        )
+        return done.returncode, done.stderr
+
+    def found(self) -> list[str]:
+        """What was found, a line each with where its input lies."""
+        lines = []
+        for path in sorted(self.folder.iterdir()):
+            kind, dash, _ = path.name.partition("-")
+            if dash and not path.suffix:
+                note = path.with_suffix(".json")
+                what = json.loads(note.read_text())[0] if note.exists() else kind
+                lines.append(f"{what}: {path}")
+        return lines
+
+    def keep(self) -> None:
+        """Put what reaches more than the first inputs do into the corpus of the repository."""
+        self.worker("-set_cover_merge=1", "-use_counters=0", "seeds", "corpus")
+        first = {*TARGETS[self.name].seeds()}
+        found = {path.read_bytes() for path in (self.folder / "seeds").iterdir()} - first
+        least = sorted(found, key=lambda data: (len(data), data))[:KEPT]
+        text = json.dumps([data.decode("latin-1") for data in least], indent=0)
+        (CORPUS / f"{self.name}.json").write_text(f"{text}\n")
+
+
+def kept(name: str) -> list[bytes]:
+    """The corpus of a target."""
+    path = CORPUS / f"{name}.json"
+    return [text.encode("latin-1") for text in json.loads(path.read_text())]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="fuzz", description=__doc__)
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
+    parser.add_argument("--seconds", type=int, default=600, help="in all")
+    parser.add_argument("--runs", type=int, default=0, help="inputs of each target")
+    parser.add_argument("--seed", type=int, default=int(time.time()) % 10**8)
+    parser.add_argument("--keep", action="store_true", help="add to the corpus")
+    parser.add_argument("--out", type=Path, default=ROOT / "build/fuzz")
+    chosen = parser.parse_args(arguments)
+    names = chosen.targets or [*TARGETS]
+    everything = []
+    print(f"seed {chosen.seed}\n{'target':14}{'tried':>10}{'survived':>10}{'found':>7}{'edges':>8}")
+    for name in names:
+        bench = Bench(name, chosen.out.resolve())
+        seconds = 10**6 if chosen.runs else chosen.seconds // len(names)
+        tried = bench.attempt(seconds, chosen.runs, chosen.seed)
+        survived = tried.inputs - len(tried.found)
+        print(f"{name:14}{tried.inputs:10}{survived:10}{len(tried.found):7}{tried.edges:8}")
+        sys.stdout.flush()
+        everything += tried.found
+        if chosen.keep:
+            bench.keep()
+    print("\n".join(everything) or "nothing was found")
+    return 1 if everything else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
