@@ -15,15 +15,3 @@ def parse(text: str) -> Parsed[Course | None]:
 
 def told(text: str) -> list[str]:
     return shown(parse(text).diagnostics)
-
-
-HEAD = '[course]\ntitle = "T"\n'
-LEVEL = HEAD + '[[level]]\nid = "4"\ntitle = "L"\n'
-
-
-def lesson(id: str, *required: str, slug: str = "s", status: str = "planned") -> str:
-    names = ", ".join(f'"{name}"' for name in required)
-    return (
-        f'[[level.lesson]]\nid = "{id}"\nslug = "{slug}"\ntitle = "T"\nstatus = "{status}"\n'
-        f"prerequisites = [{names}]\n"
-    )

@@ -88,24 +88,6 @@ def test_what_does_not_compile_is_said_with_what_may_help(course: Course, messag
     assert said(checked(course, failed())) == [message]
 
 
-def test_a_block_that_must_fail_fails_with_the_message_it_names() -> None:
-    course = block(' error="mass and  inertia"')
-    assert checked(course, failed(error="Error: mass\nand inertia")) == ()
-    assert told(checked(course)) == ["mjcf-compiles: mass and  inertia"]
-    (other,) = checked(course, failed(error="Error: mass"))
-    assert (other.rule, other.span.text) == ("mjcf-message", "mass and  inertia")
-    assert [note.message for note in other.notes] == ["it says: Error: mass"]
-
-
-def test_a_model_that_does_not_compile_is_told_at_its_line_or_its_beginning() -> None:
-    course = make_course(models={"box": BOX})
-    assert checked(course, box=GOOD) == ()
-    assert told(checked(course, box=failed(2))) == ["model-error: <worldbody/>"]
-    (found,) = checked(course, box=failed())
-    assert (found.span.path, found.span.start, found.span.end) == ("models/box.xml", 0, 0)
-    assert found.message == "the model `box` does not compile: xml error: no good"
-
-
 PART = "<!-- a part -->\n<mujocoinclude/>\n"
 
 

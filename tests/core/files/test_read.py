@@ -1,4 +1,4 @@
-"""Finding and reading a course, with everything that can lie in a folder."""
+"""Reading a course, with everything that can lie in a folder."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.files.errors import EffectError, OutsideProjectError
-from coursebuild.core.files.read import find_root, read_bytes, read_course
+from coursebuild.core.files.read import read_bytes, read_course
 
 Tree = dict[str, bytes | str]
 
@@ -33,36 +33,6 @@ def complaints(root: Path) -> list[tuple[str, str, int, int, str]]:
         (d.rule, d.span.path, d.span.line, d.span.column, d.message)
         for d in read_course(root).diagnostics
     ]
-
-
-class TestFindRoot:
-    def test_chosen_folder_is_taken_as_it_is(self, tmp_path: Path) -> None:
-        (tmp_path / "anywhere").mkdir()
-        assert find_root(Path("anywhere"), tmp_path) == tmp_path / "anywhere"
-        assert find_root(tmp_path / "anywhere", Path("/")) == tmp_path / "anywhere"
-
-    def test_search_goes_upwards(self, course: Callable[[Tree], Path]) -> None:
-        root = course({"content/lessons/a/b/c.txt": ""})
-        assert find_root(None, root / "content/lessons/a/b") == root
-        assert find_root(None, root) == root
-
-    def test_nearest_course_wins(self, course: Callable[[Tree], Path]) -> None:
-        root = course({"inner/content/course.toml": "", "inner/deep/x": ""})
-        assert find_root(None, root / "inner/deep") == root / "inner"
-
-    @pytest.mark.parametrize(
-        ("chosen", "message"),
-        [
-            (Path("nowhere"), "there is no folder nowhere"),
-            (Path("file"), "file is not a folder"),
-            (None, "there is no content/course.toml in this folder or one above it"),
-        ],
-    )
-    def test_no_course(self, tmp_path: Path, chosen: Path | None, message: str) -> None:
-        (tmp_path / "file").touch()
-        with pytest.raises(EffectError) as caught:
-            find_root(chosen, tmp_path)
-        assert caught.value.message == message
 
 
 class TestListing:
@@ -214,13 +184,6 @@ class TestText:
         assert diagnostic.help == f"save the file as UTF-8; it looks like {help}"
         assert (found.value.lessons, found.value.pages) == ((), ())
         assert found.value.unreadable == ("content/lessons/1.1-a.md", "content/pages/b.md")
-
-    def test_wrong_map_and_model_are_reported_too(self, course: Callable[[Tree], Path]) -> None:
-        root = course({"content/course.toml": b"\xff", "models/m.xml": b"<a>\n \xfe</a>"})
-        assert complaints(root) == [
-            ("file-encoding", "content/course.toml", 1, 1, "byte 0xff is not UTF-8"),
-            ("file-encoding", "models/m.xml", 2, 2, "byte 0xfe is not UTF-8"),
-        ]
 
 
 class TestUnreadable:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter, Mode, Silence, Status
 from coursebuild.core.model.vocabulary import CALLOUTS
-from support.course_maps import LEVEL, lesson, parse, told
+from support.course_maps import parse, told
 
 ROOT = Path(__file__).parents[3]
 
@@ -197,12 +197,3 @@ def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
     assert parsed.value is not None or parsed.diagnostics
     orders = [d.order for d in parsed.diagnostics]
     assert orders == sorted(orders)
-
-
-def test_a_circle_points_at_each_of_its_steps() -> None:
-    text = LEVEL + lesson("4.1", "4.3") + lesson("4.2", "4.1") + lesson("4.3", "4.2")
-    (found,) = parse(text).diagnostics
-    assert [(n.message, n.span and n.span.line) for n in found.notes] == [
-        ("4.3 requires 4.2 here", 23),
-        ("4.2 requires 4.1 here", 17),
-    ]

@@ -97,15 +97,6 @@ def test_model_is_measured_again_only_where_something_changed(course: Path) -> N
     assert fake.asked == [("box", 0, True, True)]
 
 
-def test_included_file_changes_the_digest_of_a_model(course: Path) -> None:
-    write(course / "models" / "in" / "legs.xml", BOX)
-    write(course / "models" / "box.xml", '<mujoco><include file="in/legs.xml"/></mujoco>')
-    before = find_scenes(course).scenes[0].digest
-    assert before == find_scenes(course).scenes[0].digest
-    write(course / "models" / "in" / "legs.xml", BOX.replace("0.1", "0.2"))
-    assert find_scenes(course).scenes[0].digest != before
-
-
 def test_scenarios_measured_before_an_interruption_are_kept(course: Path) -> None:
     fake = Fake(swing(), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
