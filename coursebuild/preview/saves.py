@@ -35,7 +35,7 @@ def follow(session: Session, watcher: FolderWatcher, progress: Progress) -> None
     Each is told, with the milliseconds from its first event until it was taken.
     """
     while not watcher.stopped:
-        watcher.watch_also(session.files_elsewhere())
+        watcher.watch_also(session.files_elsewhere(), session.packages())
         paths = watcher.get(1.0)
         if not paths:
             continue

@@ -143,6 +143,10 @@ class Session:
             return frozenset()
         return shown_files(course) | {one.path for one in owners(course)}
 
+    def packages(self) -> frozenset[str]:
+        """The folders that scripts import from."""
+        return frozenset(one.path for one in self.course.packages) if self.course else frozenset()
+
     def base(self) -> str:
         """The path under which the published site will be, with a slash at both ends."""
         return "/" if self.course is None else urls.base_path(self.course)

@@ -2,8 +2,9 @@
 
 Entry point: `FolderWatcher`. Caches and editors' own files do not count.
 
-The course's folders are watched with everything in them, including folders that are made later.
-Pages may be elsewhere (`docs/guide.md`, `README.md`): these files are polled.
+The course's folders are watched with everything in them, including folders that are made later,
+and so are those that its scripts import from. Pages may be elsewhere (`docs/guide.md`,
+`README.md`): these files are polled.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import contextlib
 import queue
 import stat
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError, reason
@@ -30,6 +31,7 @@ class FolderWatcher:
     def __init__(self, root: Path) -> None:
         self._root = root
         self._stop = threading.Event()
+        self._watched: tuple[str, ...] = FOLDERS
         self._others: dict[str, tuple[int, ...]] = {}
         """Files elsewhere, and their state at the last look."""
         self._events: queue.SimpleQueue[frozenset[str] | OSError] = queue.SimpleQueue()
@@ -53,9 +55,14 @@ class FolderWatcher:
         if self._thread.is_alive():
             self._thread.join(1.0)
 
-    def watch_also(self, paths: frozenset[str]) -> None:
-        """Files elsewhere that count as well, by POSIX path relative to the course's folder."""
-        others = {path for path in paths if path.split("/")[0] not in FOLDERS}
+    def watch_also(self, paths: frozenset[str], folders: Iterable[str] = ()) -> None:
+        """Files and folders elsewhere that count as well, by POSIX path below the course's folder.
+
+        The whole of the course's folder cannot: what the tool itself writes lies in it.
+        """
+        self._watched = (*FOLDERS, *(folder for folder in folders if folder != "."))
+        inside = tuple(f"{folder}/" for folder in self._watched)
+        others = {path for path in paths if not path.startswith(inside)}
         self._others = {path: self._others.get(path, self._state(path)) for path in others}
 
     def get(self, seconds: float) -> frozenset[str]:
@@ -105,7 +112,7 @@ class FolderWatcher:
     def _folders(self) -> dict[str, tuple[int, ...]]:
         """The folders of the course that there are, and which they are: device and inode."""
         found: dict[str, tuple[int, ...]] = {}
-        for name in FOLDERS:
+        for name in self._watched:
             with contextlib.suppress(OSError):
                 status = (self._root / name).stat()
                 if stat.S_ISDIR(status.st_mode):

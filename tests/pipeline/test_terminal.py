@@ -201,9 +201,15 @@ def test_ctrl_c_ends_a_preview_whatever_it_does(make: Make) -> None:
         assert screen(text).rstrip().endswith("interrupted")
         assert "Traceback" not in text
         wait_until_alone(folder)
-    folder.write(folder.lesson(), "## One\n")
+    folder.replace("content/course.toml", "[course]\n", '[course]\npackages = ["lib"]\n')
+    folder.write("lib/shared.py", "X = 1\n")
+    folder.write(
+        folder.lesson(), "## One\n\n" + block("a.py", "import shared\nprint(shared.X)", "1")
+    )
     with terminal(folder, "serve", "--port", "0", "--host", "0.0.0.0") as shown:
         shown.read("everything holds")
+        folder.write("lib/shared.py", "X = 2\n")
+        shown.read("output-drift")
         shown.type(b"\x03")
         text = shown.read()
         assert shown.process.wait(120) == 130

@@ -34,7 +34,7 @@ def root(tmp_path: Path) -> Path:
 @pytest.fixture
 def saves(root: Path) -> Iterator[FolderWatcher]:
     found = FolderWatcher(root)
-    found.watch_also(frozenset({"docs/guide.md", "own.md", LESSON}))
+    found.watch_also(frozenset({"docs/guide.md", "own.md", LESSON}), {"lib", "."})
     found.start()
     yield found
     found.stop()
@@ -114,7 +114,8 @@ def test_folders_that_are_made_later(root: Path, saves: FolderWatcher) -> None:
     (root / "content/pages/one").mkdir(parents=True)
     (root / "content/pages/one/a.md").write_text("x")
     assert told(saves, {"models"}) & {"content", "content/pages"}
-    for path in ("models/deep/deeper/a.xml", "content/pages/one/a.md"):
+    (root / "lib/new").mkdir(parents=True)
+    for path in ("models/deep/deeper/a.xml", "content/pages/one/a.md", "lib/new/a.py"):
         told_of_a_save(root, saves, path)
 
 
