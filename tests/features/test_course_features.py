@@ -107,10 +107,10 @@ def test_a_mistake_in_a_fence_of_a_feature_has_its_rule_and_place(course: Folder
 @pytest.mark.parametrize(
     ("code", "message"),
     [
-        ("1 / 0\n", "features/shout.py fails: ZeroDivisionError: division by zero"),
+        ("1 / 0\n", "features/shout.py fails at line 1: ZeroDivisionError: division by zero"),
         ("def (\n", "features/shout.py fails: SyntaxError: "),
         ("FEATURE = 'shout'\n", "features/shout.py has no FEATURE"),
-        ("raise SystemExit\n", "features/shout.py fails: SystemExit: "),
+        ("raise SystemExit\n", "features/shout.py fails at line 1: SystemExit: "),
         (
             SHOUT.replace('"shout",\n    f', '"quiz",\n    f'),
             "features/shout.py: two features are called `quiz`",

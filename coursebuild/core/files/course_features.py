@@ -8,12 +8,13 @@ from __future__ import annotations
 import hashlib
 import sys
 from pathlib import Path
+from traceback import extract_tb
 from types import ModuleType
 
 from coursebuild.core.features import Feature
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model import Course
+from coursebuild.core.model import Course, NamedPath
 from coursebuild.core.registry import clash, installed_features, use_course_features
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
@@ -23,18 +24,23 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
     found: list[Feature] = []
     wrong: list[Diagnostic] = []
     digest = hashlib.sha256()
+
+    def tell(named: NamedPath, message: str, mend: str = "correct the file") -> None:
+        help = f"{mend}, or take it out of `features` in the map"
+        wrong.append(diagnose("feature-broken", named.span, message, help=help))
+
     for named in course.features:
         try:
             code = read_bytes(root, named.path)
         except EffectError as error:
-            wrong.append(diagnose("feature-broken", named.span, error.message))
+            tell(named, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
         digest.update(named.path.encode() + b"\0" + code + b"\0")
         feature = _run(named.path, code)
         if isinstance(feature, str):
-            wrong.append(diagnose("feature-broken", named.span, feature))
+            tell(named, feature)
         elif reason := clash(feature, (*installed_features(), *found)):
-            wrong.append(diagnose("feature-broken", named.span, f"{named.path}: {reason}"))
+            tell(named, f"{named.path}: {reason}")
         else:
             found.append(feature)
     use_course_features(found, digest.hexdigest() if course.features else "")
@@ -64,7 +70,9 @@ def _first_run(path: str, code: bytes) -> Feature | str:
     try:
         exec(compile(code, path, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:  # whatever an author's code raises
-        return f"{path} fails: {type(error).__name__}: {error}"
+        lines = [f.lineno for f in extract_tb(error.__traceback__) if f.filename == path]
+        place = f" at line {lines[-1]}" if lines else ""
+        return f"{path} fails{place}: {type(error).__name__}: {error}"
     feature = getattr(module, "FEATURE", None)
     return (
         feature
