@@ -11,6 +11,8 @@ Entry points: `check_bindings` (a document), `leaning_on` (who depends on what h
 4. Recorded text decides, whatever this run printed: drift is reported by itself, with the bindings
    that lean on it. The run counts where recorded text leaves things out (`...`, tables), and for a
    binding that does not hold in a text that has drifted: what is recorded may be what is wrong.
+5. Where the script above a binding has no recorded output, the number may be of that script: one of
+   the output further up is not proposed in its place.
 """
 
 from __future__ import annotations
@@ -20,8 +22,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from coursebuild.core.model import Document, Mode, NumberBinding, Table, document_inlines
+from coursebuild.core.model import (
+    Document,
+    Mode,
+    NumberBinding,
+    Script,
+    Table,
+    document_inlines,
+    document_scripts,
+)
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import (
     PrintedLine,
@@ -146,6 +157,10 @@ def check_bindings(
         place = printed.place(binding)
         checked = _check(binding, printed, held.get(place, ()))
         if isinstance(checked, Diagnostic):
+            between = None if place in held else _script_between(document, binding, printed)
+            if checked.rule == "binding-mismatch" and between is not None:
+                help = f"if `{between.path}` prints it, record its output above the number"
+                checked = replace(checked, help=help, edits=())
             found.append(checked)
         elif checked:
             held[place] = tuple(line.text for line in checked)
@@ -198,6 +213,14 @@ def _check(
             help="take `{out}` away, or let `volatile` leave this number in the comparison",
         )
     return mismatch(binding, path, lines, before)
+
+
+def _script_between(document: Document, binding: NumberBinding, printed: Printed) -> Script | None:
+    """The last script between a binding and the output further up that the binding depends on."""
+    recorded = [] if binding.script is not None else printed.recorded(binding)
+    start = _end_of_body(recorded[0]) if recorded else binding.span.start
+    scripts = [s for s in document_scripts(document) if start < s.span.start < binding.span.start]
+    return scripts[-1] if scripts else None
 
 
 def _holds(shown: Shown, lines: Sequence[PrintedLine]) -> bool:
