@@ -52,8 +52,10 @@ from coursebuild.core.model import (
     resolve,
     walk_inlines,
 )
+from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.syntax.headings import slug
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
@@ -104,8 +106,9 @@ def link_targets(course: Course) -> LinkTargets:
 def anchors(document: Document) -> Mapping[str, Span]:
     """The ids that a link may name in a document, and where they lead.
 
-    Headings, quizzes, listings, outputs, formulas, terms, and ids written in raw HTML; of lines,
-    see `_is_line`. Each lookup after the first finds what was kept with the document.
+    The title of a page, headings, quizzes, listings, outputs, formulas, terms, and ids written in
+    raw HTML; of lines, see `_is_line`. Each lookup after the first finds what was kept with the
+    document.
     """
     known: dict[str, Span] | None = document.__dict__.get("anchors")
     if known is None:
@@ -113,7 +116,17 @@ def anchors(document: Document) -> Mapping[str, Span]:
     return known
 
 
+def title_anchor(document: Document) -> str:
+    """The anchor of the title that a page opens with; empty where something below it has it."""
+    title = title_line(document.source)
+    name = "" if title is None else slug(title.text)
+    return name if name and anchors(document)[name] == title else ""
+
+
 def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
+    title = title_line(document.source)
+    if title is not None:
+        yield slug(title.text), title
     outputs: dict[str, int] = {}
     # A summary does not say where formulas stand.
     yield from ((formula.id, document.source.span(0, 0)) for formula in document.equations)
