@@ -42,7 +42,9 @@ def headings(text: str, level: int) -> list[str]:
 
 
 def _contents(text: str) -> str:
-    return "\n".join(f"- [{title}](#{slug(title)})" for title in headings(text, 2))
+    """Shown on code hosts, which drop `hidden`: on the site, contents stand beside the text."""
+    links = "\n".join(f"- [{title}](#{slug(title)})" for title in headings(text, 2))
+    return f"<div hidden>\n\n{links}\n\n</div>"
 
 
 def _table(head: str, rows: Iterable[tuple[str, ...]]) -> str:
