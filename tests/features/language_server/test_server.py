@@ -65,6 +65,12 @@ BALL = """<!-- A ball in the air. -->
 """
 
 
+def wait_for_results(editor: Editor) -> None:
+    """Until everything has run."""
+    while "nq = 7" not in editor.hover_text(TWO, "model:ba|ll"):
+        pass
+
+
 @pytest.fixture(scope="module")
 def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[Editor]:
     folder = Folder((tmp_path_factory.mktemp("course") / "a cöurse").resolve())
@@ -73,8 +79,7 @@ def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[E
     editor = Editor(folder)
     for path in (ONE, TWO, MAP):
         editor.write(path, folder.text(path))
-    while "nq = 7" not in editor.hover_text(TWO, "model:ba|ll"):
-        pass  # until everything has run once
+    wait_for_results(editor)
     yield editor
     assert editor.close() == 0
     wait_until_alone(folder)
@@ -186,6 +191,7 @@ def test_a_model_that_goes_is_missed(editor: Editor) -> None:
     editor.until(TWO, "link-model")
     editor.folder.write("models/ball.xml", BALL)
     editor.until(TWO)
+    wait_for_results(editor)
 
 
 # --- what things are
@@ -316,7 +322,8 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
 def test_a_lesson_gets_another_id_everywhere(editor: Editor) -> None:
     place = editor.named(TWO), editor.place(TWO, "lesson:1.|1#fall")
     found = editor.request("prepare_rename", types.PrepareRenameParams(*place))
-    assert found.end.character - found.start.character == len("1.1")
+    assert found.range.end.character - found.range.start.character == len("1.1")
+    assert found.placeholder == "1.1"
     done = editor.request("rename", types.RenameParams(*place, new_name="1.5"))
     *edits, moved = done.document_changes
     assert editor.places.path(moved.new_uri) == "content/lessons/1.5-one.md"
@@ -328,6 +335,40 @@ def test_a_lesson_gets_another_id_everywhere(editor: Editor) -> None:
         editor.request("rename", types.RenameParams(*place, new_name="1.2"))
     heading = editor.named(TWO), editor.place(TWO, "## L|inks")
     assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None
+
+
+def renamed(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
+    place = editor.named(path), editor.place(path, needle)
+    done = editor.request("rename", types.RenameParams(*place, new_name=name))
+    return {} if done is None else editor.edited(done.changes)
+
+
+def test_a_term_and_a_label_get_another_name_everywhere(editor: Editor) -> None:
+    text = LINKS + "\n[again][r] and [the term](lesson:1.1#term:moment-of-inertia).\n\n"
+    text += "[r]: lesson:1.1#eq:energy\n"
+    editor.write(TWO, text)
+    for path, needle in ((ONE, "{#eq:en|ergy}"), (TWO, "lesson:1.1#eq:en|ergy)")):
+        new = renamed(editor, path, needle, "eq:E-1")
+        known = {ONE: FALL, TWO: text}
+        assert new == {one: t.replace("eq:energy", "eq:E-1") for one, t in known.items()}
+    for path, needle in ((ONE, "[mom|ent of inertia]"), (TWO, "term:mom|ent-of-inertia),")):
+        new = renamed(editor, path, needle, "Rotational inertia")
+        assert new == {
+            ONE: FALL.replace("]{term}", ']{term="Rotational inertia"}'),
+            TWO: text.replace("term:moment-of-inertia", "term:rotational-inertia"),
+        }
+    assert renamed(editor, TWO, "lesson:1.1#fa|ll)", "x") == {}  # it follows from the heading
+    headed = text.replace("## Links", "## Links {#all .further}").replace("(#links)", "(#all)")
+    editor.write(TWO, headed)
+    assert renamed(editor, TWO, "{#a|ll", "both")[TWO] == headed.replace("#all", "#both")
+    for needle, name, why in (
+        ("term:mom|ent-of-inertia),", "{}", "a term has letters or digits"),
+        ("lesson:1.1#eq:en|ergy)", "energy", "a label is `eq:`"),
+        ("lesson:1.1#eq:en|ergy)", "eq:", "a label is `eq:`"),
+        ("{#a|ll", "a b", "a label is letters"),
+    ):
+        with pytest.raises(JsonRpcException, match=why):
+            renamed(editor, TWO, needle, name)
 
 
 def test_headings_and_what_can_be_folded(editor: Editor) -> None:

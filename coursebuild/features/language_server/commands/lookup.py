@@ -45,8 +45,8 @@ class Referent(Struct, frozen=True):
     """What it is, as Markdown."""
     place: Span | None = None
     """Where that is said."""
-    lesson: model.Lesson | None = None
-    """Where it is one."""
+    target: model.Target | None = None
+    """Of a link, and of a name of a lesson or a term."""
 
 
 def hover(texts: OpenTexts, source: Source, asked: types.HoverParams) -> types.Hover | None:
@@ -95,7 +95,8 @@ def _of_field(library: Library, source: Source, offset: int) -> Referent | None:
     key, lesson = place.key, library.lessons.get(place.text)
     if lesson is not None and key in ("id", "prerequisites"):
         at = lesson.span if lesson.document is None else lesson.document.source.span(0, 0)
-        return Referent(place.span, f"**Lesson {lesson.id}: {lesson.title}**", at, lesson)
+        title = f"**Lesson {lesson.id}: {lesson.title}**"
+        return Referent(place.span, title, at, model.LessonTarget(lesson.id, None))
     if key == "rule" and place.text in RULES:
         return Referent(place.span, RULES[place.text].summary)
     said = "" if key else description(place.field)
@@ -133,8 +134,7 @@ class _Lookup:
 
     def link(self, node: model.Link | model.Term, target: model.Target) -> Referent | None:
         found = self.target(target)
-        id = target.id if isinstance(target, model.LessonTarget) else ""
-        return found and Referent(node.span, *found, self.library.lessons.get(id))
+        return found and Referent(node.span, *found, target)
 
     def target(self, target: model.Target) -> tuple[str, Span | None] | None:
         """What a link leads to, and where that is; `None` where there is no such thing."""

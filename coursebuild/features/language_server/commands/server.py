@@ -24,7 +24,7 @@ from coursebuild.features.language_server.commands.diagnosis import diagnoses, p
 from coursebuild.features.language_server.commands.lookup import definition, hover
 from coursebuild.features.language_server.commands.outline import folds, headings, layout
 from coursebuild.features.language_server.commands.places import Places
-from coursebuild.features.language_server.commands.renaming import lesson_id, rename
+from coursebuild.features.language_server.commands.renaming import name_at, rename
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.preview.session import Session
 
@@ -39,7 +39,7 @@ _ANSWERS: dict[str, Callable[[OpenTexts, Source, Any], Any]] = {
     types.TEXT_DOCUMENT_COMPLETION: completions,
     types.TEXT_DOCUMENT_CODE_ACTION: actions,
     types.TEXT_DOCUMENT_FORMATTING: layout,
-    types.TEXT_DOCUMENT_PREPARE_RENAME: lesson_id,
+    types.TEXT_DOCUMENT_PREPARE_RENAME: name_at,
     types.TEXT_DOCUMENT_RENAME: rename,
     types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: headings,
     types.TEXT_DOCUMENT_FOLDING_RANGE: folds,
