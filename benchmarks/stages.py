@@ -36,9 +36,10 @@ from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import record
 from coursebuild.core.run.v8 import MathEngine
+from coursebuild.core.syntax import script
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.script import python_mistake
 from coursebuild.core.values import encode
+from coursebuild.features.language_server.commands.diagnosis import diagnoses
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
@@ -47,6 +48,9 @@ from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.site import site_files
 from coursebuild.pipeline.verify import verify
+from coursebuild.preview.rebuild import BackgroundRebuild
+from coursebuild.preview.session import Session
+from coursebuild.report import Style
 
 
 def timed(
@@ -91,6 +95,36 @@ def parsing(root: Path, repeat: int) -> None:
         ],
     }
     show(f"parsing {size / 1e3:.0f} kB", timed(candidates, repeat), "markdown-it-py, tokens only")
+
+
+def typing(root: Path, repeat: int) -> None:
+    """What one more word in the longest lesson costs the language server: time of one core."""
+    from markdown_it import MarkdownIt
+
+    quiet = Progress(quiet=True)
+    session = Session(Options(root, 1, quiet=True), site=False)
+    rebuild = BackgroundRebuild(session, quiet, Style())
+    session.start(quiet)
+    rebuild.once()
+    assert session.course is not None
+    written = [one.document.source for one in session.course.lessons if one.document is not None]
+    longest = max(written, key=lambda source: len(source.text))
+    bare = MarkdownIt("commonmark").enable(["table", "strikethrough"])
+
+    def read() -> None:
+        text = session.open_texts.get(longest.path, longest.text + "\n")
+        session.open_texts = {longest.path: f"{text}word "}
+        session.edit([longest.path], saved=False)
+
+    candidates: dict[str, Callable[[], object]] = {
+        "markdown-it-py, tokens only": lambda: bare.parse(longest.text),
+        "read and check the text": read,
+        "compare it with what scripts printed": lambda: diagnoses(session),
+    }
+    seconds = timed(candidates, max(2, repeat), time.process_time)
+    show(f"a word in {len(longest.text) / 1e3:.0f} kB", seconds, "markdown-it-py, tokens only")
+    rebuild.close()
+    session.close()
 
 
 def scripts(root: Path, repeat: int) -> None:
@@ -159,7 +193,7 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
         return [imported(script) for script in scripts]
 
     def parses() -> list[object]:
-        python_mistake.cache_clear()
+        script._compile_error.cache_clear()
         return [parse_document(d.source, kinds, lesson=True) for d in documents]
 
     drafts = draws()
@@ -191,6 +225,7 @@ def main() -> None:
     names = ("markdown-it-py", "mujoco", "numpy")
     print(f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in names))
     parsing(root, arguments.repeat)
+    typing(root, arguments.repeat)
     scripts(root, arguments.repeat)
     course = load(root).course
     assert course is not None

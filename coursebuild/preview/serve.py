@@ -11,7 +11,6 @@ The last good page stays while something is wrong; what is wrong is printed and 
 
 from __future__ import annotations
 
-import gc
 import sys
 import threading
 import webbrowser
@@ -27,11 +26,6 @@ from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from coursebuild.preview.watcher import FolderWatcher
 from coursebuild.report import Style
-
-_GARBAGE = 200_000
-"""Objects after which those in cycles are looked for: a preview lives long."""
-_SWITCH = 0.001
-"""Seconds after which a thread that computes lets another one: a save should not wait for long."""
 
 
 def serve(
@@ -64,11 +58,8 @@ def serve(
         except BaseException as error:  # told by the main thread
             rebuild.fail(error)
 
-    sys.setswitchinterval(_SWITCH)
     try:
         session.start(progress)
-        gc.freeze()  # what is read lives as long as the preview: nobody need look through it again
-        gc.set_threshold(_GARBAGE, 50, 50)
         server.start()
         watcher.start()
         _announce(server.links, browse=browse, draw=progress.live)

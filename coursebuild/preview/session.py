@@ -12,6 +12,8 @@ Entry point: `Session`.
 
 from __future__ import annotations
 
+import gc
+import sys
 import threading
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import TypeAlias
@@ -50,6 +52,10 @@ ScriptKey: TypeAlias = tuple[str, ScriptJob]
 """The text of a script, and how it is run."""
 MOST = 8
 """Documents saved at once that are taken one by one; more are read with the whole course."""
+_GARBAGE = 200_000
+"""Objects after which those in cycles are looked for: a session lives long."""
+_SWITCH = 0.001
+"""Seconds after which a thread that computes lets another one: an edit should not wait for long."""
 
 
 class Session:
@@ -105,6 +111,9 @@ class Session:
         options = self.options
         with Documents(options.store, options.jobs, progress.stage) as documents:
             self.read(documents)
+        sys.setswitchinterval(_SWITCH)
+        gc.freeze()  # what is read lives as long as the process: nobody need look through it again
+        gc.set_threshold(_GARBAGE, 50, 50)
 
     def close(self) -> None:
         """End what typesets formulas: with it running, the process may hang as it ends."""

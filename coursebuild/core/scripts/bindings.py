@@ -102,6 +102,10 @@ class Printed:
         self.scripts = frozenset({*scripts, *self.runs, *self._by_script})
         """The paths of all scripts."""
 
+    def outputs(self, document: Document) -> Sequence[Verdict]:
+        """The recorded outputs of a document, in order."""
+        return self._by_document.get(document.source.path, ())
+
     def recorded(self, binding: NumberBinding) -> list[Verdict]:
         """The recorded outputs that a binding depends on."""
         if binding.script is not None:

@@ -1,15 +1,15 @@
 """Everything that running the scripts of a course shows to be wrong.
 
-Entry points: `script_findings`: each script that failed, each recorded output that is not what was
-printed, each bound number that no output bears out; `held_lines`, by which those hold that do;
-`drift_diagnostic`.
+Entry points: `script_findings`: each script that failed, and `output_findings`: each recorded
+output that is not what was printed, each bound number that no output bears out; `held_lines`, by
+which those hold that do; `drift_diagnostic`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from coursebuild.core.model import Course
+from coursebuild.core.model import Course, Document
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bindings import (
     HeldLines,
@@ -61,20 +61,31 @@ def script_findings(
             found += divergence(extraction, run, everything)
             found += effects(extraction, run, everything)
     printed = Printed(verdicts, runs, [extraction.path for extraction in everything])
-    owner_of = {document.source.path: owner for owner, document in owners(course)}
-    for verdict in verdicts:
-        recording = verdict.recording
-        run = by_path.get(recording.script or "")
-        if run is not None and run.outcome is Outcome.OK and is_silent(run.stdout):
-            found.append(silence(recording, run.path))
-        elif verdict.status == "drift" and (varies := _varies(course, verdict, run, again or {})):
-            found.append(varies)
-        elif verdict.status == "drift":
-            leaning = leaning_on(verdict, course.documents, printed)
-            found.append(drift_diagnostic(verdict, owner_of[recording.span.path], leaning))
-    for document in course.documents:
-        found += check_bindings(document, printed, held)
-    return tuple(found)
+    return (*found, *output_findings(course, owners(course), printed, held, again))
+
+
+def output_findings(
+    course: Course,
+    documents: Iterable[tuple[str, Document]],
+    printed: Printed,
+    held: HeldLines | None = None,
+    again: Mapping[str, ScriptRun] | None = None,
+) -> Iterator[Diagnostic]:
+    """What is wrong with what some documents of a course record and bind.
+
+    They come with the ids of their lessons and pages; for the rest see `script_findings`.
+    """
+    for owner, document in documents:
+        for verdict in printed.outputs(document):
+            recording = verdict.recording
+            run = printed.runs.get(recording.script or "")
+            if run is not None and run.outcome is Outcome.OK and is_silent(run.stdout):
+                yield silence(recording, run.path)
+            elif verdict.status == "drift":
+                leaning = leaning_on(verdict, course.documents, printed)
+                varies = _varies(course, verdict, run, again or {})
+                yield varies or drift_diagnostic(verdict, owner, leaning)
+        yield from check_bindings(document, printed, held)
 
 
 def _varies(

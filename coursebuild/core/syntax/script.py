@@ -12,6 +12,7 @@ import shlex
 import sys
 import warnings
 from collections.abc import Iterator
+from functools import lru_cache
 
 from coursebuild.core.model import PlainCode, Script, SourcePart
 from coursebuild.core.model.blocks import FigureName
@@ -262,14 +263,15 @@ def _lower(sentence: str) -> str:
     return sentence
 
 
+@lru_cache(maxsize=64)
 def _compile_error(code: str) -> SyntaxError | None:
-    """The first thing that Python has against a text."""
+    """The first thing that Python has against a text; remembered, while others are written."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             compile(code, "<lesson>", "exec", dont_inherit=True)
     except SyntaxError as error:
-        return error
+        return error.with_traceback(None)
     except (ValueError, MemoryError, RecursionError, OverflowError) as error:
         message = f"the code cannot be compiled: {error}"
         found = SyntaxError(message if str(error) else "the code is nested too deeply")

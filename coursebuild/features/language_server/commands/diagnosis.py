@@ -17,7 +17,9 @@ from functools import lru_cache
 from lsprotocol import types
 from msgspec.structs import replace
 
-from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.scripts.bindings import Printed
+from coursebuild.core.scripts.extract import owners
+from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Severity
 from coursebuild.core.text.rules import HELP
 from coursebuild.core.text.source import Source, Span
@@ -34,6 +36,12 @@ _COMPARED = (
 
 def diagnoses(session: Session) -> tuple[Diagnostic, ...]:
     """All that is wrong and not silenced, in the texts as they are."""
+    return _diagnoses(session, session.version)
+
+
+@lru_cache(maxsize=1)
+def _diagnoses(session: Session, version: int) -> tuple[Diagnostic, ...]:
+    """Remembered: an editor asks for it with each move of its cursor."""
     with session.changed:
         course, library, verified = session.course, session.library, session.verified
         found, last = session.found_by_reading, session.found_by_running
@@ -42,9 +50,9 @@ def diagnoses(session: Session) -> tuple[Diagnostic, ...]:
         changed = {path for path, source in now.items() if source != then.get(path)}
         if changed:
             last = tuple(d for d in last if d.span.path not in changed or d.rule not in _COMPARED)
-            runs, verdicts = library.results.runs, library.results.verdicts
-            compared = script_findings(course, (), runs, verdicts)
-            found += tuple(d for d in compared if d.span.path in changed)
+            printed = Printed(library.results.verdicts, library.results.runs, library.scripts)
+            edited = [one for one in owners(course) if one[1].source.path in changed]
+            found += tuple(output_findings(course, edited, printed))
         found += tuple(d for one in last if (d := _moved(one, now)) is not None)
     return judge(course, found).diagnostics
 
