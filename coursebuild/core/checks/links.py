@@ -52,10 +52,8 @@ from coursebuild.core.model import (
     resolve,
     walk_inlines,
 )
-from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.figures import recorded_figures
-from coursebuild.core.syntax.headings import slug
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
@@ -116,17 +114,9 @@ def anchors(document: Document) -> Mapping[str, Span]:
     return known
 
 
-def title_anchor(document: Document) -> str:
-    """The anchor of the title that a page opens with; empty where something below it has it."""
-    title = title_line(document.source)
-    name = "" if title is None else slug(title.text)
-    return name if name and anchors(document)[name] == title else ""
-
-
 def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
-    title = title_line(document.source)
-    if title is not None:
-        yield slug(title.text), title
+    if document.title_anchor:
+        yield document.title_anchor, document.source.span(0, 0)
     outputs: dict[str, int] = {}
     # A summary does not say where formulas stand.
     yield from ((formula.id, document.source.span(0, 0)) for formula in document.equations)

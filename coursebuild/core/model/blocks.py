@@ -385,6 +385,8 @@ class Document(Struct, frozen=True, dict=True):
     source: Source
     blocks: tuple[Block, ...]
     footnotes: tuple[Footnote, ...]
+    title_anchor: str = ""
+    """Of a page's title that the text opens with; empty where a heading has the same."""
     equations: tuple[Equation, ...] = ()
     """Of a summary, which does not have what they were taken from."""
     summaries: Mapping[str, Struct] | None = None

@@ -58,7 +58,7 @@ def without_prose(document: Document) -> Document:
             kept += _kept_of(block)
     if is_blank(kept) and not is_blank(document_blocks(document)):
         kept.append(ThematicBreak(document.blocks[0].span))
-    return Document(document.source, tuple(kept), ())
+    return Document(document.source, tuple(kept), (), document.title_anchor)
 
 
 def _kept_of(block: Block) -> Iterator[Block]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from markupsafe import Markup
 from msgspec.structs import replace
 
-from coursebuild.core.checks.links import title_anchor
 from coursebuild.core.model import Document, Paragraph, plain_text
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.article import article, contents
@@ -40,7 +39,7 @@ def draw(
         page = PageContext.made(tools, inputs.shown, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
-        values["title_anchor"] = title_anchor(document)
+        values["title_anchor"] = document.title_anchor
         if head.kind == "page":
             head = replace(head, description=_first_sentences(document))
     kind = page_kind(head.kind)

@@ -29,6 +29,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import blocks_elsewhere
+from coursebuild.core.syntax.headings import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import whole
 from coursebuild.core.syntax.tree import TextReader
@@ -52,11 +53,14 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     """
     session = ParsingState(source, callouts, lesson)
     base = _without_front_matter(whole(source), session)
-    if not lesson and title_line(source) is not None:
+    title = None if lesson else title_line(source)
+    if title is not None:
         base = base.slice(len(base.text.partition("\n")[0]))
     reader = TextReader(base, session, session.definitions, nested=False)
     blocks = reader.read()
-    document = Document(source, blocks, session.notes.finish())
+    anchor = "" if title is None else slug(title.text)
+    free = not session.anchors.has(anchor)
+    document = Document(source, blocks, session.notes.finish(), anchor if free else "")
     session.end()
     session.diagnostics += _misplaced(document)
     return Parsed(document, sort_diagnostics(session.diagnostics))

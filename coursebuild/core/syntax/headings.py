@@ -109,11 +109,15 @@ class Anchors(Struct):
         else:
             self.explicit[name] = span
 
+    def has(self, name: str) -> bool:
+        """Whether a heading or a formula has an id, or asks for it."""
+        return name in self.explicit or name in self.taken
+
     def make(self, text: str) -> str:
         """The anchor of a heading without an id."""
         base = name = slug(text)
         count = self.counts.get(base, 1)
-        while name in self.explicit or name in self.taken:
+        while self.has(name):
             count += 1
             name = f"{base}-{count}"
         self.counts[base] = count
