@@ -12,6 +12,7 @@ import numpy
 import pytest
 
 from coursebuild.core.run.versions import engine_version, python_version
+from support.sandboxes import require_sandbox
 from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.site
@@ -34,8 +35,12 @@ PRINTED = "/.venv Mars mjcourse.spatial\nNo module named 'msgspec'"
 
 @pytest.fixture
 def course(make: Make) -> Folder:
+    return with_environment(make, SCRIPT, PRINTED)
+
+
+def with_environment(make: Make, script: str, printed: str) -> Folder:
     """A course with an environment that has MuJoCo, what that needs, and a package `planet`."""
-    folder = make("## One\n\n" + block("a.py", SCRIPT, PRINTED))
+    folder = make("## One\n\n" + block("a.py", script, printed))
     folder.replace("content/course.toml", "[course]\n", '[course]\nengine = "0.0.0"\n')
     folder.replace("content/course.toml", "0.0.0", engine_version())
     map = folder.text("content/course.toml")
@@ -147,3 +152,21 @@ def test_another_engine_is_tried_by_another_environment(course: Folder) -> None:
     done = course.main("check", "--against", "3.1.0")
     assert done.status == 2
     assert "scripts of this course run with .venv/bin/python" in done.err
+
+
+def test_the_sandbox_has_this_environment_and_no_other_folder_it_names(make: Make) -> None:
+    """The folder of its Python stands in a file of the course, where it may be anything."""
+    script = "import os, sys, planet\nprint(planet.NAME, os.path.exists(sys.argv[1]))"
+    folder = with_environment(make, script, "Mars False")
+    require_sandbox(folder.root)
+    home = folder.root.parent / "home"
+    (home / "lib").mkdir(parents=True)
+    folder.replace(folder.lesson(), "file=examples/a.py", f'file=examples/a.py args="{home}"')
+    done = folder.main("check", "--sandbox")
+    assert done.status == 0, done.out
+    settings = folder.root / ".venv/pyvenv.cfg"
+    named = f"home = {home}/bin\n"
+    lines = settings.read_text().splitlines(keepends=True)
+    settings.write_text("".join(named if line.startswith("home") else line for line in lines))
+    done = folder.main("check", "--sandbox", "--no-cache")
+    assert done.status == 1 and "cannot run scripts" in done.err
