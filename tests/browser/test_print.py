@@ -61,7 +61,7 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
 
 
 def is_a_handout(sheets: list[str], headings: set[str]) -> None:
-    assert 10 < len(sheets) < 33, "of text, five drawings and four labs"
+    assert 10 < len(sheets) < 35, "of text, five drawings and four labs"
     for number, sheet in enumerate(sheets, 1):
         assert f"{number} / {len(sheets)}" in sheet
         assert ("Mass and inertia · Simulation with MuJoCo" in sheet) == (number > 1)
