@@ -14,7 +14,6 @@ import hashlib
 import importlib
 import threading
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
@@ -39,7 +38,7 @@ from coursebuild.core.pages.urls import Place
 from coursebuild.core.pages.zips import imports
 from coursebuild.core.registry import summarize
 from coursebuild.core.run.versions import package_version
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import document_fingerprint
@@ -148,14 +147,6 @@ def prepare_to_read(sample: SourceText) -> None:
         start()
 
 
-@lru_cache(maxsize=4)
-def parsed(source: Source, callouts: frozenset[str], lesson: bool) -> Parsed[Document]:
-    """A text with its prose; remembered, since an editor asks many things about one."""
-    from coursebuild.core.syntax.document import parse_document
-
-    return parse_document(source, callouts, lesson=lesson)
-
-
 def kept_formulas(store: Memo, path: str) -> dict[Formula, str]:
     """MathML of the formulas that the text at a path had when it was last read."""
     return store.get(_MATHML, _formulas_key(path), lambda data: decode(data, dict)) or {}
@@ -226,9 +217,11 @@ class PageReader:
             self._room += len(known[0].source.text)
             if known[0].key == text.key:
                 return known[1]
-        read = parsed(text.source, text.callouts, text.lesson)
-        formulas = document_formulas(read.value)
-        return _Whole(read.value, read.diagnostics, self._typeset(text.source.path, formulas))
+        from coursebuild.core.syntax.document import parse_document
+
+        parsed = parse_document(text.source, text.callouts, lesson=text.lesson)
+        formulas = document_formulas(parsed.value)
+        return _Whole(parsed.value, parsed.diagnostics, self._typeset(text.source.path, formulas))
 
     def _typeset(self, path: str, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
         """MathML; that of formulas which the text at this path had before is in the store."""

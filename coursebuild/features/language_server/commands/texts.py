@@ -5,6 +5,8 @@ Entry point: `OpenTexts`.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
@@ -12,9 +14,10 @@ from coursebuild.core.files.read import read_sources
 from coursebuild.core.model import Document, Lesson
 from coursebuild.core.model.results import Formula
 from coursebuild.core.pages.library import Library, Owner, owners
+from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.language_server.commands.places import Places
-from coursebuild.pipeline.reading import kept_formulas, parsed
+from coursebuild.pipeline.reading import kept_formulas
 from coursebuild.preview.session import Session
 
 
@@ -36,7 +39,7 @@ class OpenTexts(Struct, frozen=True):
         """A lesson or page with its prose; `None` for any other text, and for one too long."""
         owner = self.owner(source)
         callouts = frozenset(self.library.callouts)
-        return None if owner is None else parsed(source, callouts, isinstance(owner, Lesson)).value
+        return None if owner is None else _parsed(source, callouts, isinstance(owner, Lesson))
 
     def owner(self, source: Source) -> Owner | None:
         """The lesson or page that has a text, if it is not too long to be read."""
@@ -47,3 +50,9 @@ class OpenTexts(Struct, frozen=True):
     def formulas(self, path: str) -> dict[Formula, str]:
         """MathML of the formulas that a text had when it was last read."""
         return kept_formulas(self.store, path)
+
+
+@lru_cache(maxsize=16)
+def _parsed(source: Source, callouts: frozenset[str], lesson: bool) -> Document:
+    """Remembered: an editor asks many things about a text before it is another."""
+    return parse_document(source, callouts, lesson=lesson).value
