@@ -224,7 +224,7 @@ def test_save_during_the_first_runs_is_not_missed(make: Make) -> None:
         folder.replace(folder.lesson(), "## First", "## Second")
         events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
         folder.write("go", "")
-        events.settled()
+        events.settled("script-writes")
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
 
 
@@ -238,14 +238,14 @@ def test_script_that_was_changed_is_not_waited_for(make: Make) -> None:
         folder.replace(folder.lesson(), "## First", "## Second")
         events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
         folder.write("go", "")
-        events.settled()
+        events.settled("script-writes")
         assert folder.read("begun") == b"x"
         (folder.root / "go").unlink()
         folder.replace(folder.lesson(), "print(1)", "print(int(1))")
         wait_for(folder.root / "begun", 2)
         events.until(lambda told: told.news["scripts"][0]["state"] == "running")
         folder.replace(folder.lesson(), waits, "")
-        events.settled()
+        events.settled("script-writes")
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
         assert folder.read("begun") == b"xxx"
 
