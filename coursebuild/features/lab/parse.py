@@ -69,7 +69,7 @@ def _parse_mjcf(fence: Fence, name: Word) -> Parsed[Lab | None]:
         try:
             value = True if word.value is None else convert(word.value, type, strict=False)
             given[word.key] = value
-        except ValidationError:
+        except (ValidationError, UnicodeEncodeError):  # half a character cannot be converted
             message = f"`{word.value}` is not {what}"
             found.append(diagnose("fence-key-value", word.value_span, message))
     verify = Verify(**{key: given.pop(key) for key in ("seconds", "rtol", "deep") if key in given})

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 from support.lab_fences import parse, text_of, told
 
 LAB = '{"model": "m", %s}'
@@ -136,3 +138,9 @@ def test_a_wrong_control_hides_nothing_else() -> None:
 def test_a_step_as_long_as_its_range_and_a_claim_of_one_value_are_good() -> None:
     assert told(SLIDER % '"step": 2, "set": "x"') == []
     assert told(CLAIM % '"t": 1, "expr": "1", "min": 1, "max": 1') == []
+
+
+def test_half_a_character_is_no_number() -> None:
+    text = "```lab mjcf height=\udc80\n<mujoco/>\n```\n"
+    parsed = parse_document(Source("content/lessons/1.1-x.md", text), frozenset(), lesson=True)
+    assert "fence-key-value" in {wrong.rule for wrong in parsed.diagnostics}
