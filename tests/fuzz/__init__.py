@@ -10,6 +10,6 @@
 3. `__main__` divides the time among the targets, starts a worker again that was ended by an input
    that hangs or takes all memory, and prints what was tried, survived and found.
 
-`corpus/` holds, in a file for each target, the few inputs that reach what all that were ever tried
-reached; `--keep` adds those of a run.
+`corpus/` holds, in a file for each target, short inputs that reached code which none before them
+had reached; `--keep` adds those of a run.
 """

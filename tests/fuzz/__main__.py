@@ -85,10 +85,9 @@ class Bench:
         return lines
 
     def keep(self) -> None:
-        """Put what reaches more than the first inputs do into the corpus of the repository."""
-        self.worker("-set_cover_merge=1", "-use_counters=0", "seeds", "corpus")
-        first = {*TARGETS[self.name].seeds()}
-        found = {path.read_bytes() for path in (self.folder / "seeds").iterdir()} - first
+        """Put the shortest inputs that reached new code into the corpus of the repository."""
+        reached = {path.read_bytes() for path in (self.folder / "corpus").iterdir()}
+        found = reached.union(kept(self.name)).difference(TARGETS[self.name].seeds())
         least = sorted(found, key=lambda data: (len(data), data))[:KEPT]
         text = json.dumps([data.decode("latin-1") for data in least], indent=0)
         (CORPUS / f"{self.name}.json").write_text(f"{text}\n")
