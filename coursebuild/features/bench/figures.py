@@ -41,6 +41,8 @@ class Grid(Struct, frozen=True):
     """The first cell of each is what the row is about."""
     left: tuple[int, ...]
     """Columns of words; numbers stand at the right."""
+    minor: tuple[int, ...] = ()
+    """Columns that go first where there is no room for all."""
     marked: tuple[int, ...] = ()
     """Rows that stand out."""
     parts: tuple[FigurePart, ...] = ()
@@ -66,14 +68,22 @@ def grid(
     columns: list[tuple[str, list[str]]],
     *,
     words: tuple[str, ...] = (),
+    minor: tuple[str, ...] = (),
     marked: tuple[int, ...] = (),
     parts: tuple[FigurePart, ...] = (),
 ) -> Grid:
-    """A table of columns, those without any text left out; `words` are titles of such of words."""
+    """A table of columns without those that have no text; `words` and `minor` name some of them."""
     shown = [(title, cells) for n, (title, cells) in enumerate(columns) if not n or any(cells)]
-    left = tuple(n for n, (title, _) in enumerate(shown) if not n or title in words)
-    rows = tuple(zip(*(cells for _, cells in shown), strict=True))
-    return Grid(label, tuple(title for title, _ in shown), rows, left, marked, parts)
+    titles = tuple(title for title, _ in shown)
+    return Grid(
+        label=label,
+        head=titles,
+        rows=tuple(zip(*(cells for _, cells in shown), strict=True)),
+        left=tuple(n for n, title in enumerate(titles) if not n or title in words),
+        minor=tuple(n for n, title in enumerate(titles) if title in minor),
+        marked=marked,
+        parts=parts,
+    )
 
 
 def power(value: float | None, digits: int = 3) -> Markup:

@@ -31,7 +31,7 @@ from coursebuild.numerics.reports.bench import (
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.cases import ErrorLine
-from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, SweepRow, cell
+from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, SweepRow, cell, shown_figures
 from coursebuild.numerics.reports.text import (
     FEWEST_STEPS,
     Quantity,
@@ -119,12 +119,12 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
         key = _QUANTITIES.get(quantity.name)
         return quantity.label if key is None else words(key), found
 
-    remarks = words("measured.remark")
+    remarks, speed, time = map(words, ("measured.remark", "measured.realtime", "measured.seconds"))
     columns: list[tuple[str, list[str]]] = [
         (words("measured.setting"), [setting_text(row.setting, usual) for row in rows]),
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
-        (words("measured.realtime"), [factor(row.realtime) for row in rows]),
-        (words("measured.seconds"), [_time(row) for row in rows]),
+        (speed, [factor(row.realtime) for row in rows]),
+        (time, [_time(row) for row in rows]),
         *(error(quantity) for quantity in quantities(report) if quantity.tells(rows)),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
@@ -135,7 +135,7 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
     ]
     marked = tuple(n for n, row in enumerate(rows) if row.own)
     label = words("measured.settings", title=report.title or report.name)
-    return grid(label, columns, words=(remarks,), marked=marked)
+    return grid(label, columns, words=(remarks,), minor=(speed, time), marked=marked)
 
 
 def _time(row: WorkPrecisionRow) -> str:
@@ -256,9 +256,10 @@ def sweep_view(words: Strings, sweep: SweepReport, anchor: str = "") -> SweepVie
         (words("measured.value"), [row.value for row in sweep.rows]),
         *((name, [cell(row, key) for row in sweep.rows]) for key, name in FIGURES.items()),
     ]
+    minor = tuple(name for key, name in FIGURES.items() if key not in shown_figures(sweep))
     marked = tuple(n for n, row in enumerate(sweep.rows) if row.own)
     notes = lost_runs((f"{row.parameter} {row.value}", row) for row in sweep.rows)
-    table = grid(sweep.title, columns, marked=marked)
+    table = grid(sweep.title, columns, minor=minor, marked=marked)
     return SweepView(anchor, sweep.title, table, tuple(notes), sweep)
 
 

@@ -1,6 +1,6 @@
 """What the page of the hard cases shows.
 
-Entry point: `numerics_values(library)`.
+Entry points: `numerics_values(library)`; `case_view`, of one case.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def _group(
     several = not number or len(cases) > 1
     title = words(key) if several and words.has(key) else cases[0].title
     rows = tuple(_matrix_row(words, one) for one in cases)
-    return CaseGroup(number, title, rows, tuple(_case(words, place, one) for one in cases))
+    return CaseGroup(number, title, rows, tuple(case_view(words, place, one) for one in cases))
 
 
 def _matrix_row(words: Strings, report: CaseReport) -> MatrixRow:
@@ -154,7 +154,8 @@ def _limit(words: Strings, line: BoundaryLine | None) -> str:
 # ------------------------------------------------------------------------------------------ a case
 
 
-def _case(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
+def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
+    """What the page shows of a case."""
     model = "" if report.case else report.name.rpartition("/")[0]
     grids = (_boundaries(words, report), _figures(words, report), _orders(words, report))
     shown = case_quantities(report)

@@ -1,6 +1,6 @@
 """A chart of lines between two logarithmic axes, as SVG.
 
-Entry point: `chart_svg(chart, …)`, for pages and for files of their own.
+Entry point: `chart_svg(chart, …)`.
 
 1. A line has a colour, a mark and a dash of its own; its name stands in the key, or at its end
    where there is no key. Bars are intervals.
@@ -102,14 +102,13 @@ class Chart(Struct, frozen=True):
     """What the key says after the lines; without it there is no key."""
 
 
-def chart_svg(chart: Chart, name: str, size: tuple[float, float], style: str = "") -> str:
+def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     """The chart as an `svg` element; empty where there is no point to be drawn.
 
     Args:
         chart: what to draw.
         name: unlike those of all other drawings on the page: what describes it has an id.
         size: one of those above.
-        style: the style sheet of a file of its own.
     """
     if not any(line.drawn for line in chart.lines):
         return ""
@@ -120,7 +119,7 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float], style: str = "
         left = 6.0 if size == NARROW else x.start
         below, height = key((*lines, *chart.marks), left, y.start + 62, size[0])
         body += below
-    return svg(body, (size[0], height), name, (chart.title, chart.text), style)
+    return svg(body, (size[0], height), name, (chart.title, chart.text))
 
 
 def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:

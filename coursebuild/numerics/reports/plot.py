@@ -1,7 +1,6 @@
 """The work–precision plot of a scenario as SVG: error against cost.
 
-Entry points: `plot_svg(report, …)`, for pages and for files of their own; `work_precision(report)`,
-what it shows.
+Entry points: `plot_svg(report, …)`; `work_precision(report)`, what it shows.
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
    scene's own solver, iterations and cone; the rows with others are small marks beside it.
@@ -32,32 +31,17 @@ from coursebuild.numerics.reports.text import (
     usual_setting,
 )
 
-STYLE = """\
-:root{color-scheme:light dark;background:light-dark(#fcfbf8,#17191c);color:light-dark(#484742,\
-#c0bcb3);--paper:light-dark(#fcfbf8,#17191c);--ink:light-dark(#1e1e1c,#e6e3dc);\
---rust:light-dark(#86340c,#f3b184);--trace-1:light-dark(#0072b2,#56b4e9);\
---trace-2:light-dark(#b34d00,#e69f00);--trace-3:light-dark(#00795a,#2fc79a);\
---trace-4:light-dark(#a8467f,#e59fc7);--trace-5:light-dark(#7a6a00,#f0e442);\
---trace-6:light-dark(#2b6f9e,#8fd0f5);--trace-7:light-dark(#1e1e1c,#e6e3dc)}\
-@media print{:root{color-scheme:light;background:#fff}}"""
-"""Of a file of its own: what a page's style sheet says otherwise."""
 
-
-def plot_svg(
-    report: ScenarioReport, *, name: str, narrow: bool = False, whole: bool = False
-) -> str:
+def plot_svg(report: ScenarioReport, *, name: str, narrow: bool = False) -> str:
     """The plot as an `svg` element; empty where no row of the scenario has an error.
 
     Args:
         report: of the scenario.
         name: unlike those of all other plots on the page: what describes it has an id.
         narrow: for narrow screens: the text has the same size there.
-        whole: for a file of its own, which has no style sheet.
     """
     chart = work_precision(report)
-    if chart is None:
-        return ""
-    return chart_svg(chart, name, NARROW if narrow else WIDE, STYLE if whole else "")
+    return "" if chart is None else chart_svg(chart, name, NARROW if narrow else WIDE)
 
 
 def work_precision(report: ScenarioReport) -> Chart | None:

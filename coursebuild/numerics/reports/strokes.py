@@ -151,20 +151,13 @@ def _key_mark(entry: Entry, x: float, y: float) -> Iterator[str]:
         yield area(mark(0, x, y, SMALL if entry.kind == "other" else MARK), look)
 
 
-def svg(
-    body: str, size: tuple[float, float], name: str, said: tuple[str, str], style: str = ""
-) -> str:
-    """A drawing as an element; `said` is its title and its text for who cannot see it.
-
-    With a `style` it is for a file of its own.
-    """
+def svg(body: str, size: tuple[float, float], name: str, said: tuple[str, str]) -> str:
+    """A drawing as an element; `said` is its title and its text for who cannot see it."""
     key = markup_text(name.replace("/", "-"))  # a name in XML has no slash
     title, text = map(markup_text, said)
-    head = ' xmlns="http://www.w3.org/2000/svg"' if style else ""
     return (
-        f'<svg{head} class="work-precision" viewBox="0 0 {size[0]:g} {size[1]:g}" '
+        f'<svg class="work-precision" viewBox="0 0 {size[0]:g} {size[1]:g}" '
         f'role="img" aria-labelledby="{key}-title {key}-text" fill="currentColor" '
         f'font-size="{SIZE:g}" font-family="{_FONT}"><title id="{key}-title">{title}'
-        f'</title><desc id="{key}-text">{text}</desc>'
-        + (f"<style>{style}</style>{body}</svg>\n" if style else f"{body}</svg>")
+        f'</title><desc id="{key}-text">{text}</desc>{body}</svg>'
     )

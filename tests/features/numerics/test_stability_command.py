@@ -25,8 +25,8 @@ def test_stability_prints_text_and_then_json_without_measuring_again(
     assert main(["-C", str(course), "stability", "projectile"]) == 0
     out, err = capsys.readouterr()
     assert out.startswith("projectile  case 4: Projectile\n")
-    assert "reference (closed, known to 1e-14, velocities to 1e-14): x = v₀t + gt²/2" in out
-    assert "-0.04905" in out
+    assert "\n  References: x = v₀t + gt²/2; MuJoCo’s accelerations over the MJCF, DOP853.\n" in out
+    assert "−0.049" in out
     assert "projectile: measured after" in err
     assert main(["-C", str(course), "stability", "projectile", "--format", "json", "-q"]) == 0
     out, err = capsys.readouterr()

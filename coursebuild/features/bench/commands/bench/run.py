@@ -1,6 +1,6 @@
 """`coursebuild bench`: speed against error of the course's models.
 
-Entry points: `bench(options, names, …)`, `check(…)`; `write_plots(file, …)`.
+Entry points: `bench(options, names, …)`, `check(…)`.
 
 1. Names mean models. One that does not compile is told, and the others are measured.
 2. What was measured is kept under all that it depends on, a scenario at a time: a run that was
@@ -11,16 +11,12 @@ Entry points: `bench(options, names, …)`, `check(…)`; `write_plots(file, …
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.files.errors import EffectError, reason
-from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -35,7 +31,7 @@ from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
 from coursebuild.numerics.reports.records import BENCH, FOLDER, ReportFailure
 from coursebuild.numerics.reports.sweep import SweepReport
-from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, Scenes, find_scenes
 from coursebuild.pipeline.shown_reports import read_record
 
@@ -211,65 +207,3 @@ class SceneRun(MeasuringRun):
                 )
                 self.keep("bench-scenarios", own, found)
             yield found
-
-
-# ------------------------------------------------------------------------------------------- plots
-
-
-def plot_file(text: str) -> Path:
-    """The file that `--plot` names.
-
-    Raises:
-        UsageError: it names none that a plot can go into.
-    """
-    path = Path(text)
-    if path.suffix.lower() != ".svg":
-        raise UsageError(f"--plot: {text!r} is no name of an SVG file: plot.svg")
-    if not path.absolute().parent.is_dir():
-        raise UsageError(f"--plot: there is no folder {path.parent}")
-    return path.absolute()
-
-
-def write_plots(file: Path, scenes: Sequence[SceneReport]) -> tuple[str, ...]:
-    """Draw every scenario in a file of its own; what was written, in words.
-
-    One scenario goes into the file that was named. Where there are several, the name of each stands
-    before its suffix: `plot.svg` becomes `plot-arm-swing.svg`.
-
-    Raises:
-        UsageError: it cannot be written.
-    """
-    from coursebuild.numerics.reports.plot import plot_svg
-
-    found = [(scene, one) for scene in scenes for one in scene.scenarios]
-    said = []
-    for path, (scene, scenario) in zip(_names(file, found), found, strict=True):
-        svg = plot_svg(scenario, name="plot", whole=True)
-        if not svg:
-            said.append(f"{scene.model}, {scenario.name}: there is no error to draw")
-            continue
-        try:
-            before = path.read_bytes() if path.exists() else None
-            data = svg.encode()
-            write_atomic(path.parent, path.name, data, expected=before, durable=False)
-        except EffectError as error:
-            raise UsageError(f"--plot: {error.message}") from None
-        except OSError as error:
-            raise UsageError(f"--plot: {path} cannot be written: {reason(error)}") from None
-        said.append(f"wrote {path.name}")
-    return tuple(said)
-
-
-def _names(file: Path, found: Sequence[tuple[SceneReport, ScenarioReport]]) -> Iterator[Path]:
-    """A file for each scenario, no two the same."""
-    taken: set[str] = set()
-    for scene, scenario in found:
-        name = file.stem
-        if len(found) > 1:
-            name += "-" + re.sub(r"[^\w.-]+", "-", f"{scene.model}-{scenario.name}")
-        number, stem = 1, name
-        while name.casefold() in taken:
-            number += 1
-            name = f"{stem}-{number}"
-        taken.add(name.casefold())
-        yield file.with_name(name + file.suffix)
