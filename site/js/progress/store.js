@@ -11,13 +11,13 @@
  *    `trouble()` says so. A damaged text is put aside before anything is written; what can be read of it is taken over.
  */
 
+import { PREFIX } from './kept.js'
 import { counts } from './schedule.js'
 import { answerOf, canonical, emptyState, encode, isTime, latest, latestRecalls, merge, NOTHING } from './state.js'
 import { placeOf, readOf, understood } from './state.js'
 
 export { matchQuestions } from './match.js'
 
-const PREFIX = 'coursebuild.progress.'
 const LAST_TIME = Date.UTC(9999, 11, 31)
 
 /**
