@@ -47,7 +47,7 @@ def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode
     """
     body = _body(source)
     try:
-        tomllib.loads(body.text)
+        tomllib.loads(source.text)
         reader = _Reader(body)
         root = _node(body, reader.document())
         assert isinstance(root, ObjectNode)

@@ -164,6 +164,7 @@ def edited(draw: st.DrawFn, text: str) -> str:
 @example("[a.b.c]\n[a]\nb.x=1\n")
 @example("[x]\na.b=1\n[x.a.c]\n")
 @example('a="""""" \n')
+@example("\r\r\n")
 def test_values_and_validity_are_those_of_tomllib(text: str) -> None:
     parsed = parse_toml(Source("x.toml", text))
     try:

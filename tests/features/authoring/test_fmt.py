@@ -105,11 +105,13 @@ def test_any_text_says_the_same(text: str, lesson: bool, width: int) -> None:
     check_formatting(text, width, lesson)
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.stem)
 def test_documents_of_the_course_say_the_same(path: Path) -> None:
     check_formatting(path.read_text(), 60, path.parent.name == "lessons")
 
 
+@pytest.mark.site
 def test_lines_of_the_course_stay() -> None:
     """Where the map names no width, only tables and white space change."""
     for path in DOCUMENTS:
