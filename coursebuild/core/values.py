@@ -5,20 +5,23 @@ Entry points: `encode` and `decode`; `fingerprint`, a hash that is the same for 
 1. A value is made of texts, numbers, tuples, lists, sets, mappings, structs and members of enums.
    It becomes lists in MessagePack: a number that says what the list is, then what is in it. Classes
    have numbers from 16 on, and are named at the beginning.
-2. Only structs, named tuples and enums of this package and of features are made of a name.
+2. Only structs, named tuples and enums of this package and of features are made of a name, and
+   only where each field is of its type.
 3. All places in a value are in one source. It is left out, and put in again by `decode`.
 """
 
 from __future__ import annotations
 
 import enum
+import functools
 import hashlib
 import importlib
 import sys
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from decimal import Decimal
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 from markupsafe import Markup
@@ -71,9 +74,10 @@ def decode(data: bytes | None, kind: type[Value], source: Source | None = None) 
     try:
         names, packed = msgspec.msgpack.decode(data or b"", type=tuple[list[str], Any])
         found = _builder(names, source)(packed) if type(packed) is list else packed
+        fits = _type_test(kind)  # type: ignore[arg-type]  # a class has a hash
+        return found if fits(found) else None
     except DAMAGE:
         return None
-    return found if isinstance(found, kind) else None
 
 
 def fingerprint(value: object, shown: Mapping[type, Callable[[Any], object]] | None = None) -> str:
@@ -159,7 +163,12 @@ class _Encoder:
 
 def _builder(names: list[str], source: Source | None) -> Callable[[list[Any]], Any]:
     """What makes a value of a list."""
-    place: Any = source  # where there is none, nothing in the value asks for one
+
+    def excerpt(text: Any, *at: Any) -> Excerpt:
+        if source is None or not isinstance(text, str) or set(map(type, at)) != {int}:
+            raise TypeError("no excerpt")
+        return Excerpt(source, text, tuple(zip(at[::2], at[1::2], strict=True)))
+
     makers: dict[int, Callable[..., Any]] = {
         _LIST: lambda *items: list(items),
         _SET: lambda *items: frozenset(items),
@@ -168,19 +177,20 @@ def _builder(names: list[str], source: Source | None) -> Callable[[list[Any]], A
         _TEXT: lambda data: data.decode("utf-8", "surrogatepass"),
         _NUMBER: int,
         _DECIMAL: Decimal,
-        _SOURCE: lambda: place,
-        _EXCERPT: lambda text, *at: Excerpt(
-            place, text, tuple(zip(at[::2], at[1::2], strict=True))
-        ),
+        _SOURCE: lambda: source,
+        _EXCERPT: excerpt,
     }
-    makers.update((number, _maker(name)) for number, name in enumerate(names, _FIRST_CLASS))
+    makers.update((number, _maker(_class(name))) for number, name in enumerate(names, _FIRST_CLASS))
 
     def build(packed: list[Any]) -> Any:
         if not packed:
             return ()
         head = packed[0]
         if head == _SPAN:  # of these there are as many as of all others
-            return Span(place, packed[1], packed[2])
+            _, start, end = packed
+            if type(start) is not int or type(end) is not int or source is None:
+                raise TypeError("no span")
+            return Span(source, start, end)
         items = [build(one) if type(one) is list else one for one in packed]
         if head == _TUPLE:
             return tuple(items[1:])
@@ -189,29 +199,68 @@ def _builder(names: list[str], source: Source | None) -> Callable[[list[Any]], A
     return build
 
 
-def _maker(name: str) -> Callable[..., Any]:
-    """What makes a value of the class of a name."""
+def _class(name: str) -> type:
+    """The class of a name."""
     module, _, inner = name.partition(":")
     kind: Any = _module(module)
     for part in inner.split("."):
         kind = vars(kind)[part]
-    if isinstance(kind, type) and issubclass(kind, enum.Enum):
-        return lambda member: kind[member]
-    if isinstance(kind, type) and issubclass(kind, Struct):
-        return _struct_maker(kind)
-    if isinstance(kind, type) and issubclass(kind, tuple) and kind is not tuple:
+    if isinstance(kind, type) and issubclass(kind, enum.Enum | Struct | tuple):
         return kind
     raise TypeError(f"{name} is no class of values")
 
 
-def _struct_maker(kind: type[Struct]) -> Callable[..., Struct]:
-    def make(*items: Any) -> Struct:
-        try:
-            return kind(*items)
-        except TypeError:  # some fields must be named
-            return kind(**dict(zip(kind.__struct_fields__, items, strict=True)))
+@functools.cache
+def _maker(kind: Any) -> Callable[..., Any]:
+    """What makes a value of a class, of fields that must be of their types."""
+    if issubclass(kind, enum.Enum):
+        return lambda member: kind[member]
+    fields = kind.__struct_fields__ if issubclass(kind, Struct) else kind._fields
+    named = len(kind.__match_args__) < len(fields)
+    hints = get_type_hints(kind)
+    tests = [_type_test(hints[field]) for field in fields]
+
+    def make(*items: Any) -> Any:
+        for test, item in zip(tests, items, strict=True):
+            if not test(item):
+                raise TypeError(f"a field of {kind.__qualname__} is of another type")
+        return kind(**dict(zip(fields, items, strict=True))) if named else kind(*items)
 
     return make
+
+
+@functools.cache
+def _type_test(hint: Any) -> Callable[[Any], bool]:
+    """What tells whether a value is of a type; what is in structs has been tested."""
+    kind, inner = get_origin(hint) or hint, get_args(hint)
+    if kind is Literal:
+        return inner.__contains__
+    if kind in (Union, UnionType):
+        plain = tuple(one for one in inner if isinstance(one, type) and one is not float)
+        tests = [_type_test(one) for one in inner if one not in plain]
+        return lambda value: isinstance(value, plain) or any(test(value) for test in tests)
+    if kind is float:
+        return lambda value: isinstance(value, float | int)
+    if not isinstance(kind, type):  # `Any`, or a variable
+        return lambda value: True
+    if kind is tuple and inner and inner[-1] is not ...:
+        row = [_type_test(one) for one in inner]
+        return lambda value: (
+            type(value) is tuple
+            and len(value) == len(row)
+            and all(test(one) for test, one in zip(row, value, strict=True))
+        )
+    if inner and issubclass(kind, Mapping):
+        of_key, of_value = map(_type_test, inner)
+        return lambda value: (
+            isinstance(value, kind)
+            and all(map(of_key, value))
+            and all(map(of_value, value.values()))
+        )
+    if inner and issubclass(kind, Collection):
+        of_one = _type_test(inner[0])
+        return lambda value: isinstance(value, kind) and all(map(of_one, value))
+    return lambda value: isinstance(value, kind)
 
 
 def _module(name: str) -> Any:

@@ -153,18 +153,27 @@ class Documents(Parser):
 
     def course_map(self, source: Source) -> Parsed[Course | None]:
         """The course that a map describes, and what is wrong in it."""
-        return self._remembered(_MAPS, source, super().course_map)
+        return self._remembered(_MAPS, Course, source, super().course_map)
 
     def declarations(self, source: Source) -> Parsed[Declarations | None]:
         """What a file beside a model declares, and what is wrong in it."""
-        return self._remembered(_DECLARATIONS, source, super().declarations)
+        return self._remembered(_DECLARATIONS, Declarations, source, super().declarations)
 
     def _remembered(
-        self, kind: str, source: Source, parse: Callable[[Source], Parsed[Value]]
-    ) -> Parsed[Value]:
+        self,
+        kind: str,
+        type: type[Value],
+        source: Source,
+        parse: Callable[[Source], Parsed[Value | None]],
+    ) -> Parsed[Value | None]:
         """What a text parses to: kept, or parsed now, by what is imported only then."""
         key = step_key(kind, source.path, source.text)
-        found = self._store.get(kind, key, lambda data: decode(data, Parsed, source))
+
+        def read(data: bytes) -> Parsed[Value | None] | None:
+            parsed = decode(data, Parsed, source)
+            return parsed if parsed and isinstance(parsed.value, type | None) else None
+
+        found = self._store.get(kind, key, read)
         if found is not None:
             return found
         parsed = parse(source)

@@ -149,7 +149,8 @@ def prepare_to_read(sample: SourceText) -> None:
 
 def kept_formulas(store: Memo, path: str) -> dict[Formula, str]:
     """MathML of the formulas that the text at a path had when it was last read."""
-    return store.get(_MATHML, _formulas_key(path), lambda data: decode(data, dict)) or {}
+    key = _formulas_key(path)
+    return store.get(_MATHML, key, lambda data: decode(data, dict[Formula, str])) or {}
 
 
 def _formulas_key(path: str) -> str:

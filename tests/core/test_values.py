@@ -13,7 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markupsafe import Markup
 
-from coursebuild.core.model import Heading, Text
+from coursebuild.core.model import (
+    BlockQuote,
+    Comparison,
+    Document,
+    Heading,
+    Mode,
+    Recording,
+    Table,
+    Text,
+)
 from coursebuild.core.model.equations import DisplayFormula
 from coursebuild.core.text.diagnostics import Severity, diagnose
 from coursebuild.core.text.source import Excerpt, Source, Span
@@ -49,11 +58,11 @@ def test_what_is_kept_comes_back(value: object) -> None:
 
 def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
     value = (
-        Heading(SPAN, 1, (Text(SPAN, "One"),), "one", SPAN),
+        Heading(SPAN, 1, (Text(SPAN, "One"),), "one", True),
         Excerpt(SOURCE, "One\ntwo", ((0, 2), (4, 7))),
         diagnose("link-broken", SPAN, "nowhere"),
         Severity.ERROR,
-        DisplayFormula(*range(len(DisplayFormula._fields))),
+        DisplayFormula(0, "x", None, "one"),
         SOURCE,
     )
     data = encode(value)
@@ -63,6 +72,36 @@ def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
     assert fingerprint(value) != fingerprint(value, {Span: lambda span: None})
     moved = (SOURCE.span(0, 1), SOURCE.span(7, 8))
     assert len({fingerprint(span, {Span: lambda span: None}) for span in moved}) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"),
+    [
+        (Span(SOURCE, "2", 5), Span),
+        (Excerpt(SOURCE, 7, ((0, 2),)), Excerpt),
+        (Excerpt(SOURCE, "One", ((0, "2"),)), Excerpt),
+        (Excerpt(SOURCE, "One", ()), Excerpt),
+        (Heading(SPAN, "1", (), "one", True), Heading),
+        (Heading(SPAN, 1, [], "one", True), Heading),
+        (Heading(SPAN, 1, ("One",), "one", True), Heading),
+        (Heading(SPAN, 1, (Text(SPAN, None),), "one", True), Heading),
+        (Document(SOURCE, (), (), summaries={"lab": "none"}), Document),
+        (Document(SOURCE, (), (), summaries={1: Text(SPAN, "")}), Document),
+        (Document(SOURCE, (BlockQuote(SPAN, (Text(SPAN, ""),)),), ()), Document),
+        (Table(SPAN, ("middle",), (), ()), Table),
+        (Recording(*(SPAN, (), SPAN, "1", SPAN), "", None, None), Recording),
+        (Comparison(rtol="0.1"), Comparison),
+        (DisplayFormula(*("" for _ in DisplayFormula._fields)), DisplayFormula),
+        (Severity.ERROR, Mode),
+        ({"a": 1}, dict[str, str]),
+        ((1, "a"), tuple[int, int]),
+        ((1,), tuple[int, int]),
+        ([1], tuple[int, ...]),
+    ],
+)
+def test_what_holds_something_of_another_type_is_none(value: object, kind: type) -> None:
+    assert decode(encode(value), kind, SOURCE) is None
+    assert decode(encode((value,)), tuple[kind, ...], SOURCE) is None
 
 
 def test_equal_sets_have_one_fingerprint() -> None:

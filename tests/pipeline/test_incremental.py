@@ -9,7 +9,7 @@ import shutil
 import msgspec
 import pytest
 
-from coursebuild.core.engine.memo import sealed
+from coursebuild.core.engine.memo import sealed, unsealed
 from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
 from support.edited_course import course as course
 
@@ -159,6 +159,13 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
                 kinds.add(kind)
         assert {"summaries", "pages", "maps", "keys"} <= kinds
         assert build(course) == before, what
+    for kind in ("maps", "mathml", "pages", "shared", "summaries"):
+        for path in sorted((folder / kind).iterdir()):
+            name = f"{kind}/{path.name}"
+            names, packed = msgspec.msgpack.decode(unsealed(name, path.read_bytes()))
+            packed[-1] = 7
+            path.write_bytes(sealed(name, msgspec.msgpack.encode((names, packed))))
+    assert build(course) == before, "a field of another type"
 
 
 def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None:

@@ -17,19 +17,19 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import document_blocks, scenario_anchor
+from coursebuild.core.model.results import Machine
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escaped, guarded
 from coursebuild.features.bench.figures import Grid, again, where
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenarios import plots, scenario_view, sweep_view
+from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.sweep import SweepReport
 
 if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter
-    from coursebuild.core.model.results import Machine
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.library import Library
-    from coursebuild.numerics.reports.bench import ScenarioReport
 
 
 class ShownBench(Struct, frozen=True):
