@@ -41,7 +41,7 @@ if TYPE_CHECKING:  # the layers above, of which a feature's functions take value
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.library import Library
     from coursebuild.core.pages.page_inputs import PageInputs
-    from coursebuild.core.pages.tools import Tools
+    from coursebuild.core.pages.renderer import Renderer
     from coursebuild.core.pages.urls import Place
     from coursebuild.core.run.dependencies import Inputs
     from coursebuild.core.run.memory import Memory
@@ -170,7 +170,7 @@ class PageKind(Struct, frozen=True, kw_only=True):
     name: str
     values: Callable[[Library], Mapping[str, object]]
     """All that the page shows of the course: it is drawn again where this is another."""
-    draw: Callable[[Tools, Mapping[str, Any]], Markup] | None = None
+    draw: Callable[[Renderer, Mapping[str, Any]], Markup] | None = None
     """What stands below the page's title. Without it the template `NAME.html` has the page."""
     exists: Callable[[Library], bool] = lambda library: True
     """Whether a course has the page."""
@@ -195,7 +195,7 @@ class ModelPart(Struct, frozen=True, kw_only=True):
     values: Callable[[Library, Place, MjcfModel], Struct | None]
     """All else that it shows of the course: the page is drawn again where this is another. `None`:
     nothing of this model."""
-    draw: Callable[[Tools, Any], Markup]
+    draw: Callable[[Renderer, Any], Markup]
     """What is made of these values."""
     opens: bool = False
     """Whether that stands at the top of the page; if not, below the facts."""

@@ -23,7 +23,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.run.environments import environment, latest_version, other_version
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.against import RunStanding, is_comparable, judgement, run_standings
 from coursebuild.core.scripts.extract import Extraction, extract

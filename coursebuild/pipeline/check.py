@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.registry import feature_trials, unproven
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic, Severity
 from coursebuild.numerics.reports import Reports

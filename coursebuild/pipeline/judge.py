@@ -12,7 +12,7 @@ from fnmatch import fnmatchcase
 from coursebuild.core.model import Course, Silence
 from coursebuild.core.model.results import Outcome, Results, TrialLine
 from coursebuild.core.run.dependencies import sought_files
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary

@@ -27,7 +27,7 @@ from coursebuild.core.text.diagnostics import did_you_mean, nearest
 if TYPE_CHECKING:
     from coursebuild.core.run.runner import RunAll
     from coursebuild.core.run.sandbox import Sandbox
-    from coursebuild.core.run.surroundings import OtherEnvironment
+    from coursebuild.core.run.script_environment import OtherEnvironment
 
 
 class Options(Struct, frozen=True):
@@ -123,7 +123,7 @@ def open_store(
         raise UsageError("--cache names no place")
     shared = None
     if where is not None:
-        from coursebuild.core.engine.shared import shared_cache
+        from coursebuild.core.engine.shared_cache import shared_cache
 
         try:
             key = environment.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")

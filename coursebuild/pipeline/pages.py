@@ -23,12 +23,12 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage
+from coursebuild.core.pages.common_files import PageFacts
 from coursebuild.core.pages.frame import Names, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import has
 from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
 from coursebuild.core.pages.record import PageRecord
-from coursebuild.core.pages.shared import PageFacts
 from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.documents import Documents

@@ -32,8 +32,8 @@ from coursebuild.core.pages.assets import strings_for
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord, record
+from coursebuild.core.pages.renderer import Renderer, known_mathml, mark_now
 from coursebuild.core.pages.templates import Texts, templates_of
-from coursebuild.core.pages.tools import Tools, known_mathml, mark_now
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.pages.zips import imports
 from coursebuild.core.registry import summarize
@@ -167,7 +167,7 @@ class PageReader:
         self._waiting: dict[str, tuple[SourceText, _Whole]] = {}
         """Documents that were read and not drawn yet, by path."""
         self._room = _ROOM
-        self._tools: dict[tuple[str, Texts], Tools] = {}
+        self._renderers: dict[tuple[str, Texts], Renderer] = {}
 
     def close(self) -> None:
         """End the engine that typesets formulas, until it is needed again."""
@@ -257,8 +257,8 @@ class PageReader:
         with self._lock:
             whole = None if request.text is None else self._whole(request.text)
             document = None if whole is None else whole.document
-            tools = self._tools_for(request.language, request.templates, whole)
-            head, html, context = draw(inputs, document, tools)
+            renderer = self._renderer_for(request.language, request.templates, whole)
+            head, html, context = draw(inputs, document, renderer)
             found, body = record(head, html, request.base_url)
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
@@ -275,18 +275,20 @@ class PageReader:
 
         assert inputs.shown is not None, "a page with a document shows it"
         whole = self._whole(text)
-        tools = self._tools_for(language, templates, whole)
-        return PageContext.made(tools, inputs.shown, Place(inputs.head.path), whole.document)
+        renderer = self._renderer_for(language, templates, whole)
+        return PageContext.made(renderer, inputs.shown, Place(inputs.head.path), whole.document)
 
-    def _tools_for(self, language: str, own: Texts, whole: _Whole | None) -> Tools:
+    def _renderer_for(self, language: str, own: Texts, whole: _Whole | None) -> Renderer:
         """Words, templates and marked code, with the formulas of a document."""
-        if (language, own) not in self._tools:
+        if (language, own) not in self._renderers:
             texts = template_texts()
             templates = templates_of(texts, prepared_folder(), own)
             strings = strings_for(texts, language)
-            self._tools = {(language, own): Tools(strings, templates, mark=_Marks(self._store))}
-        tools = self._tools[language, own]
-        return tools if whole is None else replace(tools, formulas=whole.formulas)
+            self._renderers = {
+                (language, own): Renderer(strings, templates, mark=_Marks(self._store))
+            }
+        renderer = self._renderers[language, own]
+        return renderer if whole is None else replace(renderer, formulas=whole.formulas)
 
 
 class _Marks:

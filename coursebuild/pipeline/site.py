@@ -30,11 +30,11 @@ from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Res
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.common_files import PageFacts, common_characters
 from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
-from coursebuild.core.pages.shared import PageFacts, common_characters
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
@@ -153,10 +153,10 @@ class SiteMaker:
         ]
 
     def _shared_made(self, facts: PageFacts, *, whole: bool) -> SharedFiles:
-        from coursebuild.core.pages.shared import shared_files
+        from coursebuild.core.pages.common_files import common_files
 
         cut = (lambda job: job.data) if whole else functools.partial(_cut_font, self.store)
-        made, names = shared_files(self.assets, cut, facts, self.course.theme)
+        made, names = common_files(self.assets, cut, facts, self.course.theme)
         files = (*made, *self._copies(made))
         return SharedFiles(names, {file.path: file.data for file in files})
 

@@ -30,7 +30,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.runner import Finished, RunAll, RunStoppedError, ScriptServer, Started
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic

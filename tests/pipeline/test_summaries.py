@@ -26,7 +26,7 @@ from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.tools import known_mathml
+from coursebuild.core.pages.renderer import known_mathml
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import summarize
 from coursebuild.core.scripts.compare import verify

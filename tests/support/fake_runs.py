@@ -9,7 +9,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.shared import shared_cache
+from coursebuild.core.engine.shared_cache import shared_cache
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Trace
 from coursebuild.core.run.memory import Memory
 

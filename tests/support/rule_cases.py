@@ -27,7 +27,7 @@ from typing import Self
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.shared import shared_cache
+from coursebuild.core.engine.shared_cache import shared_cache
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.lab.engines.browser import LabEngine

@@ -36,7 +36,7 @@ from coursebuild.core.files.locks import make_private_folder
 from coursebuild.core.values import DAMAGE
 
 if TYPE_CHECKING:
-    from coursebuild.core.engine.shared import SharedCache
+    from coursebuild.core.engine.shared_cache import SharedCache
 
 Value = TypeVar("Value")
 

@@ -35,8 +35,8 @@ from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.folding import Part, fold
 from coursebuild.core.pages.listings import numbered
 from coursebuild.core.pages.page_inputs import ShownRun, ShownVerdict
+from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
-from coursebuild.core.pages.tools import Tools
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
@@ -67,7 +67,7 @@ def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) 
     return page.template(
         "blocks/script.html",
         script=block,
-        parts=_parts(page.tools, block),
+        parts=_parts(page.renderer, block),
         anchor=listing_anchor(block.path),
         href=page.place.href(block.path),
         command=shlex.join(("python", block.path, *block.args)),
@@ -175,7 +175,7 @@ def output_receipt(page: PageContext, block: Recording) -> Receipt:
 def _output_receipt(
     page: PageContext, verdict: ShownVerdict | None, run: ShownRun | None, table: bool
 ) -> Receipt:
-    words, shown = page.tools.words, page.shown
+    words, shown = page.renderer.words, page.shown
     versions = {"engine": shown.engine, "python": shown.python}
     if verdict is None or verdict.status == "unchecked":
         return _not_run(words, run)
@@ -226,7 +226,7 @@ def short(value: Decimal) -> str:
 
 def script_receipt(page: PageContext, run: ShownRun | None) -> Receipt:
     """What can be said for a script without a recorded output."""
-    words, shown = page.tools.words, page.shown
+    words, shown = page.renderer.words, page.shown
     if run is not None and run.recorded:
         return Receipt("verified", words("receipt.once_ran", when=run.recorded))
     if run is not None and run.outcome is Outcome.OK:
@@ -246,17 +246,17 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 # --- code
 
 
-def _parts(tools: Tools, block: Script) -> tuple[CodePart, ...]:
+def _parts(renderer: Renderer, block: Script) -> tuple[CodePart, ...]:
     """The code as it is shown; what draws is folded whole, since its figure tells the story."""
     text = block.code.text.rstrip("\n")
-    lines = tools.mark("python", text)
+    lines = renderer.mark("python", text)
     parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
     return tuple(
         CodePart(
             numbered(lines[part.first - 1 : part.last], block.path, part.first),
             part.first,
             part.folded,
-            _fold_label(tools.words, part),
+            _fold_label(renderer.words, part),
         )
         for part in parts
     )

@@ -37,24 +37,24 @@ from coursebuild.core.pages import blocks, formulas, markup, urls
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import document_inputs, file_address
 from coursebuild.core.pages.equations import NumberedFormula, numbered
+from coursebuild.core.pages.html_context import HtmlOptions, OwnBlock, Words
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.look import Look, OwnBlock, Words
 from coursebuild.core.pages.page_inputs import ShownDocument
+from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
-from coursebuild.core.pages.tools import Tools
 from coursebuild.core.registry import kind_of_block
 
 
 class PageContext(Struct, frozen=True):
     """One document on one page."""
 
-    tools: Tools
+    renderer: Renderer
     shown: ShownDocument
     place: urls.Place
     document: Document
     joined: Mapping[int, tuple[Recording, ...]]
     """The recordings drawn with a script, by the offset at which the script begins."""
-    look: Look
+    options: HtmlOptions
     """The words that Markdown's own elements need."""
     outputs: Mapping[int, int]
     """Which output of its script a recording is, from 1, by the offset at which it begins."""
@@ -64,17 +64,21 @@ class PageContext(Struct, frozen=True):
     @classmethod
     def of(cls, library: Library, place: urls.Place, document: Document) -> PageContext:
         """The context of a document on a page of a course."""
-        return cls.made(library.tools, document_inputs(library, place, document), place, document)
+        return cls.made(
+            library.renderer, document_inputs(library, place, document), place, document
+        )
 
     @classmethod
     def made(
-        cls, tools: Tools, shown: ShownDocument, place: urls.Place, document: Document
+        cls, renderer: Renderer, shown: ShownDocument, place: urls.Place, document: Document
     ) -> PageContext:
         """The context, once it is known what the page shows of the course."""
-        look = Look(words=_markup_words(tools.words), quantities=direction(tools.words.language))
+        options = HtmlOptions(
+            words=_markup_words(renderer.words), quantities=direction(renderer.words.language)
+        )
         joined, outputs = dict(_joined(document)), _numbers(document)
-        equations = numbered(document, lambda tex: tools.mathml(tex, True))
-        return cls(tools, shown, place, document, joined, look, outputs, equations)
+        equations = numbered(document, lambda tex: renderer.mathml(tex, True))
+        return cls(renderer, shown, place, document, joined, options, outputs, equations)
 
     # what the Markdown renderer asks
 
@@ -92,18 +96,18 @@ class PageContext(Struct, frozen=True):
 
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""
-        label = self.tools.words("markup.formula")
-        return Markup(formulas.in_line(str(self.tools.mathml(tex, False)), label))
+        label = self.renderer.words("markup.formula")
+        return Markup(formulas.in_line(str(self.renderer.mathml(tex, False)), label))
 
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, which scrolls inside itself where it is too wide."""
-        mathml = self.tools.mathml(tex, True)
+        mathml = self.renderer.mathml(tex, True)
         html = self.template("blocks/formula.html", mathml=mathml)
         known = self.equations.get(start)
         if known is None:
             return html
         number = f'<span class="equation-number">({escape(known.number)})</span>'
-        label = escape(self.look.words.formula)
+        label = escape(self.options.words.formula)
         link = f'<a class="anchor" href="#{quote(known.id)}" aria-label="{label}">#</a>'
         return Markup(
             f'<span class="equation" id="{escape(known.id)}">{html}'
@@ -154,23 +158,23 @@ class PageContext(Struct, frozen=True):
 
     def blocks(self, content: tuple[Block, ...]) -> Markup:
         """Blocks as HTML, without the last line end."""
-        return Markup(str.rstrip(markup.render_blocks(content, self, self.look), "\n"))
+        return Markup(str.rstrip(markup.render_blocks(content, self, self.options), "\n"))
 
     def inlines(self, content: tuple[Inline, ...]) -> Markup:
         """Inlines as HTML."""
-        return markup.render_inlines(content, self, self.look)
+        return markup.render_inlines(content, self, self.options)
 
     def footnotes(self) -> Markup:
         """The document's footnotes."""
-        return markup.render_footnotes(self.document.footnotes, self, self.look)
+        return markup.render_footnotes(self.document.footnotes, self, self.options)
 
     def highlight(self, language: str, text: str) -> Markup:
         """Code with its tokens marked."""
-        return self.tools.highlight(language, text)
+        return self.renderer.highlight(language, text)
 
     def template(self, name: str, **values: object) -> Markup:
         """A filled-in template."""
-        return self.tools.render(name, **values)
+        return self.renderer.render(name, **values)
 
 
 def _markup_words(words: Strings) -> Words:

@@ -1,6 +1,6 @@
 """Drawing a page: its inputs and its document through the templates.
 
-Entry point: `draw(inputs, document, tools)`.
+Entry point: `draw(inputs, document, renderer)`.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from coursebuild.core.pages.page_inputs import (
     PageHead,
     PageInputs,
 )
-from coursebuild.core.pages.tools import Tools
+from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.registry import model_parts, page_kind
 
 
 def draw(
-    inputs: PageInputs, document: Document | None, tools: Tools
+    inputs: PageInputs, document: Document | None, renderer: Renderer
 ) -> tuple[PageHead, Markup, PageContext | None]:
     """The head of the page, its body, and the context of its document.
 
     The same values give the same page.
     """
     page: PageContext | None = None
-    values = {name: _drawn(value, tools) for name, value in inputs.values.items()}
+    values = {name: _drawn(value, renderer) for name, value in inputs.values.items()}
     head = inputs.head
     if document is not None and inputs.shown is not None:
-        page = PageContext.made(tools, inputs.shown, urls.Place(head.path), document)
+        page = PageContext.made(renderer, inputs.shown, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor
@@ -44,19 +44,19 @@ def draw(
             head = replace(head, description=_first_sentences(document))
     kind = page_kind(head.kind)
     if kind is not None and kind.draw is not None:
-        values |= {"title": head.title, "content": kind.draw(tools, values)}
-    return head, tools.render(inputs.template, **values), page
+        values |= {"title": head.title, "content": kind.draw(renderer, values)}
+    return head, renderer.render(inputs.template, **values), page
 
 
-def _drawn(value: object, tools: Tools) -> object:
+def _drawn(value: object, renderer: Renderer) -> object:
     match value:
         case Highlighted():
-            return numbered(tools.mark(value.language, value.text), value.path)
+            return numbered(renderer.mark(value.language, value.text), value.path)
         case Graphed():
-            return drawings(value, tools.words)
+            return drawings(value, renderer.words)
         case AddedParts():
             parts = model_parts()
-            drawn = (parts[name].draw(tools, shown) for name, shown in value.values.items())
+            drawn = (parts[name].draw(renderer, shown) for name, shown in value.values.items())
             return Markup("").join(drawn)
         case _:
             return value

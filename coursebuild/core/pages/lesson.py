@@ -12,7 +12,7 @@ from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.owners import owner_links
+from coursebuild.core.pages.owner_links import owner_links
 from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.registry import page_copies
 

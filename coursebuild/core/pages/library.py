@@ -49,9 +49,9 @@ from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, strings_for
 from coursebuild.core.pages.quiz_index import QuizIndex, quiz_index
+from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import templates_of
-from coursebuild.core.pages.tools import Tools, known_mathml
 from coursebuild.core.registry import feature_trials, page_kinds, publish_trials, summarize
 from coursebuild.numerics.reports import Reports
 
@@ -194,13 +194,13 @@ class Library(Struct, frozen=True, dict=True):
                 yield owner, known[feature]
 
     @property
-    def tools(self) -> Tools:
+    def renderer(self) -> Renderer:
         """What pages are drawn with."""
-        return Tools(self.words, self.templates, self._formulas)
+        return Renderer(self.words, self.templates, self._formulas)
 
     def render(self, template: str, **values: object) -> Markup:
-        """A filled-in template; see `Tools`."""
-        return self.tools.render(template, **values)
+        """A filled-in template; see `Renderer`."""
+        return self.renderer.render(template, **values)
 
     def verdict(self, recording: Recording) -> Verdict | None:
         """How a recorded output compared with the run; `None` where nobody compared it."""

@@ -3,8 +3,8 @@
 Entry points: `render_blocks`, `render_inlines`, `render_footnotes`, `render_table`.
 
 What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like)
-is asked of the context (`look.py`), which may call back for what its blocks hold. All else is
-Markdown, and is written here.
+is asked of the context (`html_context.py`), which may call back for what its blocks hold. All else
+is Markdown, and is written here.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from coursebuild.core import model
-from coursebuild.core.pages.look import Context, Look
+from coursebuild.core.pages.html_context import Context, HtmlOptions
 from coursebuild.core.pages.quantities import in_order, joined, quantities, unit_length
 
-_LOOK = Look()
+_OPTIONS = HtmlOptions()
 
 
 def escape(text: str) -> Markup:
@@ -45,26 +45,30 @@ def _quoted(anchor: str) -> str:
     return anchor if _PLAIN_ANCHOR.fullmatch(anchor) else quote(anchor)
 
 
-def render_blocks(blocks: Iterable[model.Block], context: Context, look: Look = _LOOK) -> Markup:
+def render_blocks(
+    blocks: Iterable[model.Block], context: Context, options: HtmlOptions = _OPTIONS
+) -> Markup:
     """Blocks one after the other, each with its line end."""
-    return Markup(_Writer(context, look).blocks(blocks))
+    return Markup(_Writer(context, options).blocks(blocks))
 
 
-def render_inlines(inlines: Iterable[model.Inline], context: Context, look: Look = _LOOK) -> Markup:
+def render_inlines(
+    inlines: Iterable[model.Inline], context: Context, options: HtmlOptions = _OPTIONS
+) -> Markup:
     """Inlines one after the other."""
-    return Markup(_Writer(context, look).inlines(inlines))
+    return Markup(_Writer(context, options).inlines(inlines))
 
 
-def render_table(table: model.Table, context: Context, look: Look = _LOOK) -> Markup:
+def render_table(table: model.Table, context: Context, options: HtmlOptions = _OPTIONS) -> Markup:
     """A table."""
-    return Markup(_Writer(context, look).table(table))
+    return Markup(_Writer(context, options).table(table))
 
 
 def render_footnotes(
-    footnotes: Iterable[model.Footnote], context: Context, look: Look = _LOOK
+    footnotes: Iterable[model.Footnote], context: Context, options: HtmlOptions = _OPTIONS
 ) -> Markup:
     """The footnotes of a document in a section at its end; empty where there are none."""
-    return Markup(_Writer(context, look).footnotes(footnotes))
+    return Markup(_Writer(context, options).footnotes(footnotes))
 
 
 def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:
@@ -90,16 +94,16 @@ def is_tight(block: model.Block) -> bool:
 class _Writer:
     """Writes in a context; every string that it gives is HTML."""
 
-    def __init__(self, context: Context, look: Look) -> None:
-        self.context, self.look = context, look
-        self.end = " />" if look.plain else ">"
+    def __init__(self, context: Context, options: HtmlOptions) -> None:
+        self.context, self.options = context, options
+        self.end = " />" if options.plain else ">"
         """Of a tag without content."""
 
     def blocks(self, blocks: Iterable[model.Block]) -> str:
         return "".join(map(self.block, blocks))
 
     def inlines(self, inlines: Iterable[model.Inline]) -> str:
-        if not self.look.quantities:
+        if not self.options.quantities:
             return "".join(map(self.inline, inlines))
         return "".join(self._with_units(tuple(inlines)))
 
@@ -118,7 +122,7 @@ class _Writer:
             )
             if number and isinstance(after, model.Text) and (taken := unit_length(after.text)):
                 html += _escaped(after.text[:taken].replace(" ", "\u00a0"))
-                if self.look.quantities == "rtl":
+                if self.options.quantities == "rtl":
                     html = in_order(Markup(html))
             written.append(html)
         return written
@@ -128,7 +132,7 @@ class _Writer:
         if _SIMPLE.fullmatch(text):  # as most are
             return text
         text = joined(text)
-        if self.look.quantities == "ltr":
+        if self.options.quantities == "ltr":
             return _escaped(text)
         pieces = ((_escaped(piece), kept) for piece, kept in quantities(text))
         return "".join(in_order(Markup(piece)) if kept else piece for piece, kept in pieces)
@@ -176,11 +180,11 @@ class _Writer:
 
     def _heading(self, heading: model.Heading) -> str:
         inner, name = self.inlines(heading.children), f"h{heading.level}"
-        if self.look.plain:
+        if self.options.plain:
             return f"<{name}>{inner}</{name}>\n"
         anchor = _escaped(heading.anchor)
         kinds = f' class="{_escaped(" ".join(heading.classes))}"' if heading.classes else ""
-        label = _escaped(self.look.words.anchor)
+        label = _escaped(self.options.words.anchor)
         link = f'<a class="anchor" href="#{_quoted(heading.anchor)}" aria-label="{label}">#</a>'
         return f'<{name} id="{anchor}"{kinds}>{inner} {link}</{name}>\n'
 
@@ -205,7 +209,7 @@ class _Writer:
         return "".join([*parts, "</li>\n"])
 
     def _box(self, checked: bool) -> str:
-        words = self.look.words
+        words = self.options.words
         label = _escaped(words.done if checked else words.not_done)
         state = " checked" if checked else ""
         return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.end} '
@@ -216,9 +220,9 @@ class _Writer:
         rows = "".join(self._row(row, table, "td") for row in table.rows)
         body = f"<tbody>\n{rows}</tbody>\n" if rows else ""
         html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
-        if self.look.plain:
+        if self.options.plain:
             return html
-        label = _escaped(self.look.words.table)
+        label = _escaped(self.options.words.table)
         return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
 
     def _row(self, cells: tuple[model.Cell, ...], table: model.Table, tag: str) -> str:
@@ -245,7 +249,7 @@ class _Writer:
                     return self.context.display(inline.tex.text, inline.span.start)
                 return self.context.math(inline.tex.text)
             case model.Term():
-                name = "" if self.look.plain else f' id="{_escaped(inline.anchor)}"'
+                name = "" if self.options.plain else f' id="{_escaped(inline.anchor)}"'
                 return f"<dfn{name}>{self.inlines(inline.children)}</dfn>"
             case model.Emphasis():
                 return f"<em>{self.inlines(inline.children)}</em>"
@@ -272,7 +276,7 @@ class _Writer:
         title = f' title="{_escaped(link.title)}"' if link.title else ""
         href = _escaped(self.context.href(link.target))
         inner = self.inlines(link.children) or _escaped(self.context.reference(link.target))
-        bare = inner == href and not self.look.plain  # an address that stands for itself
+        bare = inner == href and not self.options.plain  # an address that stands for itself
         own = ' class="url"' if bare else ""
         return f'<a href="{href}"{title}{own}>{inner}</a>'
 
@@ -285,7 +289,7 @@ class _Writer:
 
     def _reference(self, reference: model.FootnoteRef) -> str:
         number = reference.number
-        label = _escaped(self.look.words.footnote.format(number=number))
+        label = _escaped(self.options.words.footnote.format(number=number))
         name = reference_id(number, reference.occurrence)
         return (
             f'<sup class="footnote-ref"><a href="#fn:{number}" id="{name}" role="doc-noteref"'
@@ -296,7 +300,7 @@ class _Writer:
         items = "".join(map(self._footnote, footnotes))
         if not items:
             return ""
-        label = _escaped(self.look.words.footnotes)
+        label = _escaped(self.options.words.footnotes)
         start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
         return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
 
@@ -312,10 +316,10 @@ class _Writer:
         return f'<li id="fn:{footnote.number}">\n{inner}</li>\n'
 
     def _back(self, number: int, occurrence: int) -> str:
-        words = self.look.words.back if occurrence == 1 else self.look.words.back_again
+        words = self.options.words.back if occurrence == 1 else self.options.words.back_again
         label = _escaped(words.format(number=number, occurrence=occurrence))
         mark = "" if occurrence == 1 else f"<sup>{occurrence}</sup>"
-        arrow = "↪" if self.look.quantities == "rtl" else "↩"
+        arrow = "↪" if self.options.quantities == "rtl" else "↩"
         return (
             f'<a href="#{reference_id(number, occurrence)}" class="footnote-back"'
             f' role="doc-backlink" aria-label="{label}">{arrow}{mark}</a>'

@@ -31,7 +31,7 @@ from coursebuild.core.model import (
     TermTarget,
     UrlTarget,
 )
-from coursebuild.core.pages.look import Look, OwnBlock
+from coursebuild.core.pages.html_context import HtmlOptions, OwnBlock
 from coursebuild.core.pages.markup import (
     escape,
     render_blocks,
@@ -40,7 +40,7 @@ from coursebuild.core.pages.markup import (
     render_table,
 )
 
-PLAIN = Look(plain=True)
+PLAIN = HtmlOptions(plain=True)
 
 
 def plain_html(document: Document) -> Markup:

@@ -13,10 +13,10 @@ from msgspec import Struct
 
 from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.characters import visible
+from coursebuild.core.pages.common_files import page_characters
 from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.links import Reference, ids_and_addresses, references, without_lines
 from coursebuild.core.pages.page_inputs import PageHead
-from coursebuild.core.pages.shared import page_characters
 
 
 class PageRecord(Struct, frozen=True):

@@ -32,7 +32,7 @@ from coursebuild.core.engine.memo import TEMPORARY
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import make_private_folder
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
 
 _FOLDER = "environments"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from coursebuild.core.files.errors import reason
 from coursebuild.core.model import Course, NamedPath
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, version_in
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from coursebuild.core.model.results import Machine
-from coursebuild.core.run.surroundings import OtherEnvironment
+from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, package_version, python_version
 
 _INFO = Path("/proc/cpuinfo")

@@ -48,7 +48,7 @@ from coursebuild.core.run.dependencies import (
 )
 from coursebuild.core.run.packages import Installed
 from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, record_of, to_bytes
-from coursebuild.core.run.surroundings import OtherEnvironment, conditions, places
+from coursebuild.core.run.script_environment import OtherEnvironment, conditions, places
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32

@@ -33,12 +33,16 @@ from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import supervisor
-from coursebuild.core.run.notes import read_notes
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.sandbox import Sandbox, copied_folders, difference, visible
+from coursebuild.core.run.script_environment import (
+    OtherEnvironment,
+    library_folder,
+    wanted_packages,
+)
+from coursebuild.core.run.script_environment import clean_environment as clean_environment
 from coursebuild.core.run.script_process import Job
-from coursebuild.core.run.surroundings import OtherEnvironment, library_folder, wanted_packages
-from coursebuild.core.run.surroundings import clean_environment as clean_environment
+from coursebuild.core.run.trace_records import read_records
 from coursebuild.core.run.watching import STDERR_KEPT
 from coursebuild.core.run.workers import Enclose, Worker
 
@@ -386,7 +390,7 @@ def _script_run(
         _decode(err)[0],
         report["seconds"],
         missing=tuple(report["missing"]),
-        trace=read_notes(trace, root, job.path) if trace else None,
+        trace=read_records(trace, root, job.path) if trace else None,
         figures=tuple((name, data) for name, data in drawn if data is not None),
     )
 

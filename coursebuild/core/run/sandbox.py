@@ -29,7 +29,7 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, Trace
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.surroundings import OtherEnvironment, library_folder
+from coursebuild.core.run.script_environment import OtherEnvironment, library_folder
 
 SIZE = 1 << 30
 """Bytes that may be written, in memory."""

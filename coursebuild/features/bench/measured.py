@@ -12,8 +12,8 @@ from msgspec import Struct
 from coursebuild.core.model import MjcfModel, scenario_anchor
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
-from coursebuild.core.pages.tools import Tools
 from coursebuild.features.bench.figures import again, factor, power, sentence, size, where, whole
 from coursebuild.features.bench.model import declared_scenarios
 from coursebuild.features.bench.scenarios import (
@@ -101,11 +101,11 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
     )
 
 
-def draw_measured(tools: Tools, view: MeasuredView) -> Markup:
+def draw_measured(renderer: Renderer, view: MeasuredView) -> Markup:
     """The part of the page."""
     drawn = tuple(plots(f"_plot-{n}", one.report) for n, one in enumerate(view.scenarios, 1))
     swept = tuple(plots(f"_sweep-{n}", one.report) for n, one in enumerate(view.sweeps, 1))
-    return tools.render("bench/measured.html", measured=view, plots=drawn, sweep_plots=swept)
+    return renderer.render("bench/measured.html", measured=view, plots=drawn, sweep_plots=swept)
 
 
 def measured_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str], ...]:

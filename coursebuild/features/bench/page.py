@@ -118,7 +118,7 @@ def _shown(page: PageContext, block: Bench) -> ShownBench:
 
 
 def _view(page: PageContext, block: Bench) -> BenchView:
-    words, shown = page.tools.words, _shown(page, block)
+    words, shown = page.renderer.words, _shown(page, block)
     command = again("bench", block.model, "--record")
     if shown.report is None or shown.machine is None:
         return BenchView(block.model, shown.href, command)

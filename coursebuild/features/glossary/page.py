@@ -15,7 +15,13 @@ from msgspec import Struct
 from coursebuild.core.model import TermTarget
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, Owner, documents, links
-from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, added_page, owner_link, owner_links
+from coursebuild.core.pages.owner_links import (
+    OwnerLink,
+    OwnerLinks,
+    added_page,
+    owner_link,
+    owner_links,
+)
 from coursebuild.features.glossary.terms import DefinedTerm
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def draw(page: PageContext, card: Io) -> Markup:
     """The card as a list of terms."""
-    rows = tuple((page.tools.words(name), page.inlines(text)) for name, text in card.parts())
+    rows = tuple((page.renderer.words(name), page.inlines(text)) for name, text in card.parts())
     return page.template("io/io.html", rows=rows)
 
 

@@ -15,7 +15,7 @@ from coursebuild.core.features import Picture
 from coursebuild.core.model import Course, Document, FeatureBlock, MjcfModel, document_blocks
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.tools import Tools
+from coursebuild.core.pages.renderer import Renderer
 from coursebuild.features.lab.files import ShownLab
 from coursebuild.features.lab.model import SIMLAB, START, Lab
 from coursebuild.features.lab.page import LabView, lab_picture, lab_view
@@ -68,9 +68,9 @@ def model_view(library: Library, place: urls.Place, model: MjcfModel) -> LabView
     return replace(view, model_href=place.href(place.path))
 
 
-def draw_model(tools: Tools, view: LabView) -> Markup:
+def draw_model(renderer: Renderer, view: LabView) -> Markup:
     """The lab on the page of its model."""
-    return tools.render(
+    return renderer.render(
         "lab/lab.html",
         lab=view,
         docked=False,

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     """A lab as it was recorded, with a link to where it runs."""
-    words, texts = writer.words, writer.page.tools.words
+    words, texts = writer.words, writer.page.renderer.words
     title = title_of(writer.page, lab)
     live = shown_lab(writer.page, lab)
     parts = [f"**{words('lab.label')}: {escaped(title)}**"]
@@ -54,7 +54,7 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
 def _recorded(writer: MarkdownWriter, title: str, image: str, record: LabRecord) -> Iterator[str]:
     """The picture, and the readouts at the end."""
     words, page = writer.words, writer.page
-    alt = page.tools.words("lab.picture", title=title, t=number(record.time, 4))
+    alt = page.renderer.words("lab.picture", title=title, t=number(record.time, 4))
     yield picture(alt, writer.locate(page.place.href(image)))
     if record.readouts:
         yield f"{words('lab.at', t=seconds(record.end))}:"
@@ -81,7 +81,7 @@ def _shows(
     writer: MarkdownWriter, lab: Lab, *, recorded: bool
 ) -> Iterator[tuple[str, tuple[str, ...]]]:
     """What the lab shows while it runs: what it is called, and its parts."""
-    texts, fields = writer.page.tools.words, lab.fields
+    texts, fields = writer.page.renderer.words, lab.fields
     if fields.readouts and not recorded:
         yield texts("lab.readouts"), tuple(readout.label for readout in fields.readouts)
     for index in range(len(fields.plots)):

@@ -95,7 +95,7 @@ class LabView(Struct, frozen=True):
 def draw_lab(page: PageContext, block: Lab) -> Markup:
     """A lab in its static form."""
     live, model = shown_lab(page, block), block.fields.model
-    view = lab_view(page.tools.words, page.place, block, live, page.shown.engine)
+    view = lab_view(page.renderer.words, page.place, block, live, page.shown.engine)
     if model is not None:
         view = replace(view, model_href=page.href(ModelTarget(model)))
     return page.template(
@@ -175,7 +175,7 @@ def _paper(page: PageContext, name: str) -> PaperView | None:
     if not page.shown.address:
         return None
     address = f"{page.shown.address}#{quote(name)}"
-    code = qr_svg(address, page.tools.words("lab.code"))
+    code = qr_svg(address, page.renderer.words("lab.code"))
     return PaperView(code, address, address.partition("://")[2])
 
 
@@ -216,7 +216,7 @@ def seconds(value: float) -> str:
 
 def title_of(page: PageContext, block: Lab) -> str:
     """The title, or what a lab without one is called."""
-    return block.fields.title or page.tools.words("lab.untitled")
+    return block.fields.title or page.renderer.words("lab.untitled")
 
 
 def start_name(page: PageContext, block: Lab) -> str | None:

@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from typing import Protocol, assert_never
 
 from coursebuild.core import model
-from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.html_context import OwnBlock
 from coursebuild.core.pages.marks import (
     code_span,
     escaped,

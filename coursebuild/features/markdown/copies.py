@@ -72,7 +72,7 @@ def markdown_href(place: urls.Place, href: str) -> str:
 
 
 def _document_copy(inputs: PageInputs, page: PageContext) -> str:
-    place, words, document = page.place, page.tools.words, page.document
+    place, words, document = page.place, page.renderer.words, page.document
     here = place.href(place.path)
     context = DocumentWriter(page, lambda href: markdown_href(place, href), here)
     parts = (

@@ -29,7 +29,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.html_context import OwnBlock
 from coursebuild.core.pages.marks import (
     code_span,
     escaped,
@@ -109,7 +109,7 @@ class DocumentWriter(Struct, frozen=True):
 
     def words(self, key: str, **values: str | int | float) -> str:
         """A text of the interface, as Markdown."""
-        return escaped(self.page.tools.words(key, **values))
+        return escaped(self.page.renderer.words(key, **values))
 
     # --- callouts, io, MJCF
 

@@ -52,7 +52,7 @@ def note_cells(inputs: PageInputs, page: PageContext | None, body: str) -> bytes
     """The cells of a lesson as JSON; nothing for another page."""
     if page is None or inputs.head.kind != "lesson":
         return b""
-    words, address = page.tools.words, page.shown.address
+    words, address = page.renderer.words, page.shown.address
     locate = functools.partial(_whole, address)
     here = locate(page.place.href(inputs.head.path))
     writer = DocumentWriter(page, locate, here, notebook=True)

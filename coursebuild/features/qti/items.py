@@ -92,7 +92,7 @@ class _Writer:
 
     def __init__(self, page: PageContext, quiz: Quiz, number: int, course: Course) -> None:
         self.page = page
-        self.words = page.tools.words
+        self.words = page.renderer.words
         self.quiz = quiz
         self.number = number
         self.course = course

@@ -15,7 +15,13 @@ from msgspec import Struct, field
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, Owner
-from coursebuild.core.pages.owners import OwnerLink, OwnerLinks, added_page, owner_link, owner_links
+from coursebuild.core.pages.owner_links import (
+    OwnerLink,
+    OwnerLinks,
+    added_page,
+    owner_link,
+    owner_links,
+)
 from coursebuild.features.symbols.mathml import sort_key
 from coursebuild.features.symbols.uses import SymbolUse
 

@@ -80,7 +80,7 @@ def _table(page: PageContext, block: TruthTable) -> Table:
     def cells(texts: Iterable[str]) -> Iterator[Cell]:
         return (cell(Text(block.span, text)) for text in texts)
 
-    header = tuple(cells(page.tools.words(f"truth.{name}") for name in _COLUMNS))
+    header = tuple(cells(page.renderer.words(f"truth.{name}") for name in _COLUMNS))
     rows = tuple((cell(RawInline(block.span, name)), *cells(row)) for name, *row in shown.rows)
     return Table(block.span, ("left", *(_RIGHT for _ in _COLUMNS[1:])), header, rows)
 

@@ -59,7 +59,7 @@ def draw(page: PageContext, block: Diagram) -> Markup:
     width, height = (f"{float(number):.0f}" for number in size.groups()) if size else ("", "")
     picture = Markup('<img src="data:image/svg+xml;base64,{}" alt="{}" width="{}" height="{}">')
     folded = Markup("<details><summary>{}</summary>\n{}</details>")
-    text = folded.format(page.tools.words("mermaid.text"), page.code("", block.text))
+    text = folded.format(page.renderer.words("mermaid.text"), page.code("", block.text))
     image = picture.format(data, block.alt, width, height)
     return Markup('<figure class="mermaid">{}\n{}</figure>').format(image, text)
 

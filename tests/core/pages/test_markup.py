@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.model import Document, NumberBinding, Target, Text
-from coursebuild.core.pages.look import Look, OwnBlock, Words
+from coursebuild.core.pages.html_context import HtmlOptions, OwnBlock, Words
 from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
 from coursebuild.core.pages.plain import PlainContext, plain_html
 from coursebuild.core.pages.quantities import in_order, joined, quantities
@@ -50,8 +50,8 @@ class Page(PlainContext):
         return Markup("<x-{}>\n").format(type(block).__name__.lower())
 
 
-def html(text: str, look: Look | None = None) -> str:
-    return str(render_blocks(parsed(text).blocks, Page(), look or Look()))
+def html(text: str, options: HtmlOptions | None = None) -> str:
+    return str(render_blocks(parsed(text).blocks, Page(), options or HtmlOptions()))
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_a_table_is_framed_and_aligned() -> None:
 
 
 def test_a_table_without_rows_and_frame() -> None:
-    text = html("| a |\n| - |\n", Look(plain=True))
+    text = html("| a |\n| - |\n", HtmlOptions(plain=True))
     assert text == '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n</tr>\n</thead>\n</table>\n'
 
 
@@ -155,9 +155,11 @@ def test_no_footnotes_no_section() -> None:
 def test_words_can_be_translated() -> None:
     document = parsed("## A\n\nb[^x]\n\n[^x]: c\n")
     words = Words(anchor='Zum "Teil"', footnotes="Fußnoten", footnote="Nr. {number}")
-    text = render_blocks(document.blocks, Page(), Look(words))
+    text = render_blocks(document.blocks, Page(), HtmlOptions(words))
     assert 'aria-label="Zum &quot;Teil&quot;"' in text and 'aria-label="Nr. 1"' in text
-    assert 'aria-label="Fußnoten"' in render_footnotes(document.footnotes, Page(), Look(words))
+    assert 'aria-label="Fußnoten"' in render_footnotes(
+        document.footnotes, Page(), HtmlOptions(words)
+    )
 
 
 def test_text_is_escaped_wherever_it_stands() -> None:
@@ -200,8 +202,8 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
     inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
     known = joined(text).translate(_ESCAPES)
-    assert render_inlines(inlines, Page(), Look(quantities="ltr")) == known
+    assert render_inlines(inlines, Page(), HtmlOptions(quantities="ltr")) == known
     pieces = ((Markup(one.translate(_ESCAPES)), kept) for one, kept in quantities(joined(text)))
     known = "".join(in_order(html) if kept else html for html, kept in pieces)
-    assert render_inlines(inlines, Page(), Look(quantities="rtl")) == known
+    assert render_inlines(inlines, Page(), HtmlOptions(quantities="rtl")) == known
     assert render_inlines(inlines, Page()) == text.translate(_ESCAPES)

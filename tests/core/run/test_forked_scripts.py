@@ -16,7 +16,7 @@ import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.runner import ScriptServer, clean_environment
-from coursebuild.core.run.surroundings import OtherEnvironment, library_folder
+from coursebuild.core.run.script_environment import OtherEnvironment, library_folder
 from coursebuild.core.run.versions import python_version
 from support.probe_scripts import FAILURES, PROBES
 from support.runners import job

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Callout, Document, PlainCode, Target
-from coursebuild.core.pages.look import OwnBlock
+from coursebuild.core.pages.html_context import OwnBlock
 from coursebuild.core.pages.marks import (
     code_span,
     escaped,

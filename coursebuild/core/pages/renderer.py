@@ -1,6 +1,6 @@
 """What pages are drawn with, whatever they show: words, templates, formulas.
 
-Entry points: `Tools`; `known_mathml`.
+Entry points: `Renderer`; `known_mathml`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def mark_now(language: str, code: str) -> tuple[Markup, ...]:
     return highlight_lines(language, code)
 
 
-class Tools(Struct, frozen=True):
+class Renderer(Struct, frozen=True):
     """The interface's words in the course's language, the templates, and formulas as MathML."""
 
     words: Strings

@@ -1,6 +1,6 @@
 """From the records of a `Tracer` to a `Trace`.
 
-Entry point: `read_notes`.
+Entry point: `read_records`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ _FIELDS = 6
 """Of a record that says that a simulation was lost."""
 
 
-def read_notes(records: bytes, root: str, script: str) -> Trace:
+def read_records(records: bytes, root: str, script: str) -> Trace:
     """What the records say, each of which ends with a null byte.
 
     Args:

@@ -1,7 +1,7 @@
 """What a page decides about the HTML of Markdown.
 
-Entry points: `Context`, which is asked what depends on the course; `Look`, details of the HTML;
-`OwnBlock`, the blocks that are more than Markdown.
+Entry points: `Context`, which is asked what depends on the course; `HtmlOptions`, details of the
+HTML; `OwnBlock`, the blocks that are more than Markdown.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Words(Struct, frozen=True):
     not_done: str = "Not done"
 
 
-class Look(Struct, frozen=True):
+class HtmlOptions(Struct, frozen=True):
     """Details of the HTML."""
 
     words: Words = field(default_factory=Words)

@@ -7,7 +7,7 @@ import platform
 import sys
 from pathlib import Path
 
-from coursebuild.core.run.surroundings import conditions, places, wanted_packages
+from coursebuild.core.run.script_environment import conditions, places, wanted_packages
 
 OUTER = {"PATH": "/bin", "HOME": "/home/me", "USER": "me", "LANG": "de", "SECRET": "x"}
 

@@ -1,7 +1,7 @@
 """The files that every page refers to: fonts, the style sheet, the page's script, the icon.
 
 Entry points: `page_characters(html)` and `common_characters(library)`, by which they depend on the
-pages; `shared_files`, which makes them, with `needed_fonts`.
+pages; `common_files`, which makes them, with `needed_fonts`.
 
 The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
 names and the styles that were written in single elements: a page that changes touches these files
@@ -83,7 +83,7 @@ def needed_fonts(assets: Assets, facts: PageFacts, theme: Theme) -> tuple[fonts.
     return fonts.font_jobs(given, text, mathematics, theme_faces(theme))
 
 
-def shared_files(
+def common_files(
     assets: Assets,
     subset: Callable[[fonts.FontJob], bytes],
     facts: PageFacts,

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.shared import FolderPlace, SharedCache, shared_cache
+from coursebuild.core.engine.shared_cache import FolderPlace, SharedCache, shared_cache
 from coursebuild.core.files.errors import EffectError
 
 KEY = hashlib.sha256(b"a key").hexdigest()
