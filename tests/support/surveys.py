@@ -11,7 +11,7 @@ from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
-from coursebuild.numerics.pruning.readers import Readers, python_reader
+from coursebuild.numerics.pruning.readers import Readers, read_code
 from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
 from coursebuild.numerics.reports.diet import Finding
 from coursebuild.numerics.timing import Clock
@@ -84,7 +84,7 @@ def tried(
     order = Order(
         model,
         pruning_scenes(model.model, declared, quick=quick),
-        Readers((python_reader("examples/a.py", lesson),) if lesson else ()),
+        Readers((read_code("examples/a.py", lesson),) if lesson else ()),
         keeps or {},
         locked or {},
         numbered,

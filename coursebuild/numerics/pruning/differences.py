@@ -1,7 +1,7 @@
 """What differs between two compiled models, and between their states: all by which code could tell.
 
-Entry points: `ModelDifference`, `difference(whole, changed)`, `state_difference`; `VIEWS`, the
-words by which code asks a model for one thing.
+Entry points: `ModelDifference`, `difference(whole, changed)`; `VIEWS`, the words by which code asks
+a model for one thing.
 
 The fields are those that MuJoCo's structures have, whatever their names.
 """
@@ -36,11 +36,9 @@ class ModelDifference(Struct, frozen=True):
 
     fields: frozenset[str] = frozenset()
     """That hold something else."""
-    parts: frozenset[tuple[str, str]] = frozenset()
-    """Of views on things that are in both, by their kind: `("Sensor", "adr")`."""
 
     def __or__(self, other: ModelDifference) -> ModelDifference:
-        return ModelDifference(self.fields | other.fields, self.parts | other.parts)
+        return ModelDifference(self.fields | other.fields)
 
     def beyond(self, kinds: frozenset[str]) -> frozenset[str]:
         """Fields that are neither those of these kinds nor lists nor references by number."""
@@ -65,19 +63,14 @@ def _prefixes() -> tuple[tuple[str, str, str], ...]:
 
 
 def difference(whole: Any, changed: Any) -> ModelDifference:
-    """What differs between two models."""
-    return ModelDifference(_fields(whole, changed), frozenset(_parts(whole, changed)))
-
-
-def state_difference(data: Any, other: Any) -> ModelDifference:
-    """What differs between states of two models."""
-    return ModelDifference(_fields(data, other))
-
-
-def _fields(one: Any, other: Any) -> frozenset[str]:
-    rest = dict(_leaves(other))
-    return frozenset(
-        name.rpartition(".")[2] for name, value in _leaves(one) if not _same(value, rest.get(name))
+    """What differs between two models, or two states."""
+    rest = dict(_leaves(changed))
+    return ModelDifference(
+        frozenset(
+            name.rpartition(".")[2]
+            for name, value in _leaves(whole)
+            if not _same(value, rest.get(name))
+        )
     )
 
 
@@ -106,26 +99,3 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         return one.shape == other.shape and one.tobytes() == other.tobytes()
     return type(one) is type(other) and bool(one == other)
-
-
-def _parts(whole: Any, changed: Any) -> Iterator[tuple[str, str]]:
-    """What views say otherwise of things that are in both, which are found by their names."""
-    for prefix, size, kind in _prefixes():
-        ids, new = _by_name(whole, prefix, size), _by_name(changed, prefix, size)
-        both = [name for name in new if name in ids]
-        before, after = [ids[name] for name in both], [new[name] for name in both]
-        if before != after:
-            yield kind, "id"
-        for name in _names(type(whole)):  # type: ignore[arg-type]
-            if name.startswith(f"{prefix}_"):
-                one, other = getattr(whole, name), getattr(changed, name)
-                rows = len(one) == getattr(whole, size) and len(other) == getattr(changed, size)
-                if rows and one[before].tobytes() != other[after].tobytes():
-                    yield kind, name.removeprefix(f"{prefix}_")
-
-
-def _by_name(model: Any, prefix: str, size: str) -> dict[str, int]:
-    """The numbers of all things of a kind that have names."""
-    start, names = getattr(model, f"name_{prefix}adr", ()), model.names
-    found = {names[at : names.index(0, at)].decode(): i for i, at in enumerate(start)}
-    return {name: number for name, number in found.items() if name}

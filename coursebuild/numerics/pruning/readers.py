@@ -1,23 +1,21 @@
 """What code may notice of a model: what cannot be ruled out counts as a use.
 
-Entry points: `python_reader(path, text, own)`, `Reader`, `Readers`.
+Entry points: `read_code(path, text, own)`, `Reader`, `Readers`.
 
-1. Nobody's code is understood. Its syntax tree says which fields it asks anything for, which things
-   it asks for by a complete literal, and of which kinds it may ask for any thing: by an argument
-   that is no such literal, by a number, or by a function that is handed on.
-2. Whoever could get at a field without naming it may use everything: by reflection, by a module
-   that is not known to leave models alone, by a function of MuJoCo's that takes numbers of things
-   or does not simulate, by reading or including the model's file.
+1. Nobody's code is understood: it is words. A thing is used where code has its name as a text, a
+   field where its name stands anywhere, and any thing of a kind where code has the word by which
+   one is asked for, unless a complete name follows: `model.sensor("tip")`.
+2. Code that could get at a field without naming it may use everything: by reflection, by a module
+   that is not known to leave models alone, by a function of MuJoCo's that does not simulate, by
+   reading or including the model's file.
 3. Which fields tell a smaller model from the whole one is found by comparing both (`differences`):
-   a reader notices it where it asks for one of these.
+   a reader notices it where it has one of their names.
 """
 
 from __future__ import annotations
 
-import ast
-import functools
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import mujoco
 from msgspec import Struct
@@ -30,16 +28,42 @@ _LEAVE_MODELS_ALONE = frozenset(
     " random scipy statistics sys textwrap time typing warnings".split(" ")
 )
 """Modules that ask a model that they are given for nothing."""
-_REFLECTION = frozenset(
-    "__import__ breakpoint compile delattr dir eval exec getattr globals hasattr locals open"
-    " setattr vars".split(" ")
+_SIMULATION = frozenset(
+    "mj_Euler mj_comPos mj_crb mj_differentiatePos mj_energyPos mj_energyVel mj_forward mj_fullM"
+    " mj_fwdPosition mj_fwdVelocity mj_getState mj_integratePos mj_inverse mj_kinematics mj_mulM"
+    " mj_normalizeQuat mj_resetData mj_resetDataKeyframe mj_rne mj_setConst mj_setState mj_solveM"
+    " mj_stateSize mj_step mj_step1 mj_step2 mj_subtreeVel".split(" ")
 )
-_GET = frozenset(("delattr", "getattr", "hasattr", "setattr"))
-_FILES = frozenset(
-    "fromfile genfromtxt glob iterdir listdir load loadtxt modules open read_bytes read_text"
-    " rglob scandir walk".split(" ")
+"""Functions of MuJoCo's that tell nothing of the whole, and take no number but of a keyframe."""
+_OPAQUE = frozenset(
+    # reflection
+    "__import__ breakpoint compile delattr dir eval exec format format_map getattr globals hasattr"
+    " locals setattr vars Function Object Reflect"
+    # the file of the model, or names of things
+    " fromfile genfromtxt glob iterdir listdir load loadtxt modules open read_bytes read_text rglob"
+    " scandir walk MjSpec MjvScene Renderer rollout".split(" ")
 )
-"""By which the file of a model, or names of things, could be read."""
+_THING = re.compile(r"""\w+\s*\.\s*(\w+)\(\s*(?:"[^"\\]*"|'[^'\\]*')\s*\)(?:\s*\.\s*(\w+))?""")
+"""One thing that is asked for by a complete name, and what it is asked for."""
+_RESET = re.compile(r"""mj_resetDataKeyframe\(\w+, \w+, \w+\.key\(("[^"\\]*"|'[^'\\]*')\)\.id\)""")
+"""The number of a keyframe, which is asked for by a complete name."""
+_TEXT = re.compile(r""""((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)'|`([^`]*)`""")
+_LITERAL = r"(?<![fF])(?:\"\"\"[\s\S]*?\"\"\"|\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*')"
+_PROSE = {
+    True: re.compile(rf"{_LITERAL}|#[^\n]*"),
+    False: re.compile(rf"{_LITERAL}|//[^\n]*|/\*[\s\S]*?\*/"),
+}
+"""Texts and comments, in which no code stands: of Python, and of JavaScript."""
+_FILLED = re.compile(r"([\"'])\s*\.format\(")
+"""A text that asks for fields of what it is given."""
+_FUNCTION = re.compile(r"mj[dsprv]?_")
+_WORD = re.compile(r"[^\W\d]\w*")
+_MEMBER = re.compile(r"\.\s*([^\W\d]\w*)")
+_IMPORT = re.compile(r"(?:^|[;:])\s*(?:from\s+([\w.]+)\s+import\b|import\s+([\w., ]+))", re.M)
+_INCLUDE = re.compile(r"<[^>]*\bfile\s*=")
+_POSITIONAL = re.compile(r"\bcase\s+\w+\(\s*\w+\s*[,)]")
+_SCRIPT = re.compile(r"\bfor\s*\(\s*\w+\s+\w+\s+in\b|\.\.\.|\bimport\b|(?<![\w.])\w+\[\s*[^\W\d]")
+"""In JavaScript: what goes through what there is, or makes a name while it runs."""
 _OF_BODIES = ("bodyid", "parentid", "rootid", "weldid", "treeid", "mocapid", "jntid", "dofid")
 _REFERENCES = frozenset(
     name
@@ -47,8 +71,8 @@ _REFERENCES = frozenset(
     if "_" in name and name.endswith("id") and not name.endswith(_OF_BODIES)
 )
 """Fields that hold numbers of things other than bodies and joints."""
-_WORD = re.compile(r"[^\W\d]\w*")
-_INCLUDES = re.compile(r"<[^>]*\bfile\s*=")
+_NUMBERS = frozenset(("adr", "id", "num"))
+"""By which one thing may be told from the numbers of the others."""
 
 
 class Reader(Struct, frozen=True):
@@ -56,11 +80,13 @@ class Reader(Struct, frozen=True):
 
     path: str
     names: frozenset[str] = frozenset()
-    """Complete literals: things may be called so."""
-    fields: frozenset[str] = frozenset()
-    """That it asks anything for."""
+    """Complete texts: things may be called so."""
+    words: frozenset[str] = frozenset()
+    """All that stand in it: fields may be called so."""
+    members: frozenset[str] = frozenset()
+    """Words that it asks anything for."""
     parts: frozenset[tuple[str, str]] = frozenset()
-    """That it asks one thing for that it names, by the kind of the thing."""
+    """What it asks one thing for that it names, by the kind of the thing."""
     kinds: frozenset[str] = frozenset()
     """Of which it may ask for any thing."""
     opaque: str = ""
@@ -70,25 +96,28 @@ class Reader(Struct, frozen=True):
         self, names: Collection[str], kinds: Collection[str], change: ModelDifference
     ) -> bool:
         """Whether it may notice that things of these names and kinds are gone."""
-        parts = {part for _, part in change.parts}
         return bool(
-            self.opaque
-            or not self.names.isdisjoint(names)
+            not self.names.isdisjoint(names)
             or not self.kinds.isdisjoint(kinds)
-            or not self.fields.isdisjoint(change.fields | parts)
-            or not self.parts.isdisjoint(change.parts)
+            or not self.words.isdisjoint(change.fields)
+            or (
+                change.fields and not _NUMBERS.isdisjoint(self.members | {p for _, p in self.parts})
+            )
             or self.touches(_REFERENCES)
         )
+
+    @property
+    def _asked(self) -> set[str]:
+        return {part for _, part in self.parts}
 
     def touches(self, fields: Collection[str]) -> bool:
         """Whether it may change one of these fields of a model, for one thing or for all."""
         split = [field.partition("_") for field in fields]
-        ends = {end for _, _, end in split} - {""}
-        of_one = {(VIEWS.get(prefix, ""), end) for prefix, _, end in split}
         return bool(
             self.opaque
-            or not self.fields.isdisjoint(ends | set(fields))
-            or not self.parts.isdisjoint(of_one)
+            or not self.words.isdisjoint(fields)
+            or not self.members.isdisjoint(end for _, _, end in split)
+            or not self.parts.isdisjoint((VIEWS.get(prefix, ""), end) for prefix, _, end in split)
         )
 
 
@@ -108,177 +137,37 @@ class Readers(Struct, frozen=True):
         return next((one for one in self.files if one.touches(fields)), None)
 
 
-def python_reader(path: str, text: str, own: Collection[str] = ()) -> Reader:
-    """What a Python file asks models for; `own` are modules that are read themselves."""
-    try:
-        tree = ast.parse(text)
-    except (SyntaxError, ValueError):
-        return Reader(path, opaque="it is no Python")
-    found = _PythonUse(own)
-    found.visit(tree)
-    return Reader(
-        path,
-        frozenset(found.names),
-        frozenset(found.fields),
-        frozenset(found.parts),
-        frozenset(found.kinds),
-        found.opaque,
-    )
+def read_code(path: str, text: str, own: Collection[str] = ()) -> Reader:
+    """What a file of Python or JavaScript asks models for; `own` are modules that are read too."""
+    names = frozenset(next(filter(None, found), "") for found in _TEXT.findall(text))
+    rest, filled = _FILLED.subn(r"\1(", _RESET.sub("", text))
+    parts = {(VIEWS[view], part) for view, part in _THING.findall(rest) if view in VIEWS}
+    rest = _THING.sub(lambda one: "named" if one[1] in VIEWS else one[0], rest)
+    code = _PROSE[path.endswith(".py")].sub('""', rest)
+    words = frozenset(_WORD.findall(rest if filled else code))
+    members = frozenset(_MEMBER.findall(code))
+    opaque = sorted(filter(_may_do_anything, _WORD.findall(code)))
+    reasons = [f"it uses `{opaque[0]}`"] if opaque else []
+    if _INCLUDE.search(text):
+        reasons.append("it puts models together from files")
+    if path.endswith(".py"):
+        modules = (name for found in _IMPORT.findall(text) for name in _modules(*found))
+        known = _LEAVE_MODELS_ALONE.union(own)
+        reasons += [f"it imports {name}" for name in modules if name not in known]
+        reasons += ["it matches patterns by their place"] if _POSITIONAL.search(text) else []
+    elif found := _SCRIPT.search(code):
+        reasons.append(f"it goes through what there is: `{found[0]}`")
+    kinds = {VIEWS[word] for word in members if word in VIEWS}
+    kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
+    reason = next(iter(reasons), "")
+    return Reader(path, names, words, members, frozenset(parts), frozenset(kinds), reason)
 
 
-class _PythonUse(ast.NodeVisitor):
-    def __init__(self, own: Collection[str]) -> None:
-        self.own = own
-        self.names: set[str] = set()
-        self.fields: set[str] = set()
-        self.parts: set[tuple[str, str]] = set()
-        self.kinds: set[str] = set()
-        self.opaque = ""
-
-    def visit_Constant(self, node: ast.Constant) -> None:
-        """A string may name a thing; a bytes object too."""
-        value = node.value.decode("latin-1") if isinstance(node.value, bytes) else node.value
-        if isinstance(value, str):
-            self.names.add(value)
-            if _INCLUDES.search(value):
-                self.opaque = "it puts models together from files"
-
-    def visit_Import(self, node: ast.Import) -> None:
-        """A module that is imported."""
-        for alias in node.names:
-            self._module(alias.name)
-
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
-        """A module of which something is imported."""
-        module = node.module or ""
-        self._module(module)
-        for alias in node.names:
-            (self._member if module.startswith("mujoco") else self._field)(alias.name)
-
-    def _module(self, name: str) -> None:
-        first, *rest = name.split(".")
-        if first not in _LEAVE_MODELS_ALONE and first not in self.own:
-            self.opaque = f"it imports {first}"
-        for part in rest:
-            (self._member if first == "mujoco" else self._field)(part)
-
-    def visit_MatchClass(self, node: ast.MatchClass) -> None:
-        """A pattern asks for fields."""
-        self.fields.update(node.kwd_attrs)
-        if node.patterns:
-            self.opaque = "it matches patterns by their place"
-        self.generic_visit(node)
-
-    def visit_Name(self, node: ast.Name) -> None:
-        """A name on which code runs that is not here."""
-        hidden = node.id.startswith("__") and node.id not in ("__doc__", "__file__", "__name__")
-        if node.id in _REFLECTION or hidden:
-            self.opaque = f"it uses `{node.id}`"
-        elif hasattr(mujoco, node.id):
-            self._member(node.id)
-
-    def visit_Attribute(self, node: ast.Attribute) -> None:
-        """A field of anything; of one thing that is named, only of that."""
-        kind = _named(node.value)
-        if kind is not None:
-            self.parts.add((kind, node.attr))
-            self._arguments(node.value)
-        else:
-            self._field(node.attr)
-            self.visit(node.value)
-
-    def visit_Call(self, node: ast.Call) -> None:
-        """A function of MuJoCo's, a format that asks for fields, or reflection with a literal."""
-        function, name = node.func, getattr(node.func, "attr", getattr(node.func, "id", ""))
-        kinds = _uses(name)
-        given = [one for one in node.args if _is_number_of_named(one)]
-        if isinstance(function, ast.Name) and name in _GET and _is_literal(node.args[1:2]):
-            self._field(node.args[1].value)  # type: ignore[attr-defined]
-            self._arguments(node)
-        elif name in ("format", "format_map") and _is_literal([getattr(function, "value", None)]):
-            self.fields.update(_WORD.findall(function.value.value))  # type: ignore[attr-defined]
-            self._arguments(node)
-        elif kinds and len(given) == len(kinds):
-            for one in given:
-                self._arguments(one.value)  # type: ignore[attr-defined]
-            self._arguments(ast.Call(function, [one for one in node.args if one not in given], []))
-        else:
-            self.generic_visit(node)
-
-    def _arguments(self, call: ast.expr) -> None:
-        """What stands in a call, but not what is called."""
-        assert isinstance(call, ast.Call)
-        inner = call.func.value if isinstance(call.func, ast.Attribute) else None
-        for part in (inner, *call.args, *call.keywords):
-            if part is not None:
-                self.visit(part)
-
-    def _field(self, name: str) -> None:
-        self.fields.add(name)
-        if name in VIEWS:
-            self.kinds.add(VIEWS[name])
-        if name in _FILES:
-            self.opaque = f"it uses `{name}`, and may read the model's file, or names"
-        elif name.startswith("__") or name in ("format", "format_map"):
-            self.opaque = f"it uses `{name}`"
-        elif hasattr(mujoco, name):
-            self._member(name)
-
-    def _member(self, name: str) -> None:
-        kinds = _uses(name)
-        if kinds is None:
-            self.opaque = f"it uses `{name}`"
-        else:
-            self.kinds.update(kinds)
+def _may_do_anything(word: str) -> bool:
+    """Whether it is reflection, or a function of MuJoCo's that does not only simulate."""
+    hidden = word.startswith("__") and word not in ("__main__", "__name__", "__file__", "__doc__")
+    return word in _OPAQUE or hidden or (bool(_FUNCTION.match(word)) and word not in _SIMULATION)
 
 
-def _named(node: ast.AST) -> str | None:
-    """The kind of the one thing that a call asks for by a complete literal."""
-    if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
-        return None
-    return VIEWS.get(node.func.attr) if _is_literal(node.args) and not node.keywords else None
-
-
-def _is_literal(given: Sequence[ast.expr | None]) -> bool:
-    """Whether something is a complete literal, and nothing else is given."""
-    return [type(getattr(one, "value", None)) for one in given] == [str] and isinstance(
-        given[0], ast.Constant
-    )
-
-
-def _is_number_of_named(node: ast.expr) -> bool:
-    """Whether it is the number of a thing that is named: `model.key("up").id`."""
-    return isinstance(node, ast.Attribute) and node.attr == "id" and _named(node.value) is not None
-
-
-@functools.cache
-def _uses(name: str) -> tuple[str, ...] | None:
-    """The kinds of which a function of MuJoCo's takes numbers; `None` where it may do anything."""
-    member = getattr(mujoco, name, None)
-    if name in ("MjModel", "MjData") or name.startswith("mjt") or isinstance(member, int | float):
-        return ()
-    found: list[str] = []
-    said = getattr(member, "__doc__", "") or ""
-    lines = re.findall(rf"^(?:\d+\. )?({name}\(.*\)) -> (.*)$", said, re.M)
-    if not lines:
-        return None
-    for line, gives in lines:
-        if gives != "None" and re.search("MjModel|MjData", line):
-            return None  # what is told of the whole
-        (function,) = ast.parse(f"def {line}: ...").body
-        assert isinstance(function, ast.FunctionDef)
-        for argument in function.args.args:
-            kind = _argument_use(argument)
-            if kind is None:
-                return None
-            found.append(kind)
-    return tuple(filter(None, found))
-
-
-def _argument_use(argument: ast.arg) -> str | None:
-    """The kind of which an argument is a number; empty for none, `None` for anything."""
-    given = ast.unparse(argument.annotation) if argument.annotation is not None else ""
-    if "SupportsInt" in given and argument.arg != "nstep":
-        return VIEWS.get(argument.arg.rstrip("12"))
-    known = ("MjModel", "MjData", "NDArray", "SupportsFloat", "SupportsInt")
-    return "" if any(word in given for word in known) else None
+def _modules(source: str, listed: str) -> list[str]:
+    return [one.split()[0].split(".")[0] for one in (source or listed).split(",") if one.split()]

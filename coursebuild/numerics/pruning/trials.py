@@ -16,7 +16,7 @@ from msgspec import Struct
 from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
 from coursebuild.numerics.pruning.candidates import Item
 from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
-from coursebuild.numerics.pruning.differences import ModelDifference, state_difference
+from coursebuild.numerics.pruning.differences import ModelDifference, difference
 from coursebuild.numerics.pruning.edits import (
     ModelEdit,
     drop_attribute,
@@ -117,7 +117,7 @@ class PruningTrials:
             transfer(whole, data, trial.index, trial.model, other)
             advance(whole, data)
             advance(trial.model, other)
-            found |= state_difference(data, other)
+            found |= difference(data, other)
         return found
 
     @cached_property

@@ -6,7 +6,7 @@ import textwrap
 
 import pytest
 
-from coursebuild.numerics.pruning.readers import python_reader
+from coursebuild.numerics.pruning.readers import read_code
 from support.surveys import declared, names, scene, tried
 
 MODEL = scene(
@@ -140,6 +140,5 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
     }
 
 
-def test_a_reader_that_is_no_python_may_use_everything() -> None:
-    assert python_reader("a.py", "print(").opaque
-    assert not python_reader("a.py", "import numpy\nprint(numpy.pi)").opaque
+def test_python_that_names_nothing_else_uses_nothing_else() -> None:
+    assert not read_code("a.py", "import numpy\nprint(numpy.pi)").opaque

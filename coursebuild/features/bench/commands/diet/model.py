@@ -2,10 +2,10 @@
 
 Entry point: `DietModel`.
 
-1. Who reads a model is told by `diet_readers`, and by what is declared to be measured on it.
+1. Who reads a model is told by `readers`, and by what is declared to be measured on it.
 2. A file that another model uses too, or that is not in `models/`, is not changed.
-3. Changes are collected, read again as files, compiled and compared with what was run; only then
-   are they written, all of them or none.
+3. Changed files are read again as such, compiled and compared with what was run; only then are they
+   written, all of them or none.
 """
 
 from __future__ import annotations
@@ -53,22 +53,17 @@ class DietModel:
         self.keeps = {" ".join(one.finding.split()): one for one in kept}
         self.locked = _locked(root, files, self.path, scene.model.source.text)
         self.readers = _readers(root, files, course, scene)
-        self.original: dict[str, bytes] = {}
-        """What was read of the disk."""
-        self.changed: dict[str, bytes] = {}
+        self._files: dict[str, bytes | None] = {}
 
     def read(self, path: str) -> bytes | None:
-        """The bytes of a file, as changed so far."""
-        if path in self.changed:
-            return self.changed[path]
-        if path not in self.original:
-            if not (self.root / path).is_file():
-                return None
+        """The bytes of a file, as they were when it was first looked at."""
+        if path not in self._files:
             try:
-                self.original[path] = read_bytes(self.root, path)
+                there = (self.root / path).is_file()
+                self._files[path] = read_bytes(self.root, path) if there else None
             except EffectError:
-                return None
-        return self.original[path]
+                self._files[path] = None
+        return self._files[path]
 
     def compile(self, text: bytes) -> Any:
         """A text as if it stood in the model's place."""
@@ -89,7 +84,7 @@ class DietModel:
         """
         source = self.scene.model.source
         try:
-            text = open_model(self.path, self.read, self.compile, check=not self.changed)
+            text = open_model(self.path, self.read, self.compile)
             declared = self.scene.declared
             order = Order(
                 text,
@@ -101,7 +96,7 @@ class DietModel:
                 time.thread_time_ns,
                 quick,
                 tell,
-                lambda changed: rerun({**self.changed, **changed}),
+                rerun,
             )
             return survey(order), text
         except MarkupError as error:
@@ -146,62 +141,39 @@ class DietModel:
         place = self.keeps[key].finding_span
         return StaleKeep(key, place.path, place.line, place.column)
 
-    def change(self, survey: Survey, text: ModelText) -> None:
-        """Take over what is to be changed, if it still compiles to the model that was run."""
-        before = dict(self.changed)
-        self.changed |= text.files(survey.edits)
-        if self._compiled() != saved(text.compiled(survey.edits)):
-            self.changed = before
-            raise self._another()
-
-    def _compiled(self) -> bytes | None:
-        """The model of the files as changed so far; `None` where they make none."""
-        try:
-            return saved(open_model(self.path, self.read, self.compile, check=False).model)
-        except (MarkupError, ModelTextError, ValueError):
-            return None
-
-    def digest(self) -> str:
-        """Of the model as it lies on the disk now."""
-        text = self.read(self.path) or b""
-        model = MjcfModel(self.scene.name, Source(self.path, text.decode("utf-8")))
-        return scene_digest(self.root, model, self.scene.declared)
-
-    def write(self) -> None:
-        """Put the changed files into their places; all of them, or none.
-
-        What then stands on the disk must compile to the model that was run.
+    def write(self, survey: Survey, text: ModelText) -> None:
+        """Make the changes that were found; all of them, or none.
 
         Raises:
             EffectError: a file cannot be written, or somebody changed it.
-            CannotError: the files make another model.
+            CannotError: the files would make another model than the one that was run.
         """
-        if not self.changed:
-            return
-        wanted = self._compiled()
+        changed = text.files(survey.edits)
+
+        def read(path: str) -> bytes | None:
+            return changed.get(path) or self.read(path)
+
+        new = open_model(self.path, read, self.compile, check=False).model
+        if saved(new) != saved(text.compiled(survey.edits)):
+            message = f"the changed model `{self.scene.name}` is not the one that was run"
+            place = self.scene.model.source.span(0, 0)
+            raise CannotError(diagnose("model-error", place, message))
         written: list[str] = []
         try:
-            for path, data in sorted(self.changed.items()):
-                write_atomic(self.root, path, data, expected=self.original[path])
+            for path, data in sorted(changed.items()):
+                write_atomic(self.root, path, data, expected=self.read(path))
                 written.append(path)
-            if not self._compiles_to(wanted):
-                raise self._another()
-        except (EffectError, CannotError):
+        except EffectError:
             for path in written:
-                write_atomic(self.root, path, self.original[path], expected=self.changed[path])
-            self.changed.clear()
+                write_atomic(self.root, path, self.read(path) or b"", expected=changed[path])
             raise
+        self._files.clear()
 
-    def _compiles_to(self, wanted: bytes | None) -> bool:
-        """Whether the files on the disk make a model, with what MuJoCo itself includes."""
-        try:
-            return saved(self.compile(self.read(self.path) or b"")) == wanted
-        except ValueError:
-            return False
-
-    def _another(self) -> CannotError:
-        message = f"the changed model `{self.scene.name}` is not the one that was run"
-        return CannotError(diagnose("model-error", self.scene.model.source.span(0, 0), message))
+    def digest(self) -> str:
+        """Of the model as it lies on the disk now."""
+        text = (self.read(self.path) or b"").decode("utf-8")
+        model = MjcfModel(self.scene.name, Source(self.path, text))
+        return scene_digest(self.root, model, self.scene.declared)
 
 
 def _numbered(declared: Declarations | None) -> frozenset[str]:
@@ -242,5 +214,5 @@ def _readers(root: Path, files: CourseFiles, course: Course | None, scene: Cours
         fields = {"energy"} if any("energy" in (one.conserved or ()) for one in declared) else set()
         if names or fields:
             path = scene.declared.source.path
-            found.append(Reader(path, names=names, fields=frozenset(fields)))
+            found.append(Reader(path, names=names, words=frozenset(fields)))
     return Readers(tuple(found))

@@ -25,18 +25,16 @@ from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model import Course, FeatureBlock, document_blocks
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.scripts.extract import extract
-from coursebuild.features.lab.javascript import parse, text_of, walk
 from coursebuild.features.lab.model import Lab
 from coursebuild.numerics.pruning.differences import VIEWS
-from coursebuild.numerics.pruning.readers import Reader, Readers, python_reader
+from coursebuild.numerics.pruning.readers import Reader, Readers, read_code
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.pipeline.verify import verify
 
-_SCRIPT_FILES = (".js", ".mjs", ".ts")
-_REFLECTION = frozenset("Function Object Reflect eval import with".split(" "))
+_CODE = (".py", ".js", ".mjs", ".ts")
 _NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
 """Kinds that a lab's picture does not show."""
 _COPIED = ("content", "models")
@@ -50,7 +48,7 @@ def readers_of(
         return Readers((Reader("content/course.toml", opaque="the course cannot be read"),))
     own = {Path(path).stem for path in files.files if path.endswith(".py")}
     scripts = [
-        python_reader(one.path, one.text, own)
+        read_code(one.path, one.text, own)
         for one in extract(course).value
         if _may_use(one.text, scene.name)
     ]
@@ -80,7 +78,7 @@ def _blocks(course: Course, model: str) -> Iterator[Reader]:
             if not isinstance(block, Lab):
                 yield Reader(place, kinds=drawn)
                 continue
-            code = script_reader(place, "\n".join(f"({piece.text}\n);" for _, piece in block.code))
+            code = read_code(place, "\n".join(piece.text for _, piece in block.code))
             names = frozenset(re.findall(r"\"((?:[^\"\\]|\\.)*)\"", block.config))
             if re.search(r"\"key(frame)?\"\s*:\s*\d", block.config):
                 drawn |= {"Keyframe"}
@@ -90,45 +88,13 @@ def _blocks(course: Course, model: str) -> Iterator[Reader]:
 def _code(root: Path, files: CourseFiles, own: set[str]) -> Iterator[Reader]:
     """The course's files of code."""
     for path in files.files:
-        try:
-            if path.endswith(".py"):
-                yield python_reader(path, read_bytes(root, path).decode("utf-8", "replace"), own)
-            elif path.endswith(_SCRIPT_FILES):
-                yield script_reader(path, read_bytes(root, path).decode("utf-8", "replace"))
-        except EffectError:
-            yield Reader(path, opaque="it cannot be read")
-
-
-def script_reader(path: str, text: str) -> Reader:
-    """What JavaScript asks models for."""
-    names: set[str] = set()
-    fields: set[str] = set()
-    kinds: set[str] = set()
-    opaque = ""
-    for node in walk(parse(text)):
-        said = text_of(node)
-        if node.type in ("string", "template_string"):
-            names.add(said[1:-1])
-            fields |= set(re.findall(r"\w+", said))
-        elif node.type.endswith("identifier") or node.type.startswith("shorthand_property"):
-            fields.add(said)
-            opaque = f"it uses `{said}`" if said in _REFLECTION else opaque
-        elif node.type in ("for_in_statement", "spread_element", "import"):
-            opaque = "it goes through what there is"
-        elif node.type == "call_expression":
-            called = node.child_by_field_name("function")
-            word = text_of(called).rpartition(".")[2] if called is not None else ""
-            given = node.child_by_field_name("arguments")
-            if word in VIEWS and given is not None:
-                literal = [one.type for one in given.named_children] == ["string"]
-                kinds |= set() if literal else {VIEWS[word]}
-        elif node.type == "subscript_expression":
-            held, index = (node.child_by_field_name(name) for name in ("object", "index"))
-            if held is None or index is None:
-                continue
-            if held.type == "identifier" and index.type not in ("number", "string"):
-                opaque = f"it makes the name in `{said}` while it runs"
-    return Reader(path, frozenset(names), frozenset(fields), kinds=frozenset(kinds), opaque=opaque)
+        if path.endswith(_CODE):
+            try:
+                text = read_bytes(root, path).decode("utf-8", "replace")
+            except EffectError:
+                yield Reader(path, opaque="it cannot be read")
+            else:
+                yield read_code(path, text, own)
 
 
 class Reruns:

@@ -7,8 +7,7 @@ Entry point: `diet(options, names, …)`.
    is no finding. A finding that is wanted stands in `models/NAME.toml` with its reason.
 3. What was found is kept under all that it depends on, as of `bench`.
 4. `fix` takes out what is proved, until nothing is left: what something needed that is gone may go
-   as well. The files are read again, compiled and run before they are written; a file that changed
-   meanwhile is left as it is.
+   as well. A file that changed meanwhile is left as it is.
 """
 
 from __future__ import annotations
@@ -48,8 +47,6 @@ _CODE = (
     "coursebuild/features/bench/commands/diet/readers.py",
     "mjcourse/spatial",
 )
-_ROUNDS = 20
-"""Most times that something new is found after something was changed."""
 
 
 def diet(
@@ -122,27 +119,23 @@ class _DietRun(MeasuringRun):
         return look.report(survey, self.here, quick=self.quick), survey, text
 
     def _fixed(self, look: DietModel) -> DietReport | None:
-        """Change, look again, and write when nothing is left to change.
+        """Change and look again until nothing is left to change.
 
         `None` where it could not be written; why is told.
         """
-        kinds: dict[str, list[str]] = {}
-        for _ in range(_ROUNDS):
-            report, survey, text = self._surveyed(look)
-            if not survey.edits:
-                break
-            look.change(survey, text)
+        kinds: dict[str, dict[str, None]] = {}
+        report, survey, text = self._surveyed(look)
+        while survey.edits:
+            try:
+                look.write(survey, text)
+            except EffectError as error:
+                self.failures.append(ReportFailure(error.message, error.help))
+                return None
             for finding in report.findings:
-                if finding.fixable:
-                    for path in {edit.path for edit in finding.edits}:
-                        kinds.setdefault(path, []).append(finding.kind)
-        try:
-            look.write()
-        except EffectError as error:
-            self.failures.append(ReportFailure(error.message, error.help))
-            return None
-        for path in sorted(look.changed):
-            self.remarks.append(f"changed {path}: {', '.join(dict.fromkeys(kinds.get(path, ())))}")
+                for edit in finding.edits if finding.fixable else ():
+                    kinds.setdefault(edit.path, {})[finding.kind] = None
+            report, survey, text = self._surveyed(look)
+        self.remarks += [f"changed {path}: {', '.join(kinds[path])}" for path in sorted(kinds)]
         return report
 
     def _parts(self, look: DietModel) -> tuple[object, ...]:
