@@ -167,7 +167,7 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         tuple(Markup(case_svg(report, one, f"{name}-{one.name}")) for one in shown),
         tuple(one for one in grids if one is not None),
         tuple(_notes(words, report)),
-        again("stability", model or report.name),
+        again("bench", model) if model else again("stability", report.name),
         place.href(urls.model_page_path(model)) if model else "",
     )
 

@@ -119,16 +119,6 @@ def test_a_report_of_something_else(course: Path) -> None:
         assert failure.message == message
 
 
-def test_a_report_of_no_model_is_told(course: Path) -> None:
-    recorded(course)
-    (course / "content/reports/gone").mkdir()
-    (course / "content/reports/gone/arm.bench.json").write_bytes(b"{}")
-    found = check(options(course), measuring=Fake())
-    assert found.ok
-    assert found.remarks == ("content/reports/gone/arm.bench.json belongs to no model",)
-    assert check(options(course), ("box",), measuring=Fake()).remarks == ()
-
-
 def test_a_part_is_not_recorded(course: Path) -> None:
     why = " takes no --quick: what is recorded is measured in full"
     with pytest.raises(UsageError, match=f"--record{why}"):

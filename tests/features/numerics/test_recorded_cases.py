@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -69,43 +68,6 @@ def test_recording_some_cases_leaves_the_others(course: Path) -> None:
     path.write_bytes(STABILITY.encode((old,)))
     assert run(course, "projectile", "--record") == 0
     assert names(course) == ["projectile"]
-
-
-def test_a_model_whose_motion_the_course_knows_is_a_case_and_recorded_as_a_model(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    models = course / "models"
-    models.mkdir()
-    (models / "ball.xml").write_text(BALL)
-    (models / "ball.toml").write_text(
-        '[[scenario]]\nname = "up"\nqvel = [3]\nduration = 0.4\nsample = 0.1\n'
-    )
-    (models / "ball.exact.py").write_text(EXACT)
-    assert run(course, "ball", "--record") == 0
-    out = capsys.readouterr().out
-    assert out.startswith("ball/up  ball: up\n")
-    assert "\n  References: models/ball.exact.py; Bulirsch–Stoer over mj_forward.\n" in out
-    assert re.search(
-        r"\n  Euler, implicit, implicitfast, discrete +1\.00 ± 0\.00, bend 0\.00\n", out
-    )
-    assert re.search(r"\n  2 ms +3\.92e-03 +3\.92e-03 +3\.92e-03 +<1\.\de-13", out)
-    path = "content/reports/ball.bench.json"
-    assert out.endswith(f"\nwrote {path}\n") and not (course / STABILITY.path()).exists()
-    assert run(course, "ball", "--check") == 0
-    assert capsys.readouterr().out == f"ball  as recorded in {path}\n"
-
-
-BALL = """\
-<mujoco>
-  <worldbody>
-    <body><joint type="slide" axis="0 0 1"/><geom size="0.1"/></body>
-  </worldbody>
-</mujoco>
-"""
-EXACT = """\
-def motion(time, qpos, qvel):
-    return qpos + qvel * time - 9.81 / 2 * time**2, qvel - 9.81 * time
-"""
 
 
 def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -27,7 +27,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "problems",
         nargs="*",
         metavar="PROBLEM",
-        help="a hard case, a family, or a model whose exact motion the course says (default: all)",
+        help="a hard case, or a family of them (default: all)",
     )
     add_format(parser, "text", "json")
     add_recorded(parser)

@@ -2,9 +2,7 @@
 
 Entry points: `stability(options, names)`, `check_stability`.
 
-1. Names mean problems, families of them (`damped-spring` is all of its damping ratios), or models
-   of the course whose exact motion stands beside them: these are measured, recorded and checked as
-   `bench` does, and told as the others are.
+1. Names mean problems, or families of them (`damped-spring` is all of its damping ratios).
 2. What was measured is kept under the machine, its versions and the code that measures; what is
    kept is not measured again, but where it is held against a record.
 3. All problems are recorded in one file. Where some are named, recording them leaves the others as
@@ -16,7 +14,6 @@ Entry points: `stability(options, names)`, `check_stability`.
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -25,12 +22,9 @@ from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine, one_processor
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
-from coursebuild.features.bench.commands.bench.run import bench, check
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, with_records
-from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.cases import CaseReport
-from coursebuild.numerics.reports.course_cases import course_cases, exact_file
 from coursebuild.numerics.reports.departures import Checked, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
@@ -50,11 +44,10 @@ def stability(
     Raises:
         UsageError: no case is called so.
     """
-    problems, models = _chosen(options, names)
-    found = _CaseRun(options).all(problems)
-    if record and problems and not found.failures:
+    found = _CaseRun(options).all(_chosen(names))
+    if record and not found.failures:
         found = _recorded(options, found, whole=not names)
-    return _with_models(found, bench(options, models, record=record) if models else Measurement(()))
+    return found
 
 
 def _recorded(
@@ -72,19 +65,6 @@ def _recorded(
     return with_records(options.root, found, records)
 
 
-def _with_models(
-    found: Measurement[CaseReport], own: Measurement[SceneReport]
-) -> Measurement[CaseReport]:
-    """With what was measured on models of the course."""
-    return Measurement(
-        (*found.reports, *(case for scene in own.reports for case in course_cases(scene))),
-        own.diagnostics,
-        failures=(*found.failures, *own.failures),
-        checked=(*found.checked, *own.checked),
-        remarks=(*found.remarks, *own.remarks),
-    )
-
-
 def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
     """Measure again, and hold it against what is recorded.
 
@@ -93,18 +73,13 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     Raises:
         UsageError: no case is called so.
     """
-    problems, models = _chosen(options, names)
-    found = _checked(options, problems, whole=not names) if problems else Measurement(())
-    return _with_models(found, check(options, models) if models else Measurement(()))
-
-
-def _checked(options: Options, problems: list[str], *, whole: bool) -> Measurement[CaseReport]:
+    problems = _chosen(names)
     recorded = read_record(options.root, STABILITY)
     if isinstance(recorded, ReportFailure):
         return Measurement((), failures=(recorded,))
     found = _CaseRun(options, again=True).all(problems)
     new = {case.name for case in found.reports}
-    old = [case for case in recorded if whole or case.name in new]
+    old = [case for case in recorded if not names or case.name in new]
     here = engine_version()
     others = sorted({case.machine.engine for case in old} - {here})
     remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in others)
@@ -143,10 +118,9 @@ def _known() -> tuple[str, ...]:
     return problem_names()
 
 
-def _chosen(options: Options, names: tuple[str, ...]) -> tuple[list[str], tuple[str, ...]]:
-    """The problems and the models that names mean; all where there are none."""
-    problems, models = _known(), _models(options.root)
-    known = (*problems, *models)
+def _chosen(names: tuple[str, ...]) -> list[str]:
+    """The problems that names mean; all where there are none."""
+    known = _known()
     wanted = set() if names else set(known)
     for name in names:
         found = {one for one in known if one == name or one.startswith(f"{name}-")}
@@ -156,12 +130,4 @@ def _chosen(options: Options, names: tuple[str, ...]) -> tuple[list[str], tuple[
             help = all_of_them if near is None else f"did you mean `{near}`?"
             raise UsageError(f"no hard case is called `{name}`", help=help)
         wanted |= found
-    return [one for one in problems if one in wanted], tuple(one for one in models if one in wanted)
-
-
-def _models(root: Path) -> tuple[str, ...]:
-    """Those beside which their exact motion stands."""
-    folder = root / "models"
-    names = (path.relative_to(folder).as_posix() for path in folder.rglob("*.xml"))
-    known = (name.removesuffix(".xml") for name in names)
-    return tuple(sorted(name for name in known if (root / exact_file(name)).is_file()))
+    return [one for one in known if one in wanted]

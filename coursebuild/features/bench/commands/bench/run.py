@@ -11,13 +11,14 @@ Entry points: `bench(options, names, …)`, `check(…)`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.model.scenarios import Bands, DeclaredSweep
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench import measuring
@@ -29,12 +30,13 @@ from coursebuild.features.bench.commands.runs import (
 )
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
-from coursebuild.numerics.reports.records import BENCH, FOLDER, ReportFailure
+from coursebuild.numerics.reports.records import BENCH, ReportFailure
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.scenes import CourseScene, Scenes, find_scenes
+from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.pipeline.shown_reports import read_record
 
+_T = TypeVar("_T")
 _CODE = (
     "coursebuild/numerics",
     "coursebuild/features/bench/commands/bench/measuring.py",
@@ -93,7 +95,6 @@ def check(
             run.failures.append(report)
         else:
             recorded[scene.name] = report
-    run.remarks += () if names else _of_no_model(options, scenes)
     known = {scene.name: scene for scene in scenes.scenes if scene.name in recorded}
     found = run.each(tuple(known.values()), run.measure)
     checked = [_checked(recorded[one.model], one, known[one.model]) for one in found.reports]
@@ -116,15 +117,6 @@ def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -
     bands = Bands() if scene.declared is None else scene.declared.bands
     departures = scene_departures(recorded, measured, bands)
     return Checked(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
-
-
-def _of_no_model(options: Options, found: Scenes) -> Iterator[str]:
-    """Recorded reports that nothing is held against any more."""
-    folder = options.root / FOLDER
-    for path in sorted(folder.rglob(f"*{BENCH.suffix}")) if folder.is_dir() else ():
-        name = path.relative_to(folder).as_posix().removesuffix(BENCH.suffix)
-        if name not in found.names and not name.startswith("."):
-            yield f"{BENCH.path(name)} belongs to no model"
 
 
 # --------------------------------------------------------------------------------------- measuring
@@ -160,50 +152,49 @@ class SceneRun(MeasuringRun):
         )
 
     def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> SceneReport:
-        loaded = self.measuring.scenarios_of(self.options.root, scene, quick=self.quick)
-        scenarios = tuple(self._scenarios(scene, loaded, parts))
-        sweeps = tuple(self._sweeps(scene, loaded, parts))
+        root, timed, name = self.options.root, not self.again, scene.name
+        loaded = self.measuring.scenarios_of(root, scene, quick=self.quick)
+
+        def tell(text: str) -> None:
+            self.progress.doing(name, text)
+
+        def scenario(number: int) -> ScenarioReport:
+            how = {"quick": self.quick, "timed": timed, "tell": tell}
+            found: ScenarioReport = self.measuring.measured(loaded, number, **how)
+            return found
+
+        def sweep(declared: DeclaredSweep) -> SweepReport:
+            tell(declared.name)
+            found: SweepReport = self.measuring.swept(
+                loaded, declared, quick=self.quick, timed=timed
+            )
+            return found
+
         report = SceneReport(
-            model=scene.name,
+            model=name,
             digest=scene.digest,
             quick=self.quick,
             machine=self.here,
-            scenarios=scenarios,
-            sweeps=sweeps,
+            scenarios=tuple(
+                self._part("bench-scenarios", (*parts, n), ScenarioReport, partial(scenario, n))
+                for n in range(len(loaded.scenarios))
+            ),
+            sweeps=tuple(
+                self._part("bench-sweeps", (*parts, one.name), SweepReport, partial(sweep, one))
+                for one in (() if scene.declared is None else scene.declared.sweeps)
+            ),
         )
-        if self.cards and scenarios:
-            self.progress.doing(scene.name, "what it is made of")
-            report = self.measuring.with_card(self.options.root, scene, report)
+        if self.cards and report.scenarios:
+            tell("what it is made of")
+            report = self.measuring.with_card(root, scene, report)
         return report
 
-    def _sweeps(
-        self, scene: CourseScene, loaded: Any, parts: tuple[object, ...]
-    ) -> Iterator[SweepReport]:
-        """Each sweep, from what is kept or measured now."""
-        for sweep in () if scene.declared is None else scene.declared.sweeps:
-            own = (*parts, "sweep", sweep.name)
-            found = self.kept("bench-sweeps", own, SweepReport)
-            if found is None:
-                self.progress.doing(scene.name, sweep.name)
-                timed = not self.again
-                found = self.measuring.swept(loaded, sweep, quick=self.quick, timed=timed)
-                self.keep("bench-sweeps", own, found)
-            yield found
-
-    def _scenarios(
-        self, scene: CourseScene, loaded: Any, parts: tuple[object, ...]
-    ) -> Iterator[ScenarioReport]:
-        """Each scenario, from what is kept or measured now."""
-        for number in range(len(loaded.scenarios)):
-            own = (*parts, number)
-            found = self.kept("bench-scenarios", own, ScenarioReport)
-            if found is None:
-                found = self.measuring.measured(
-                    loaded,
-                    number,
-                    quick=self.quick,
-                    timed=not self.again,
-                    tell=lambda text: self.progress.doing(scene.name, text),
-                )
-                self.keep("bench-scenarios", own, found)
-            yield found
+    def _part(
+        self, kind: str, parts: tuple[object, ...], what: type[_T], measure: Callable[[], _T]
+    ) -> _T:
+        """A scenario or a sweep, from what is kept or measured now."""
+        found = self.kept(kind, parts, what)
+        if found is None:
+            found = measure()
+            self.keep(kind, parts, found)
+        return found
