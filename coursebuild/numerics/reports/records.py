@@ -13,7 +13,6 @@ files; `RecordError`, why a file is none.
 from __future__ import annotations
 
 import json
-import re
 import shlex
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
@@ -127,37 +126,18 @@ STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
 
 
 def _decoded(data: bytes, holds: str, kind: type[_T]) -> _T:
-    value = _json(data)
-    if not isinstance(value, dict) or "holds" not in value:
-        raise RecordError(f"holds no report of `{holds}`")
-    if value["holds"] != holds:
-        shown = json.dumps(value["holds"], ensure_ascii=False)[:40]
-        raise RecordError(f"holds a report of {shown}, not of `{holds}`")
-    form = value.get("form")
-    if not isinstance(form, int) or isinstance(form, bool):
-        raise RecordError("does not say which form it has")
-    if form != FORM:
-        age = "an older" if form < FORM else "a newer"
-        raise RecordError(f"was written by {age} version of this tool (form {form}, not {FORM})")
     try:
+        value = msgspec.json.decode(data)
+        head = value if isinstance(value, dict) else {}
+        if head.get("holds") != holds:
+            raise RecordError(f"holds no report of `{holds}`")
+        if head.get("form") != FORM:
+            form = head.get("form")
+            raise RecordError(f"was written by another version of this tool (form {form})")
         return msgspec.convert(value, kind)
-    except msgspec.ValidationError as error:
-        text = str(error)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        text = str(error).replace("JSON is malformed", "no JSON")
         raise RecordError(f"is damaged: {text[:1].lower()}{text[1:]}") from None
-
-
-def _json(data: bytes) -> Any:
-    try:
-        return msgspec.json.decode(data)
-    except RecursionError:
-        raise RecordError("is damaged: values are nested too deep") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        match = re.search(r"byte (\d+)", str(error))
-        if match is None:
-            what = str(error).partition(" - at")[0]
-            raise RecordError(f"is damaged: {what[:1].lower()}{what[1:]}") from None
-        line = data.count(b"\n", 0, int(match[1])) + 1
-        raise RecordError(f"is damaged: no JSON at line {line}") from None
 
 
 # --- writing
