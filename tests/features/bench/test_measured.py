@@ -228,7 +228,7 @@ def test_a_scenario_whose_motion_the_course_knows_is_a_hard_case(make: Make) -> 
     model = scene(known, replace(awkward(), name="awkward"), model="box")
     page = pages(make, Reports({"box": model}, cases=(case("a", 4),)))["numerics/index.html"]
     told = text(page.replace("<details", "<div").replace("</details", "</div"))
-    assert "Cases of this course box: " in told and "coursebuild stability box" in told
+    assert "Cases of this course box: " in told and "coursebuild bench box" in told
     assert 'href="#box/swing"' in page and 'id="box/swing"' in page
     assert 'href="../models/box.html">box: ' in page and "box/awkward" not in page
     assert "References: models/box.exact.py; " in told and "error of position" in page
