@@ -1,6 +1,6 @@
 """The terms of a course: what a document says of each, and a page of all.
 
-1. `terms` reads a document: each term with the sentence that defines it (`sentences`).
+1. `terms` reads a document: each term with two sentences of its paragraph (`sentences`).
 2. `page` brings those of all documents together.
 """
 

@@ -1,4 +1,4 @@
-"""The glossary: every term of the course, the sentence that defines it, and where it is used.
+"""The glossary: every term of the course, what the text says of it, and where it is used.
 
 Entry points: `course_terms`; `glossary_values`, what the page shows.
 """

@@ -1,6 +1,6 @@
-"""The sentence around a term: what a glossary shows of the paragraph that defines it.
+"""What a glossary shows of the paragraph that defines a term: two sentences.
 
-Entry points: `sentence_of(inlines, term)`, `runs_on(sentence)`.
+Entry points: `definition_of(inlines, term)`, `runs_on(definition)`.
 
 A sentence ends at a full stop, a question or exclamation mark, with what closes behind it, before
 white space; not after an initial or a usual abbreviation, and not before a small letter. The marks
@@ -36,21 +36,24 @@ _OBJECT = "\ufffc"
 """Stands for what is no text."""
 
 
-def sentence_of(inlines: tuple[Inline, ...], term: Term) -> tuple[Inline, ...]:
-    """The inlines of the sentence in which a term stands, cut at its ends."""
+def definition_of(inlines: tuple[Inline, ...], term: Term) -> tuple[Inline, ...]:
+    """The sentence in which a term stands and the next one, unless that defines another term."""
     texts = [_shown(inline) for inline in inlines]
     at = next(n for n, inline in enumerate(inlines) if term in walk_inlines((inline,)))
     place = sum(map(len, texts[:at]))
     whole = "".join(texts)
     ends = [0, *_ends(whole), len(whole)]
     start = max(end for end in ends if end <= place)
-    stop = min(end for end in ends if end > place)
-    return tuple(_cut(inlines, texts, start, stop))
+    stop, *later = (end for end in ends if end > place)
+    sentence = tuple(_cut(inlines, texts, start, stop))
+    following = tuple(_cut(inlines, texts, stop, later[0])) if later else ()
+    defines = any(isinstance(inline, Term) for inline in walk_inlines(following))
+    return sentence if defines else sentence + following
 
 
-def runs_on(sentence: tuple[Inline, ...]) -> bool:
-    """Whether a sentence goes on in what follows its paragraph."""
-    return _CLOSED.search("".join(map(_shown, sentence))) is None
+def runs_on(definition: tuple[Inline, ...]) -> bool:
+    """Whether a definition goes on in what follows its paragraph."""
+    return _CLOSED.search("".join(map(_shown, definition))) is None
 
 
 def _shown(inline: Inline) -> str:

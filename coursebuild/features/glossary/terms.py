@@ -1,8 +1,8 @@
 """The terms of a document, each with what the text says of it where it defines it.
 
-Entry point: `document_terms`. Each term gets the sentence that defines it, as HTML. Where that runs
-on into a formula on a line of its own, the formula comes with it. Links lose their addresses: the
-glossary stands elsewhere.
+Entry point: `document_terms`. Each term gets the sentence that defines it and the next one, as
+HTML. Where they run on into a formula on a line of its own, the formula comes with them. Links lose
+their addresses: the glossary stands elsewhere.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from coursebuild.core.pages.link_texts import without_links
 from coursebuild.core.pages.markup import render_inlines
 from coursebuild.core.pages.plain import PLAIN, PlainContext
 from coursebuild.core.text.diagnostics import Parsed
-from coursebuild.features.glossary.sentences import runs_on, sentence_of
+from coursebuild.features.glossary.sentences import definition_of, runs_on
 
 
 class DefinitionPart(Struct, frozen=True):
@@ -94,19 +94,20 @@ def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
                     continue
                 following = siblings[number + 1] if number + 1 < len(siblings) else None
                 title = Markup.escape(term.name) if term.renamed else html(term.children)
-                pieces = tuple(_pieces(sentence_of(block.children, term), following, html, context))
+                definition = definition_of(block.children, term)
+                pieces = tuple(_pieces(definition, following, html, context))
                 yield DefinedTerm(term.id, term.name, str(title), pieces)
 
 
 def _pieces(
-    sentence: tuple[Inline, ...],
+    definition: tuple[Inline, ...],
     following: Block | None,
     html: Callable[[tuple[Inline, ...]], str],
     context: _Excerpted,
 ) -> Iterator[DefinitionPart]:
-    """A sentence, cut at its displayed formulas."""
+    """A definition, cut at its displayed formulas."""
     line: list[Inline] = []
-    for inline in sentence:
+    for inline in definition:
         if isinstance(inline, Math) and inline.display:
             yield DefinitionPart(html(tuple(line)).strip())
             yield DefinitionPart(str(context.display(inline.tex.text, 0)), display=True)
@@ -115,7 +116,7 @@ def _pieces(
             line.append(inline)
     if line:
         yield DefinitionPart(html(tuple(line)).strip())
-    if isinstance(following, MathBlock) and following.tex.text and runs_on(sentence):
+    if isinstance(following, MathBlock) and following.tex.text and runs_on(definition):
         yield DefinitionPart(str(context.display(following.tex.text, 0)), display=True)
 
 

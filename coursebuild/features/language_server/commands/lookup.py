@@ -27,7 +27,7 @@ from coursebuild.core.scripts.bound_numbers import Shown
 from coursebuild.core.syntax.decode import description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
-from coursebuild.features.glossary.sentences import sentence_of
+from coursebuild.features.glossary.sentences import definition_of
 from coursebuild.features.language_server.commands.engine import described_name
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
@@ -201,14 +201,14 @@ class _Lookup:
         return next((one.facts for one in known if one is not None and one.facts is not None), None)
 
     def term(self, id: str, owner: Owner) -> tuple[str, Span] | None:
-        """The sentence that defines a term."""
+        """What the glossary says of a term."""
         document = self.texts.document(self.texts.source(owner.path))
         for block in () if document is None else model.document_blocks(document):
             inlines = block.children if isinstance(block, model.Paragraph) else ()
             for term in model.walk_inlines(inlines):
                 if isinstance(term, model.Term) and term.id == id:
-                    sentence = without_links(sentence_of(inlines, term))
-                    said = (i.text if isinstance(i, model.Text) else i.span.text for i in sentence)
+                    inlines = without_links(definition_of(inlines, term))
+                    said = (i.text if isinstance(i, model.Text) else i.span.text for i in inlines)
                     return _paragraphs(f"**{term.name}**", "".join(said).strip()), term.span
         return None
 
