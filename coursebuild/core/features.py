@@ -58,9 +58,9 @@ else:  # names alone, which `help` can show: nothing above is imported
         "PageContext",
         "PageInputs",
         "Place",
+        "Renderer",
         "SiteContext",
         "TextParser",
-        "Tools",
     ):
         globals()[above] = NewType(above, object)
 
