@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -12,100 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from support.edited_course import LESSON, NORUN, QUIZ, Course
+from support.edited_course import EDITS, LESSON, NORUN, WORDS, Course, plan, remove, retitle, turn
 from support.scratch_course import Folder
 
 pytestmark = pytest.mark.site
-
-
-def prose(course: Course, id: str, text: str) -> None:
-    course.edit(id, "Prose", f"{text} Prose")
-
-
-def heading(course: Course, id: str, text: str) -> None:
-    course.edit(id, "## First", f"## {re.sub('[^a-z]', '', text) or 'h'}\n\n## First")
-
-
-def retitle(course: Course, id: str, text: str) -> None:
-    course.titles[id] = f"{re.sub('[^a-z é]', '', text)} {id}"
-
-
-def script(course: Course, id: str, text: str) -> None:
-    course.edit(id, "print(", f"print({text!a}, ")
-
-
-def plan(course: Course, id: str, text: str) -> None:
-    """A lesson is taken back, or written."""
-    if id in course.planned:
-        course.planned.discard(id)
-        n = course.ids.index(id) + 1 if id in course.ids else 9
-        course.write(id, LESSON.format(n=n, next="1.1", script=""))
-    else:
-        course.planned.add(id)
-        (course.folder.root / course.path(id)).unlink(missing_ok=True)
-
-
-def remove(course: Course, id: str, text: str) -> None:
-    """A lesson goes, or comes back at the end of its level."""
-    if id in course.ids:
-        course.ids.remove(id)
-        (course.folder.root / course.path(id)).unlink(missing_ok=True)
-    else:
-        course.ids.append(id)
-        if id not in course.planned:
-            course.write(id, LESSON.format(n=7, next="1.1", script=""))
-
-
-def turn(course: Course, id: str, text: str) -> None:
-    course.ids.reverse()
-
-
-def term(course: Course, id: str, text: str) -> None:
-    """A term is defined in a lesson, or no more; others link to the lesson where it was."""
-    path = course.folder.root / course.path(id)
-    name = f"[w{id}]{{term}}"
-    if name in path.read_text(encoding="utf-8"):
-        course.edit(id, name, f"[no term](lesson:{id})")
-    else:
-        course.edit(id, "Prose", f"A {name} is {text}: $q_{{{id}}}$. Prose")
-
-
-def label(course: Course, id: str, text: str) -> None:
-    """A formula gets a label, and is referred to, if it has none."""
-    course.edit(id, "\n$$\n\n[^n]:", "\n$$ {#eq:e}\n\nBy [](#eq:e) $\\dot q$.\n\n[^n]:")
-
-
-def ask(course: Course, id: str, text: str) -> None:
-    """A lesson asks something, or something else."""
-    path = course.folder.root / course.path(id)
-    if "```quiz" in path.read_text(encoding="utf-8"):
-        course.edit(id, '"why', '"why-not')
-    else:
-        course.edit(id, "Prose", QUIZ.replace("asked", f"asked-{id}") + "Prose")
-
-
-def model(course: Course, id: str, text: str) -> None:
-    course.folder.write("models/box.xml", f"<mujoco><!--{text.replace('-', '')}--></mujoco>\n")
-
-
-def page(course: Course, id: str, text: str) -> None:
-    course.folder.write("content/pages/about.md", f"{text}\n\n[m](model:box) and $é$\n")
-
-
-def picture(course: Course, id: str, text: str) -> None:
-    course.folder.write("content/images/dot.png", text.encode())
-
-
-def breakage(course: Course, id: str, text: str) -> None:
-    """What keeps the course from being built, or mends it."""
-    course.extra = "" if course.extra else '[[silence]]\nrule = "no-such-rule"\nreason = "x"\n'
-
-
-EDITS: list[Callable[[Course, str, str], None]] = [
-    *(prose, heading, retitle, script, plan, remove, turn, model, page, picture, breakage),
-    *(term, label, ask),
-]
-WORDS = ["a", "word", "*é*", "`code`", "$z$", "ŝ", "<b style='color: red'>x</b>"]
 
 
 @pytest.fixture(scope="module")

@@ -67,34 +67,6 @@ def test_a_page_is_new_before_anything_else_is_done(
     assert running.find("lessons/1.2-two.html") == other
 
 
-def test_lists_of_lessons_follow_their_questions(
-    make: Make, live: Callable[[Folder], Live], builds: Builds
-) -> None:
-    folder = make(GOOD, GOOD.replace("hello.py", "other.py"))
-    running = live(folder)
-    running.site()
-    path = folder.lesson(2)
-    good = folder.text(path)
-    asking = '```quiz\n{"id": "q", "title": "Q", "questions": [%s]}\n```\n'
-    one, other = (
-        f'{{"kind": "open", "id": "{id}", "q": "{id}?", "reference": "So."}}' for id in "ab"
-    )
-    lists = ("index.html", "levels/1.html", "progress/index.html", "review/index.html")
-
-    def same(text: str) -> bool:
-        folder.write(path, text)
-        assert running.save(path)
-        running.rebuild.once()
-        built = builds(folder)
-        assert built is not None
-        return [running.find(p) for p in lists] == [built.get(p) for p in lists]
-
-    assert same(f"{good}\n{asking % one}")
-    assert same(f"{good}\n{asking % f'{one}, {other}'}")
-    assert same(good)
-    assert running.find("review/index.html") is None
-
-
 def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]) -> None:
     """Also where a page lies outside of `content/`."""
     folder = make(GOOD)
@@ -224,44 +196,6 @@ def test_scripts_run_behind_and_only_those_that_changed(
 
 
 # --- what others make of a lesson
-
-
-def test_terms_symbols_links_and_numbers_follow_the_text(
-    make: Make, live: Callable[[Folder], Live], builds: Builds
-) -> None:
-    folder = make("## A\n\nText with $x$.\n", "## B\n\nText.\n")
-    one, two = folder.lesson(1), folder.lesson(2)
-    running = live(folder)
-
-    def same(*paths: str) -> dict[str, bytes]:
-        """Save; the pages are those of a build."""
-        assert running.save(*paths)
-        running.rebuild.once()
-        built = builds(folder)
-        assert built is not None
-        pages = [path for path in built if path.startswith(("glossary/", "symbols/", "lessons/1."))]
-        pages = [path for path in pages if path.endswith(".html")]
-        assert [path for path in pages if running.find(path) != built[path]] == []
-        for path in ("glossary/index.html", "symbols/index.html"):
-            assert running.session.files.has_page(path) is (path in built)
-        return {path: built[path] for path in pages}
-
-    folder.replace(one, "Text", "A [thing]{term} is $q$. Text")
-    folder.replace(two, "Text", 'The [thing](term:thing) of Lesson 1.1, $z${symbol="height"}')
-    pages = same(one, two)
-    assert "glossary/index.html" in pages
-    assert b"Referred to by" in pages["lessons/1.1-one.html"]
-    assert b"height" in pages["symbols/index.html"]
-    folder.replace(one, "is $q$", "is $\\dot q$, so that\n\n$$a = b$$ {#eq:a}\n\nis")
-    assert running.save(one)
-    folder.replace(two, "height", "depth")
-    folder.replace(two, "Lesson 1.1", "[](lesson:1.1#eq:a)")
-    assert running.save(two)
-    folder.replace(one, "[thing]{term}", "thing")
-    folder.replace(two, "[thing](term:thing)", "thing")
-    pages = same(one, two)
-    assert b"(1) of Lesson 1.1" in pages["lessons/1.2-two.html"]
-    assert "glossary/index.html" not in pages
 
 
 def test_a_term_that_goes_makes_a_mistake_elsewhere_until_it_comes_back(

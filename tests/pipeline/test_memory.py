@@ -54,7 +54,7 @@ def test_a_result_is_remembered_whole(desk: Desk) -> None:
     assert last is not None and last.kept.seconds == 2.5
 
 
-def test_failures_are_remembered_and_stopped_or_unwatched_runs_are_not(desk: Desk) -> None:
+def test_failures_are_remembered(desk: Desk) -> None:
     stderr = f'File "{desk.root}/examples/a.py", line 1\nValueError: no\n'
     for outcome, status in ((Outcome.FAILED, 3), (Outcome.OUTPUT_LIMIT, 9), (Outcome.ENCODING, 0)):
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
@@ -62,16 +62,33 @@ def test_failures_are_remembered_and_stopped_or_unwatched_runs_are_not(desk: Des
         found = desk.recall()
         assert found is not None
         assert (found.outcome, found.status, found.stderr) == (outcome, status, stderr)
-    shutil.rmtree(desk.root / ".coursebuild")
-    for outcome in (Outcome.TIMEOUT, Outcome.KILLED, Outcome.SKIPPED):
-        desk.run(outcome=outcome, status=9)
-        assert desk.recall() is None
+
+
+def outside(path: str) -> dict[str, Trace]:
+    return {"trace": replace(NOTHING, outside=(path,))}
+
+
+FORGOTTEN: list[tuple[Outcome, dict[str, object], str]] = [
+    (Outcome.TIMEOUT, {}, "it was stopped after its time limit"),
+    (Outcome.KILLED, {}, "a signal ended it"),
+    (Outcome.SKIPPED, {"missing": ("scipy", "jax")}, "it needs scipy, jax"),
+    (Outcome.NORUN, {}, "its lesson says `norun`"),
+    (Outcome.FAILED, {"stderr": "x\nModuleNotFoundError: jax"}, "it did not find a module"),
+    (Outcome.FAILED, {"stderr": "ImportError: cannot import"}, "it did not find a module"),
+    (Outcome.OK, {"trace": None}, "nobody could watch what it looks at"),
+    (Outcome.OK, {"trace": replace(NOTHING, opaque="it starts others")}, "it starts others"),
+    (Outcome.OK, outside("/dev/random"), "it reads /dev/random"),
+    (Outcome.OK, outside("/proc/stat"), "it reads /proc/stat"),
+]
+
+
+def test_runs_that_another_may_not_repeat_are_not_remembered(desk: Desk) -> None:
+    for outcome, fields, why in FORGOTTEN:
+        shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
+        desk.run(outcome=outcome, **fields)  # type: ignore[arg-type]
+        assert (desk.recall(), desk.why()) == (None, why)
         last = desk.memory().last(PATH)
-        assert last is not None and last.kept.outcome is outcome and last.forgotten
-    desk.run(replace(NOTHING, opaque="it starts other programs"))
-    assert (desk.recall(), desk.why()) == (None, "it starts other programs")
-    desk.run(None)
-    assert desk.recall() is None
+        assert last is not None and last.kept.outcome is outcome
 
 
 def test_another_text_option_or_environment_is_another_result(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import pytest
 
-from support.scratch_course import FIRST, ROOT, Folder, block
+from support.scratch_course import FIRST, ROOT, Folder
 
 pytestmark = pytest.mark.site
 
@@ -96,40 +96,8 @@ def test_nothing_changed_counts_for_the_same_command_only(make: Make) -> None:
     done = folder.main(*command, cwd=folder.root / "data")
     assert (done.status, done.out) == (2, "")
     assert "no lesson or page is called" in done.err
-
-
-def edit(folder: Folder) -> None:
-    folder.write(folder.lesson(), "## One\n\n" + block("one.py", "print(2)", "1"))
-
-
-def replace_by_a_link_out_of_the_course(folder: Folder) -> None:
-    away = folder.root.with_name("away.md")
-    (folder.root / folder.lesson()).rename(away)
-    (folder.root / folder.lesson()).symlink_to(away)
-
-
-def edit_and_put_the_time_back(folder: Folder) -> None:
-    lesson = folder.root / folder.lesson()
-    before = lesson.stat()
-    lesson.write_bytes(lesson.read_bytes().replace(b"print(1)", b"print(2)"))
-    os.utime(lesson, ns=(before.st_atime_ns, before.st_mtime_ns))
-    after = lesson.stat()
-    assert (after.st_size, after.st_mtime_ns) == (before.st_size, before.st_mtime_ns)
-
-
-@pytest.mark.parametrize(
-    "change", [edit, replace_by_a_link_out_of_the_course, edit_and_put_the_time_back]
-)
-def test_change_is_seen_after_a_check_with_nothing_to_do(
-    make: Make, change: Callable[[Folder], None]
-) -> None:
-    folder = make(FIRST)
-    aged(folder)
-    assert folder.main("check").status == 0
-    assert "nothing has changed" in folder.main("check").out
-    change(folder)
-    done = folder.main("check")
-    assert (done.status, "nothing has changed" in done.out) == (1, False)
+    folder.replace(folder.lesson(), "print(1)", "print(2)")
+    assert folder.main("check").status == 1
 
 
 def test_working_directory_that_is_gone_gives_2(make: Make) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -112,3 +114,106 @@ QUIZ = """```quiz
 ```
 
 """
+"""A question, asked in a lesson."""
+
+
+# --- edits
+
+
+def prose(course: Course, id: str, text: str) -> None:
+    course.edit(id, "Prose", f"{text} Prose")
+
+
+def heading(course: Course, id: str, text: str) -> None:
+    course.edit(id, "## First", f"## {re.sub('[^a-z]', '', text) or 'h'}\n\n## First")
+
+
+def retitle(course: Course, id: str, text: str) -> None:
+    course.titles[id] = f"{re.sub('[^a-z é]', '', text)} {id}"
+
+
+def script(course: Course, id: str, text: str) -> None:
+    course.edit(id, "print(", f"print({text!a}, ")
+
+
+def plan(course: Course, id: str, text: str) -> None:
+    """A lesson is taken back, or written."""
+    if id in course.planned:
+        course.planned.discard(id)
+        n = course.ids.index(id) + 1 if id in course.ids else 9
+        course.write(id, LESSON.format(n=n, next="1.1", script=""))
+    else:
+        course.planned.add(id)
+        (course.folder.root / course.path(id)).unlink(missing_ok=True)
+
+
+def remove(course: Course, id: str, text: str) -> None:
+    """A lesson goes, or comes back at the end of its level."""
+    if id in course.ids:
+        course.ids.remove(id)
+        (course.folder.root / course.path(id)).unlink(missing_ok=True)
+    else:
+        course.ids.append(id)
+        if id not in course.planned:
+            course.write(id, LESSON.format(n=7, next="1.1", script=""))
+
+
+def turn(course: Course, id: str, text: str) -> None:
+    course.ids.reverse()
+
+
+def term(course: Course, id: str, text: str) -> None:
+    """A term is defined in a lesson, or no more; others link to the lesson where it was."""
+    path = course.folder.root / course.path(id)
+    name = f"[w{id}]{{term}}"
+    if name in path.read_text(encoding="utf-8"):
+        course.edit(id, name, f"[no term](lesson:{id})")
+    else:
+        course.edit(id, "Prose", f"A {name} is {text}: $q_{{{id}}}$. Prose")
+
+
+def label(course: Course, id: str, text: str) -> None:
+    """A formula gets a label, and is referred to, if it has none."""
+    course.edit(id, "\n$$\n\n[^n]:", "\n$$ {#eq:e}\n\nBy [](#eq:e) $\\dot q$.\n\n[^n]:")
+
+
+def ask(course: Course, id: str, text: str) -> None:
+    """A lesson asks something, or something else."""
+    path = course.folder.root / course.path(id)
+    if "```quiz" in path.read_text(encoding="utf-8"):
+        course.edit(id, '"why', '"why-not')
+    else:
+        course.edit(id, "Prose", QUIZ.replace("asked", f"asked-{id}") + "Prose")
+
+
+def model(course: Course, id: str, text: str) -> None:
+    course.folder.write("models/box.xml", f"<mujoco><!--{text.replace('-', '')}--></mujoco>\n")
+
+
+def page(course: Course, id: str, text: str) -> None:
+    course.folder.write("content/pages/about.md", f"{text}\n\n[m](model:box) and $é$\n")
+
+
+def picture(course: Course, id: str, text: str) -> None:
+    course.folder.write("content/images/dot.png", text.encode())
+
+
+def breakage(course: Course, id: str, text: str) -> None:
+    """What keeps the course from being built, or mends it."""
+    course.extra = "" if course.extra else '[[silence]]\nrule = "no-such-rule"\nreason = "x"\n'
+
+
+def run(course: Course, id: str, text: str) -> None:
+    """A script that runs is added, or prints another thing than is recorded."""
+    path, name = course.path(id), f"ran{id}.py"
+    if name in course.folder.text(path):
+        course.edit(id, "print(17)", "print(17.0)")
+    else:
+        course.edit(id, "> [!note]", block(name, "print(17)", "17", "digits") + "> [!note]")
+
+
+EDITS: list[Callable[[Course, str, str], None]] = [
+    *(prose, heading, script, run, term, label, ask, model, page, picture),
+    *(retitle, plan, remove, turn, breakage),
+]
+WORDS = ["a", "word", "*é*", "`code`", "$z$", "ŝ", "<b style='color: red'>x</b>"]

@@ -67,34 +67,6 @@ def rewrite(path: str) -> Callable[[Path], None]:
     return change
 
 
-def touch(root: Path) -> None:
-    os.utime(root / "content/course.toml")
-
-
-def add(root: Path) -> None:
-    (root / "content/lessons/1.2-b.md").touch()
-
-
-def add_folder(root: Path) -> None:
-    (root / "content/new").mkdir()
-
-
-def remove(root: Path) -> None:
-    (root / "models/m.xml").unlink()
-
-
-def rename(root: Path) -> None:
-    (root / "content/lessons/1.1-a.md").rename(root / "content/lessons/1.1-b.md")
-
-
-def appear(root: Path) -> None:
-    (root / "data/not-there.csv").touch()
-
-
-def vanish(root: Path) -> None:
-    (root / "data/d.csv").unlink()
-
-
 def replace(root: Path) -> None:
     """Another file with the same name, size and time."""
     file = root / "models/m.xml"
@@ -104,17 +76,21 @@ def replace(root: Path) -> None:
     (root / "models/new").replace(file)
 
 
+def put_the_time_back(root: Path) -> None:
+    """After another text, as long as it was."""
+    before = (root / "models/m.xml").stat()
+    rewrite("models/m.xml")(root)
+    os.utime(root / "models/m.xml", ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def link_away(root: Path) -> None:
+    (root / "models/m.xml").rename(root.with_name("away.xml"))
+    (root / "models/m.xml").symlink_to(root.with_name("away.xml"))
+
+
 def install(root: Path) -> None:
     packages = root.parent / "site-packages"
     (packages / "numpy-2.0.dist-info").rename(packages / "numpy-2.1.dist-info")
-
-
-def site_gone(root: Path) -> None:
-    (root / "public").rename(root / "elsewhere")
-
-
-def foreign(root: Path) -> None:
-    (root / "public/note.txt").touch()
 
 
 def file_for_folder(root: Path) -> None:
@@ -122,16 +98,37 @@ def file_for_folder(root: Path) -> None:
     (root / "examples/a.py").mkdir()
 
 
-CHANGES = [
-    *(rewrite(p) for p in ("content/lessons/1.1-a.md", "models/m.xml", "data/d.csv")),
-    *(rewrite(p) for p in ("public/index.html", "examples/a.py")),
-    *(touch, add, add_folder, remove, rename, appear, vanish, replace, install, site_gone),
-    *(foreign, file_for_folder),
-]
+def add(root: Path) -> None:
+    (root / "content/lessons/1.2-b.md").touch()
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_any_change_is_seen(root: Path, change: Callable[[Path], None]) -> None:
+def remove(root: Path) -> None:
+    (root / "models/m.xml").unlink()
+
+
+LESSON = "content/lessons/1.1-a.md"
+CHANGES: dict[str, Callable[[Path], object]] = {
+    **{path: rewrite(path) for path in (LESSON, "models/m.xml", "data/d.csv")},
+    **{path: rewrite(path) for path in ("public/index.html", "examples/a.py")},
+    "touched": lambda root: os.utime(root / "content/course.toml"),
+    "a file more": add,
+    "a folder more": lambda root: (root / "content/new").mkdir(),
+    "removed": remove,
+    "renamed": lambda root: (root / LESSON).rename(root / "content/lessons/1.1-b.md"),
+    "what a script looked for": lambda root: (root / "data/not-there.csv").touch(),
+    "what a script read": lambda root: (root / "data/d.csv").unlink(),
+    "replaced": replace,
+    "the time put back": put_the_time_back,
+    "a link in its place": link_away,
+    "a package": install,
+    "the site": lambda root: (root / "public").rename(root / "elsewhere"),
+    "in the site": lambda root: (root / "public/note.txt").touch(),
+    "a folder in its place": file_for_folder,
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_any_change_is_seen(root: Path, change: Callable[[Path], object]) -> None:
     assert keep(root)
     change(root)
     assert said(root) is None

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import pytest
-from msgspec.structs import replace
 
 from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
-from coursebuild.core.model.results import Outcome, ScriptRun, Trace
+from coursebuild.core.model.results import Trace
 from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
     described,
-    forgotten,
     input_changes,
     state_changes,
 )
@@ -22,43 +20,6 @@ INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), AROUND
 Places = tuple[tuple[str, str], ...]
 PLACES: Places = (("course", "/home/me/course"), ("library", "/opt/tool"), ("home", "/home/me"))
 NOTHING = Trace((), (), (), (), "")
-
-
-def run(
-    outcome: Outcome = Outcome.OK, trace: Trace | None = NOTHING, **fields: object
-) -> ScriptRun:
-    base = ScriptRun("examples/a.py", outcome, 0, "", "", 0.1, trace=trace)
-    return replace(base, **fields)  # type: ignore[arg-type]
-
-
-# --- what is not remembered
-
-
-@pytest.mark.parametrize(
-    ("outcome", "fields", "words"),
-    [
-        (Outcome.OK, {}, ""),
-        (Outcome.FAILED, {"stderr": "ValueError: no"}, ""),
-        (Outcome.OUTPUT_LIMIT, {}, ""),
-        (Outcome.ENCODING, {}, ""),
-        (Outcome.TIMEOUT, {}, "it was stopped after its time limit"),
-        (Outcome.KILLED, {}, "a signal ended it"),
-        (Outcome.SKIPPED, {"missing": ("scipy", "jax")}, "it needs scipy, jax"),
-        (Outcome.NORUN, {}, "its lesson says `norun`"),
-        (Outcome.FAILED, {"stderr": "x\nModuleNotFoundError: jax"}, "it did not find a module"),
-        (Outcome.FAILED, {"stderr": "ImportError: cannot import name"}, "it did not find a module"),
-        (Outcome.OK, {"trace": None}, "nobody could watch what it looks at"),
-        (Outcome.OK, {"trace": replace(NOTHING, opaque="it starts others")}, "it starts others"),
-        (Outcome.OK, {"trace": replace(NOTHING, outside=("/dev/null",))}, ""),
-        (Outcome.OK, {"trace": replace(NOTHING, outside=("/dev/random",))}, "it reads /dev/random"),
-        (Outcome.OK, {"trace": replace(NOTHING, outside=("/proc/stat",))}, "it reads /proc/stat"),
-    ],
-)  # fmt: skip
-def test_what_is_not_remembered(outcome: Outcome, fields: dict[str, object], words: str) -> None:
-    assert forgotten(run(outcome, **fields)) == words
-
-
-# --- words
 
 
 def test_changes_of_inputs() -> None:
