@@ -38,7 +38,7 @@ def test_the_tutorial_leads_to_a_published_course(tmp_path: Path) -> None:
         elif path := fence.value("shows"):
             assert fence.text in folder.text(path)
     page = folder.text("public/lessons/1.3-free-fall.html")
-    assert "the ball touches the floor after 0.430 s" in page
+    assert "the ball touches the floor after 0.322 s" in page
     assert 'class="lab"' in page
     assert "1.3-check" in page
 

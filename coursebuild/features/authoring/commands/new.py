@@ -35,9 +35,9 @@ _MODEL = """\
 <mujoco model="{}">
   <worldbody>
     <geom name="floor" type="plane" size="1 1 0.1"/>
-    <body name="ball" pos="0 0 1">
+    <body name="ball" pos="0 0 0.8">
       <freejoint/>
-      <geom name="ball" size="0.1" mass="1"/>
+      <geom name="ball" size="0.3" mass="1"/>
     </body>
   </worldbody>
 </mujoco>
