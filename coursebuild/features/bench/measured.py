@@ -28,17 +28,12 @@ from coursebuild.numerics.reports.records import BENCH, DIET
 
 
 class FindingView(Struct, frozen=True):
-    """A finding of the diet."""
+    """A finding of the diet; the template takes from it what needs no words of the page."""
 
-    kind: str
+    finding: Finding
     message: str
     label: str
     saving: str
-    scenarios: str
-    proof: str
-    kept: str
-    doubt: str
-    places: tuple[str, ...]
 
 
 class DietView(Struct, frozen=True):
@@ -112,31 +107,21 @@ def measured_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str],
     """What the model is made of, and how fast it runs, as pairs of words."""
     words, scene = library.words, library.reports.scenes.get(model.name)
     missing = words("measured.not")
-    text = len(model.source.text.encode())
-    card = None if scene is None else scene.card
-    own = None
+
+    def speed(times: float | None) -> str:
+        return missing if times is None else words("measured.times", factor=factor(times))
+
+    own = browser = None
     if scene is not None and scene.scenarios:
         own = next((row.realtime for row in scene.scenarios[0].rows if row.own), None)
-    speed = words("measured.times", factor=factor(own)) if own is not None else missing
-    if card is None:
-        return (
-            (words("measured.possible"), missing),
-            (words("measured.touched"), missing),
-            (words("measured.mjcf_file"), size(text)),
-            (words("measured.native"), speed),
-            (words("measured.browser"), missing),
-        )
-    browser = missing
-    if card.browser is not None:
-        browser = words("measured.times", factor=factor(card.browser))
-    return (
-        (words("measured.possible"), str(card.possible)),
-        (words("measured.touched"), str(card.touched)),
-        (words("measured.mjcf"), size(card.mjcf)),
-        (words("measured.mjb"), size(card.mjb)),
-        (words("measured.native"), speed),
-        (words("measured.browser"), browser),
-    )
+    text = size(len(model.source.text.encode()))
+    made = {"possible": missing, "touched": missing, "mjcf_file": text}
+    if scene is not None and (card := scene.card) is not None:
+        browser = card.browser
+        made = {"possible": str(card.possible), "touched": str(card.touched)}
+        made |= {"mjcf": size(card.mjcf), "mjb": size(card.mjb)}
+    told = made | {"native": speed(own), "browser": speed(browser)}
+    return tuple((words(f"measured.{name}"), said) for name, said in told.items())
 
 
 # --- the diet
@@ -161,17 +146,7 @@ def _finding(words: Strings, one: Finding) -> FindingView:
     label = escape(one.label)
     if one.difference:
         label += Markup(" ({})").format(whole(power(one.difference, 2)))
-    return FindingView(
-        kind=one.kind,
-        message=sentence(one.message),
-        label=label,
-        saving=_saving(words, one.saving),
-        scenarios=", ".join(one.scenarios),
-        proof=one.proof,
-        kept=one.kept,
-        doubt=one.doubt,
-        places=tuple(f"{at.path}:{at.line}" for at in one.places),
-    )
+    return FindingView(one, sentence(one.message), label, _saving(words, one.saving))
 
 
 def _saving(words: Strings, saving: Saving) -> str:

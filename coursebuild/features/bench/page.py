@@ -119,36 +119,29 @@ def _shown(page: PageContext, block: Bench) -> ShownBench:
 
 def _view(page: PageContext, block: Bench) -> BenchView:
     words, shown = page.renderer.words, _shown(page, block)
-    command = again("bench", block.model, "--record")
+    nothing = BenchView(block.model, shown.href, again("bench", block.model, "--record"))
     if shown.report is None or shown.machine is None:
-        return BenchView(block.model, shown.href, command)
+        return nothing
+    made = where(words, shown.machine)
     if isinstance(shown.report, SweepReport):
         swept = sweep_view(words, shown.report)
-        return BenchView(
-            block.model,
-            shown.href,
-            command,
-            title=swept.title,
-            notes=swept.notes,
-            folded=swept.table,
-            where=where(words, shown.machine),
+        return replace(
+            nothing, title=swept.title, notes=swept.notes, folded=swept.table, where=made
         )
     view = scenario_view(words, shown.report, "")
     grids = {"stable": view.stable, "orders": view.orders}
     tables = [grid for name in block.shows if (grid := grids.get(name)) is not None]
     alone = block.shows == ("table",)
     settings = bool({"plot", "table"}.intersection(block.shows))
-    return BenchView(
-        model=block.model,
-        href=shown.href,
-        command=command,
+    return replace(
+        nothing,
         title=view.title,
         verdict=view.verdict if settings else "",
         notes=view.notes if settings else (),
         tables=(view.settings,) if alone else tuple(tables),
         folded=view.settings if "table" in block.shows and not alone else None,
         about=view.about,
-        where=where(words, shown.machine),
+        where=made,
     )
 
 

@@ -115,7 +115,7 @@ def _same_bits(base: Any, changed: Any, index: IndexMap, scene: Scene) -> bool:
     for step, command in steps_of(scene):
         if command:
             data.ctrl[:] = command
-            other.ctrl[:] = data.ctrl[index.ctrl]
+            other.ctrl[:] = data.ctrl[index["nu"]]
         advance(base, data)
         advance(changed, other)
         if any(mine.tobytes() != his.tobytes() for mine, his in _states(data, other, index)):
@@ -128,16 +128,16 @@ def _same_bits(base: Any, changed: Any, index: IndexMap, scene: Scene) -> bool:
 def _states(data: Any, other: Any, index: IndexMap) -> tuple[tuple[Any, Any], ...]:
     """What is left of the base's state and sensors, beside that of the changed model."""
     return (
-        (data.qpos[index.qpos], other.qpos),
-        (data.qvel[index.dof], other.qvel),
-        (data.act[index.act], other.act),
-        (data.sensordata[index.sensor], other.sensordata),
+        (data.qpos[index["nq"]], other.qpos),
+        (data.qvel[index["nv"]], other.qvel),
+        (data.act[index["na"]], other.act),
+        (data.sensordata[index["nsensordata"]], other.sensordata),
     )
 
 
 def _equal_contacts(base: Any, data: Any, changed: Any, other: Any, index: IndexMap) -> bool:
     """Whether the geoms that are left touch alike, with the same forces."""
-    left = {int(whole): i for i, whole in enumerate(index.geom)}
+    left = {int(whole): i for i, whole in enumerate(index["ngeom"])}
     everything = {i: i for i in range(changed.ngeom)}
     return _contacts(base, data, left) == _contacts(changed, other, everything)
 
@@ -164,7 +164,7 @@ def _shots(base: Any, changed: Any, index: IndexMap, scene: Scene, *, whole: boo
     for step, command in steps_of(scene):
         if command:
             data.ctrl[:] = command
-            other.ctrl[:] = data.ctrl[index.ctrl]
+            other.ctrl[:] = data.ctrl[index["nu"]]
         at = 0 if whole else step % every
         if at == 0 and not whole:
             transfer(base, data, index, changed, other)

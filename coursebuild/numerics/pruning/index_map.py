@@ -5,6 +5,7 @@ Entry points: `IndexMap`, `index_map`, `transfer`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 import mujoco
@@ -15,8 +16,25 @@ from numpy.typing import NDArray
 from coursebuild.numerics.engine import STATE, full_state
 
 Places: TypeAlias = NDArray[np.int64]
+IndexMap: TypeAlias = Mapping[str, Places]
+"""For each entry of the changed model the place that it has in the whole one, by the field with
+their number, such as `nq`."""
 
-_SIZES = ("nq", "nv", "na", "nu", "nbody", "nmocap", "ngeom", "nsensordata", "nuserdata", "neq")
+_WIDTHS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
+"""Positions of a joint that has several."""
+_STATE = {
+    "qpos": "nq",
+    "qvel": "nv",
+    "act": "na",
+    "ctrl": "nu",
+    "qacc_warmstart": "nv",
+    "qfrc_applied": "nv",
+    "xfrc_applied": "nbody",
+    "mocap_pos": "nmocap",
+    "mocap_quat": "nmocap",
+}
+"""Parts of a state, and what they are numbered by."""
+_KEYS = {"key_qpos": "nq", "key_qvel": "nv", "key_act": "na", "key_ctrl": "nu"}
 
 
 class Gone(Struct, frozen=True):
@@ -28,25 +46,6 @@ class Gone(Struct, frozen=True):
     sensors: frozenset[int] = frozenset()
     actuators: frozenset[int] = frozenset()
 
-    def __bool__(self) -> bool:
-        return bool(self.bodies or self.geoms or self.sensors or self.actuators)
-
-
-class IndexMap(Struct, frozen=True, eq=False):
-    """For each entry of the changed model, the place that it has in the whole one."""
-
-    qpos: Places
-    dof: Places
-    act: Places
-    ctrl: Places
-    body: Places
-    mocap: Places
-    geom: Places
-    sensor: Places
-    """Of `sensordata`."""
-    equal: bool
-    """Whether nothing of these is gone."""
-
 
 def index_map(model: Any, gone: Gone) -> IndexMap:
     """What is left of a model."""
@@ -54,27 +53,26 @@ def index_map(model: Any, gone: Gone) -> IndexMap:
     for number in range(1, model.nbody):  # parents come first
         if int(model.body_parentid[number]) in bodies:
             bodies.add(number)
-    body = np.array([b for b in range(model.nbody) if b not in bodies], dtype=np.int64)
+    body = _left(model.nbody, bodies)
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
-    ctrl = [i for i in range(model.nu) if i not in gone.actuators]
-    sensors = [i for i in range(model.nsensor) if i not in gone.sensors]
-    geoms = np.flatnonzero(np.isin(model.geom_bodyid, body))
-    sizes = [_POSITIONS.get(int(kind), 1) for kind in model.jnt_type[joints]]
-    return IndexMap(
-        qpos=_ranges(model.jnt_qposadr[joints], sizes),
-        dof=np.flatnonzero(np.isin(model.dof_bodyid, body)),
-        act=_ranges(model.actuator_actadr[ctrl], model.actuator_actnum[ctrl]),
-        ctrl=np.array(ctrl, dtype=np.int64),
-        body=body,
-        mocap=mocap[mocap >= 0].astype(np.int64),
-        geom=np.array([g for g in geoms.tolist() if g not in gone.geoms], dtype=np.int64),
-        sensor=_ranges(model.sensor_adr[sensors], model.sensor_dim[sensors]),
-        equal=not gone,
-    )
+    ctrl, sensors = _left(model.nu, gone.actuators), _left(model.nsensor, gone.sensors)
+    geoms = _left(model.ngeom, gone.geoms)
+    widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
+    return {
+        "nq": _ranges(model.jnt_qposadr[joints], widths),
+        "nv": np.flatnonzero(np.isin(model.dof_bodyid, body)),
+        "na": _ranges(model.actuator_actadr[ctrl], model.actuator_actnum[ctrl]),
+        "nu": ctrl,
+        "nbody": body,
+        "nmocap": mocap[mocap >= 0].astype(np.int64),
+        "ngeom": geoms[np.isin(model.geom_bodyid[geoms], body)],
+        "nsensordata": _ranges(model.sensor_adr[sensors], model.sensor_dim[sensors]),
+    }
 
 
-_POSITIONS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
+def _left(count: int, gone: set[int] | frozenset[int]) -> Places:
+    return np.array([number for number in range(count) if number not in gone], dtype=np.int64)
 
 
 def _ranges(starts: Any, counts: Any) -> Places:
@@ -89,27 +87,11 @@ def _ranges(starts: Any, counts: Any) -> Places:
 
 def fits(index: IndexMap, whole: Any, model: Any) -> bool:
     """Whether a changed model has just what should be left of the whole one, in keyframes too."""
-    left = {
-        "nq": index.qpos,
-        "nv": index.dof,
-        "na": index.act,
-        "nu": index.ctrl,
-        "nbody": index.body,
-        "nmocap": index.mocap,
-        "ngeom": index.geom,
-        "nsensordata": index.sensor,
-    }
-    if any(getattr(model, size) != len(places) for size, places in left.items()):
+    if any(getattr(model, size) != len(places) for size, places in index.items()):
         return False
-    keys = {
-        "key_qpos": index.qpos,
-        "key_qvel": index.dof,
-        "key_act": index.act,
-        "key_ctrl": index.ctrl,
-    }
     return model.nkey != whole.nkey or all(
-        np.array_equal(getattr(model, name), getattr(whole, name)[:, places])
-        for name, places in keys.items()
+        np.array_equal(getattr(model, name), getattr(whole, name)[:, index[size]])
+        for name, size in _KEYS.items()
     )
 
 
@@ -119,9 +101,8 @@ def transfer(model: Any, data: Any, index: IndexMap, other: Any, into: Any) -> N
     Raises:
         ValueError: a part of it (of a plugin, of a delay) cannot be told apart.
     """
-    same = all(getattr(model, size) == getattr(other, size) for size in _SIZES)
-    sizes = {mujoco.mj_stateSize(one, STATE) for one in (model, other)}
-    if index.equal and same and len(sizes) == 1:
+    same = all(getattr(model, size) == getattr(other, size) for size in (*index, "neq"))
+    if same and mujoco.mj_stateSize(model, STATE) == mujoco.mj_stateSize(other, STATE):
         mujoco.mj_setState(other, into, full_state(model, data), STATE)
         return
     delays = mujoco.mj_stateSize(other, int(mujoco.mjtState.mjSTATE_HISTORY))
@@ -130,14 +111,7 @@ def transfer(model: Any, data: Any, index: IndexMap, other: Any, into: Any) -> N
     if other.neq != model.neq:
         raise ValueError("it has other equalities")
     into.time = data.time
-    into.qpos[:] = data.qpos[index.qpos]
-    into.qvel[:] = data.qvel[index.dof]
-    into.act[:] = data.act[index.act]
-    into.ctrl[:] = data.ctrl[index.ctrl]
-    into.qacc_warmstart[:] = data.qacc_warmstart[index.dof]
-    into.qfrc_applied[:] = data.qfrc_applied[index.dof]
-    into.xfrc_applied[:] = data.xfrc_applied[index.body]
-    into.mocap_pos[:] = data.mocap_pos[index.mocap]
-    into.mocap_quat[:] = data.mocap_quat[index.mocap]
+    for name, size in _STATE.items():
+        getattr(into, name)[:] = getattr(data, name)[index[size]]
     into.eq_active[:] = data.eq_active
     into.userdata[:] = data.userdata

@@ -48,12 +48,11 @@ from coursebuild.numerics.reports.diet import (
     Saving,
     TextEdit,
     Tried,
+    name_list,
 )
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock
 
-NAMES = 6
-"""Names that a message lists."""
 LEAST = 1.05
 """What only runs speak for must save so much time to be worth a word."""
 _OWN_FIELDS = {
@@ -86,8 +85,8 @@ class Order(Struct, frozen=True, eq=False):
     """Reasons, by the finding: `KIND`, or `KIND NAME`."""
     locked: Mapping[str, str]
     """Files that are not to be changed, and why."""
-    numbered: frozenset[str]
-    """What scenarios give by number: `qpos`, `qvel`, `controls`."""
+    has_commands: bool
+    """Whether scenarios give commands, by the number of their actuator."""
     clock: Clock | None
     """`None`: nothing is timed."""
     quick: bool
@@ -291,7 +290,7 @@ class _Surveyor:
         reader = self.order.readers.noticing((), {items[0].view} - {""}, change)
         finding = Finding(
             kind=kind,
-            message=message_of(kind, _listed(items), len(items)),
+            message=message_of(kind, name_list([item.name for item in items]), len(items)),
             places=tuple(_place(item) for item in items if item.element is not None),
             label=label,
             difference=apart,
@@ -313,7 +312,7 @@ class _Surveyor:
             return "it is kept"
         if finding.label != PROVED:
             return f"only what is {PROVED} is changed"
-        if finding.kind == "actuator-idle" and "controls" in self.order.numbered:
+        if finding.kind == "actuator-idle" and self.order.has_commands:
             return "scenarios give commands by number: their rows would have to be shortened"
         locked = (self.order.locked.get(edit.path, "") for edit in finding.edits)
         return next(filter(None, locked), "")
@@ -321,7 +320,7 @@ class _Surveyor:
     def _note(self, items: Sequence[Item], apart: float | None, why: str) -> None:
         finite = apart if apart is not None and math.isfinite(apart) else None
         kind, names = items[0].kind, tuple(item.name for item in items)
-        message = message_of(kind, _listed(items), len(items))
+        message = message_of(kind, name_list([item.name for item in items]), len(items))
         self.tried.append(Tried(kind, message, names, finite, why))
 
     def _texts(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
@@ -364,12 +363,6 @@ class _Surveyor:
         if (best.saving.time or 0.0) > (slim.time or 0.0):
             return best.saving, best.difference
         return slim, result.difference
-
-
-def _listed(items: Sequence[Item]) -> str:
-    more = len(items) - NAMES
-    shown = ", ".join(item.name for item in items[:NAMES])
-    return shown + (f" and {more} more" if more > 0 else "")
 
 
 def _place(item: Item) -> ModelPlace:

@@ -32,6 +32,15 @@ from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock, Timing, scenario_job, timed
 
 _T = TypeVar("_T")
+_KEY_NUMBERS = {
+    "qpos": ("nq", 1),
+    "qvel": ("nv", 1),
+    "act": ("na", 1),
+    "ctrl": ("nu", 1),
+    "mpos": ("nmocap", 3),
+    "mquat": ("nmocap", 4),
+}
+"""Of each attribute of a keyframe, what it has numbers for, and how many for each."""
 _DRAWS = 2
 """Random states in which two models are compared."""
 
@@ -158,7 +167,7 @@ class PruningTrials:
             return None
         jobs = (
             scenario_job(whole, begins, self.scenes[0].own),
-            scenario_job(trial.model, others, self.scenes[0].own, index.ctrl.tolist()),
+            scenario_job(trial.model, others, self.scenes[0].own, index["nu"].tolist()),
         )
         with silent():
             found, own = timed(jobs, 1, self.clock, quick=self.quick)
@@ -198,21 +207,10 @@ def _keyframes(text: ModelText, gone: Gone, removed: Collection[Element]) -> Ite
     """Keyframes list a number for every coordinate: those of what is gone go too."""
     if not (gone.bodies or gone.actuators):
         return
-    model, left = text.model, index_map(text.model, gone)
-
-    def lost(size: int, kept: Any, width: int = 1) -> frozenset[int]:
-        things = frozenset(range(size)) - frozenset(kept.tolist())
-        return frozenset(width * thing + k for thing in things for k in range(width))
-
-    places = {
-        "qpos": lost(model.nq, left.qpos),
-        "qvel": lost(model.nv, left.dof),
-        "act": lost(model.na, left.act),
-        "ctrl": lost(model.nu, left.ctrl),
-        "mpos": lost(model.nmocap, left.mocap, 3),
-        "mquat": lost(model.nmocap, left.mocap, 4),
-    }
-    for key in text.elements:
-        if key.tag == "key" and key not in removed:
-            for name, at in places.items():
-                yield from drop_numbers(key, name, at)
+    left = index_map(text.model, gone)
+    for name, (size, width) in _KEY_NUMBERS.items():
+        lost = set(range(getattr(text.model, size))) - set(left[size].tolist())
+        places = {width * thing + k for thing in lost for k in range(width)}
+        for key in text.elements:
+            if key.tag == "key" and key not in removed:
+                yield from drop_numbers(key, name, places)

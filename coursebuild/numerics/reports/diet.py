@@ -5,6 +5,8 @@ Entry point: `DietReport`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Record
 
@@ -12,6 +14,16 @@ PROVED = "proved"
 """Without it every bit is the same in every state, for a reason that is stated."""
 SAME = "the same in what was run"
 """Without it scenarios, scripts and labs gave the same; nothing says that it must be so."""
+
+
+_NAMES = 6
+"""That a message lists."""
+
+
+def name_list(names: Sequence[str]) -> str:
+    """Names in a message, and how many more there are."""
+    more = len(names) - _NAMES
+    return ", ".join(names[:_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 class ModelPlace(Record, frozen=True):

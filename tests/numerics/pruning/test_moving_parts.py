@@ -34,7 +34,7 @@ def test_an_actuator_with_a_state_of_its_own_stays() -> None:
 
 def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> None:
     rest = '<actuator><motor name="push" joint="pivot"/></actuator>'
-    model, survey = tried(scene(rest=rest), numbered=frozenset({"controls"}))
+    model, survey = tried(scene(rest=rest), has_commands=True)
     finding = found(survey)["actuator-idle"]
     assert finding.counts and not finding.fixable
     assert finding.unfixed.startswith("scenarios give commands by number")

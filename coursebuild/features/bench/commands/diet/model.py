@@ -20,7 +20,7 @@ import mujoco
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.write import write_atomic
-from coursebuild.core.model import Course, Declarations, MjcfModel
+from coursebuild.core.model import Course, MjcfModel
 from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.text.diagnostics import diagnose
@@ -92,7 +92,7 @@ class DietModel:
                 self.readers,
                 {key: one.reason for key, one in self.keeps.items()},
                 self.locked,
-                _numbered(declared),
+                declared is not None and any(one.controls for one in declared.scenarios),
                 time.thread_time_ns,
                 quick,
                 tell,
@@ -174,16 +174,6 @@ class DietModel:
         text = (self.read(self.path) or b"").decode("utf-8")
         model = MjcfModel(self.scene.name, Source(self.path, text))
         return scene_digest(self.root, model, self.scene.declared)
-
-
-def _numbered(declared: Declarations | None) -> frozenset[str]:
-    """What scenarios give by number."""
-    found: set[str] = set()
-    for one in () if declared is None else declared.scenarios:
-        found |= {"qpos"} if one.qpos else set()
-        found |= {"qvel"} if one.qvel else set()
-        found |= {"controls"} if one.controls else set()
-    return frozenset(found)
 
 
 def _locked(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:

@@ -10,12 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coursebuild.numerics.reports.diet import DietReport, Finding, Saving, TextEdit
+from coursebuild.numerics.reports.diet import DietReport, Finding, Saving, TextEdit, name_list
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 from coursebuild.report.values import plain, plural
 
-_NAMES = 6
-"""Names that a message lists."""
 _EDITS = 6
 """Changes that are shown of a finding."""
 _LINES = 6
@@ -40,9 +38,12 @@ def diet_text(reports: Sequence[DietReport], style: Style) -> str:
 
 
 def _model(report: DietReport, style: Style) -> str:
-    lines = [style.paint(visible(report.model), BOLD) + _quick(report, style)]
+    head = style.paint(visible(report.model), BOLD)
+    if report.quick:
+        head += "  " + style.paint("quick: short runs, rough times", YELLOW)
+    lines = [head]
     tried = [one.name for one in report.scenarios if one.status == "ok"]
-    lines += style.wrap(f"in {_listed(tried)}" if tried else "in no scenario", "  ")
+    lines += style.wrap(f"in {name_list(tried)}" if tried else "in no scenario", "  ")
     for one in report.scenarios:
         if one.status != "ok":
             why = "; ".join(one.reasons)
@@ -56,10 +57,6 @@ def _model(report: DietReport, style: Style) -> str:
         lines += ["", *style.wrap(told, "  ", RED)]
     lines += ["", *_summary(report, style)]
     return "\n".join(lines) + "\n"
-
-
-def _quick(report: DietReport, style: Style) -> str:
-    return "  " + style.paint("quick: short runs, rough times", YELLOW) if report.quick else ""
 
 
 def _summary(report: DietReport, style: Style) -> list[str]:
@@ -82,7 +79,7 @@ def _summary(report: DietReport, style: Style) -> list[str]:
     for one in report.tried:
         by_reason.setdefault(one.reason, []).append(one.kind)
     for reason, kinds in by_reason.items():
-        shown = _listed(list(dict.fromkeys(kinds)))
+        shown = name_list(list(dict.fromkeys(kinds)))
         told = f"not found, because {reason}" if reason else "tried and needed"
         lines += style.wrap(f"{told}: {shown}", "  ", FAINT)
     return lines
@@ -144,9 +141,3 @@ def _saving(saving: Saving) -> str:
             fewer = "fewer" if count > 0 else "more"
             parts.append(f"{abs(count):,} bytes of {where} {fewer}")
     return ", ".join(parts) or "saves nothing that is measured"
-
-
-def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:_NAMES])
-    more = len(names) - _NAMES
-    return shown + (f" and {more} more" if more > 0 else "")
