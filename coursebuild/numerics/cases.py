@@ -39,6 +39,7 @@ from coursebuild.numerics.measure import (
     reference_motion,
 )
 from coursebuild.numerics.problem import (
+    ROUNDING,
     STANDARD,
     Array,
     Integrator,
@@ -61,9 +62,6 @@ from coursebuild.numerics.scene import Scene, SceneError
 from coursebuild.numerics.stability import boundaries
 from coursebuild.numerics.timing import Clock, scenario_job, timed
 from mjcourse.spatial import quat_conj, quat_mul
-
-_ROUNDING = 1e-14
-"""No motion in double precision is known better, in rad and relative to sizes of 1."""
 
 
 class DisagreementError(ArithmeticError):
@@ -176,7 +174,7 @@ def floor(problem: Problem) -> Sizes:
         if not found <= most:
             message = f"the references of `{problem.name}` differ by {found:.2g} in {part}"
             raise DisagreementError(f"{message}, where {most:.0e} is said")
-    return Sizes(*(max(_ROUNDING, one) for one in (gap.position, gap.attitude, gap.velocity)))
+    return gap.at_least(ROUNDING)
 
 
 def agreement(problem: Problem) -> Sizes:

@@ -15,6 +15,7 @@ from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
@@ -126,6 +127,10 @@ class Sizes(Struct, frozen=True):
     velocity: float
     """m/s or rad/s."""
 
+    def at_least(self, other: Sizes) -> Sizes:
+        """Of each part the larger one."""
+        return Sizes(*map(max, astuple(self), astuple(other)))
+
     @property
     def place(self) -> float:
         """Of positions and attitudes together."""
@@ -135,6 +140,10 @@ class Sizes(Struct, frozen=True):
     def largest(self) -> float:
         """Of all of them."""
         return max(self.position, self.attitude, self.velocity)
+
+
+ROUNDING = Sizes(1e-14, 1e-14, 1e-14)
+"""No motion in double precision is known better, in rad and relative to sizes of 1."""
 
 
 class Solution(Protocol):

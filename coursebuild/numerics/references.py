@@ -53,7 +53,7 @@ from coursebuild.numerics.integrate import (
 from coursebuild.numerics.measure import energy_drift, energy_scale, errors, momentum_drift
 from coursebuild.numerics.observe import Sticks, sticking, visible_error
 from coursebuild.numerics.pilot import Pilot, apart
-from coursebuild.numerics.problem import Array, Integrator, Motion, Setup, Sizes
+from coursebuild.numerics.problem import ROUNDING, Array, Integrator, Motion, Setup, Sizes
 from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
 from coursebuild.numerics.settings import CONES
@@ -71,9 +71,6 @@ CONSERVED = 1e-8
 """Relative change, over the reference, of what is called conserved."""
 _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
-_ROUNDING = 1e-14
-"""No reference in double precision is known better, in rad and relative to sizes of 1."""
-_EXACT = Sizes(_ROUNDING, _ROUNDING, _ROUNDING)
 _ELSEWHERE = "the engine in small steps tends elsewhere"
 
 
@@ -130,7 +127,7 @@ def know(model: Any, first: Pilot, *, quick: bool = False) -> Known:
         return found
     motion = _exact_motion(model, first, exact, found)
     return _closed(
-        model, found, motion, exact.span.path, _EXACT, f"`{exact.span.path}`", exact.span
+        model, found, motion, exact.span.path, ROUNDING, f"`{exact.span.path}`", exact.span
     )
 
 
@@ -217,7 +214,7 @@ def _compared(
 ) -> Known:
     motion = motion_of(model, states)
     gap = errors(motion, motion_of(model, other)).largest
-    floor = Sizes(*(max(_ROUNDING, one) for one in (gap.position, gap.attitude, gap.velocity)))
+    floor = gap.at_least(ROUNDING)
     return Known(kind, source, states, other, motion, floor, second, gap.largest, horizon)
 
 
@@ -235,11 +232,7 @@ def _closed(
             message = f"{what} is not this scene's motion"
             help = f"the two are {away:.2g} apart (rad, or relative to the extent)"
             raise SceneError(message, place, help)
-        known = Sizes(
-            max(least.position, gap.position),
-            max(least.attitude, gap.attitude),
-            max(least.velocity, gap.velocity),
-        )
+        known = least.at_least(gap)
     return replace(
         second,
         kind="closed",
