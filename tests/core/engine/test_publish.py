@@ -111,7 +111,7 @@ class TestPublish:
         publish(root, root / "public", site("two"))
         assert tree(root / "public") == as_tree(site("two"))
 
-    @pytest.mark.parametrize("call", ["fchmod", "mkdir", "fchmod"])
+    @pytest.mark.parametrize("call", ["fchmod", "mkdir"])
     def test_full_disk(self, root: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
         publish(root, root / "public", site("one"))
         really = getattr(os, call)

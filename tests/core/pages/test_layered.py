@@ -33,19 +33,6 @@ def reach(nodes: list[str], edges: list[Edge] | tuple[Edge, ...]) -> set[Edge]:
     return found
 
 
-def crossings(layout: Layout) -> int:
-    layer = {node.id: node.layer for node in layout.nodes}
-    steps = [
-        (layer[edge.start] + level, x, y)
-        for edge in layout.edges
-        for level, (x, y) in enumerate(pairwise(edge.xs))
-    ]
-    return sum(
-        one[0] == two[0] and (one[1] - two[1]) * (one[2] - two[2]) < 0
-        for one, two in combinations(steps, 2)
-    )
-
-
 @settings(max_examples=50)
 @given(graphs())
 def test_every_arrow_leads_down_and_meets_its_nodes(graph: Graph) -> None:

@@ -1,11 +1,10 @@
-"""Keys of results, what counts as a change, and the words for it."""
+"""What counts as a change, and the words for it."""
 
 from __future__ import annotations
 
 import pytest
 
 from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
-from coursebuild.core.model.results import Trace
 from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
@@ -17,9 +16,6 @@ from coursebuild.core.run.dependencies import (
 
 AROUND = (("Python", "CPython 3.11.7"), ("platform", "linux x86_64"))
 INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), AROUND)
-Places = tuple[tuple[str, str], ...]
-PLACES: Places = (("course", "/home/me/course"), ("library", "/opt/tool"), ("home", "/home/me"))
-NOTHING = Trace((), (), (), (), "")
 
 
 def test_changes_of_inputs() -> None:

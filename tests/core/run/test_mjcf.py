@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,10 +18,10 @@ from coursebuild.core.run.mjcf import (
     model_files,
     readable_error,
 )
+from support.model_files import TETRAHEDRON, png
 
 pytestmark = pytest.mark.site
 
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 ARM = """<mujoco model="arm">
   <option timestep="0.001" integrator="implicitfast"/>
   <worldbody>
@@ -34,18 +33,6 @@ ARM = """<mujoco model="arm">
   <keyframe><key name="home"/><key/></keyframe>
 </mujoco>
 """.replace('type="hinge"', 'name="h" type="hinge" pos="1 0 0"').replace('<joint type="ball"/>', "")
-
-
-def png() -> bytes:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return (
-            len(data).to_bytes(4, "big") + kind + data + zlib.crc32(kind + data).to_bytes(4, "big")
-        )
-
-    header = (2).to_bytes(4, "big") * 2 + b"\x08\x02\x00\x00\x00"
-    rows = (b"\x00" + b"\xff\x00\x00" * 2) * 2
-    parts = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + parts
 
 
 def names(folder: Path) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,22 +11,21 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf
 from coursebuild.core.run.model_memory import compile_kept
+from support.model_files import TETRAHEDRON
 
 pytestmark = pytest.mark.site
 
-MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 MAIN = """<mujoco><compiler meshdir="assets"/><include file="part.xml"/>
 <asset><mesh name="m" file="m.obj"/></asset>
 <worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>"""
 PART = '<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>'
-Compile = Callable[..., CompileResult]
 
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     root = tmp_path / "course"
     (root / "models/assets").mkdir(parents=True)
-    (root / "models/assets/m.obj").write_text(MESH)
+    (root / "models/assets/m.obj").write_text(TETRAHEDRON)
     (root / "models/part.xml").write_text(PART)
     (root / "models/main.xml").write_text(MAIN)
     return root
@@ -104,7 +102,7 @@ def test_an_error_is_remembered_until_the_missing_file_is_there(
     compiled.clear()
     assert run(root) == first
     assert compiled == []
-    (root / "models/assets/m.obj").write_text(MESH)
+    (root / "models/assets/m.obj").write_text(TETRAHEDRON)
     whole = run(root)
     assert whole["main"].error == ""
     assert compiled == ["main"]

@@ -9,36 +9,21 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import struct
 import subprocess
 import sys
-import zlib
 from pathlib import Path
 
 import pytest
 
 from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.runner import ScriptServer, clean_environment
+from support.model_files import TETRAHEDRON, png
 
 pytestmark = pytest.mark.site
 
 
-def png(level: int) -> bytes:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return (
-            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        )
-
-    rows = b"".join(
-        b"\0" + bytes((level, y, x)[i] for x in range(4) for i in range(3)) for y in range(4)
-    )
-    header = struct.pack(">IIBBBBB", 4, 4, 8, 2, 0, 0, 0)
-    parts = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + parts
-
-
-def obj(size: float) -> bytes:
-    return f"v 0 0 0\nv {size} 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n".encode()
+def obj(size: int) -> bytes:
+    return TETRAHEDRON.replace("1 0 0", f"{size} 0 0").encode()
 
 
 def mjcf(inside: str) -> bytes:

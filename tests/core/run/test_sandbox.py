@@ -330,14 +330,6 @@ class TestRefusals:
         monkeypatch.setenv("PATH", str(folder))
         return folder
 
-    def test_without_bubblewrap(self, programs: Path, root: Path) -> None:
-        with pytest.raises(EffectError) as refused:
-            find_sandbox(root)
-        assert refused.value.message == (
-            "`--sandbox` needs Bubblewrap, and there is no program `bwrap`"
-        )
-        assert refused.value.help == "install it, as by `apt-get install bubblewrap`"
-
     def test_without_user_namespaces(self, programs: Path, root: Path) -> None:
         shell, said = shutil.which("sh", path="/bin:/usr/bin"), "setting up uid map: not permitted"
         (programs / "bwrap").write_text(f"#!{shell}\necho 'bwrap: {said}' >&2\nexit 1\n")

@@ -1,0 +1,17 @@
+"""Files that models are made of."""
+
+from __future__ import annotations
+
+import io
+
+from PIL import Image
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+
+
+def png(level: int = 0) -> bytes:
+    """A picture, another for each level."""
+    pixels = bytes(value for y in range(4) for x in range(4) for value in (level, y, x))
+    data = io.BytesIO()
+    Image.frombytes("RGB", (4, 4), pixels).save(data, "PNG")
+    return data.getvalue()
