@@ -4,7 +4,7 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { deflateRawSync } from 'node:zlib'
 import { readError } from '../js/lab/page/editor.js'
-import { fillScript, pythonLiteral } from '../js/lab/page/export.js'
+import { fillScript } from '../js/lab/page/export.js'
 import { placeOf } from '../js/lab/page/notices.js'
 import {
   digitsOfStep,
@@ -69,21 +69,6 @@ test('a slider shows as many digits as its steps need', () => {
   ]) {
     assert.equal(digitsOfStep(step), digits, String(step))
   }
-})
-
-test('values become Python literals', () => {
-  const cases = [
-    [1, '1'],
-    [0.1, '0.1'],
-    [-0, '-0.0'],
-    [1e300, '1e+300'],
-    [NaN, 'float("nan")'],
-    [-Infinity, 'float("-inf")'],
-    [true, 'True'],
-    [null, 'None'],
-    ['a "b"\n', '"a \\"b\\"\\n"'],
-  ]
-  for (const [value, text] of cases) assert.equal(pythonLiteral(value), text)
 })
 
 test('a script takes the values of the controls, and dollars stay dollars', () => {

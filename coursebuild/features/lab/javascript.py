@@ -148,11 +148,6 @@ def dotted_name(node: Node) -> tuple[str, ...]:
     return tuple(map(text_of, dotted_names(node)))
 
 
-def is_name(node: Node, name: str) -> bool:
-    """Whether a node is this variable."""
-    return node.type == "identifier" and text_of(node) == name
-
-
 def string_value(node: Node) -> str:
     """What a string holds."""
     return "".join(_fragment(child) for child in node.named_children)

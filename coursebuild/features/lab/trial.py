@@ -171,7 +171,7 @@ class _Attempt(Struct, frozen=True):
             return self._failed(module, began), [wrong]
         reply, parity = findings.reply, findings.parity
         found = [*findings.failures]
-        offer = LabExport(None) if found else self._export(reply, parity)
+        offer = LabExport(None) if found else self._export(reply)
         own = () if lab.xml is not None else (self.model.path,)
         self.context.memory.note_trial(
             inputs,
@@ -296,11 +296,11 @@ class _Attempt(Struct, frozen=True):
             return steps
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
 
-    def _export(self, trial: TrialReply, parity: Parity | None) -> LabExport:
+    def _export(self, trial: TrialReply) -> LabExport:
         """The script that does what the lab does."""
         if trial.main is None or self.lab.kind == MJCF:
             return LabExport(None)
-        return exported(self.context, self.engines.native, self.trial, self.lab, trial.main, parity)
+        return exported(self.context, self.engines.native, self.trial, self.lab, trial.main)
 
     def _version(self, trial: TrialReply) -> Iterator[Diagnostic]:
         if trial.version != engine_version():

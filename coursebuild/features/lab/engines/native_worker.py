@@ -153,7 +153,6 @@ def _script(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
 def _loaded(path: str, text: str) -> Any:
     module = types.ModuleType("lab_script")
     module.__file__ = path
-    sys.modules[module.__name__] = module  # dataclasses look for it there
     exec(compile(text, path, "exec"), module.__dict__)
     return module
 
@@ -190,7 +189,7 @@ def _shown(module: Any, *state: Any) -> list[list[Any]]:
 
 def _tried(module: Any, button: str | None) -> None:
     """A few steps, after a button or with other values."""
-    state = [*module.load(), *([module.Ctx()] if hasattr(module, "Ctx") else [])]
+    state = module.load()
     module.start(*state)
     if button is not None:
         getattr(module, button)(*state)

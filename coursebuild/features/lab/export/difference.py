@@ -35,24 +35,22 @@ def recorded(run: dict[str, Any], horizon: int) -> dict[str, Any] | None:
     }
 
 
-def difference(main: MainRun, run: dict[str, Any], *, exact: bool, rtol: float) -> str | None:
+def difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
     """How a script's run differs from the main run of the trial, in words; `None` if it does not.
 
-    `exact`: the states must be the same to the last bit; else the one that was recorded may be
-    apart by `rtol`, relative to its largest number, which counts as at least 1.
+    The state that was recorded may be apart by `rtol`, relative to its largest number, which counts
+    as at least 1. Where the end is the same to the last bit, its readouts are compared, too.
     """
     kept = main["recorded"]
     assert kept is not None, "where nothing was recorded, no script is offered"
     if run["steps"] != kept["steps"]:
         return f"it makes {run['steps']} steps, and the lab {kept['steps']}"
-    if exact and run["last"] != kept["last"]:
-        return "its state at the end is not that of the lab"
     apart = _apart(run["state"], kept["state"])
-    if not exact and not apart <= rtol:
+    if not apart <= rtol:
         return f"its state after {kept['near']} steps is apart from the lab's by {apart:.1e}"
     first, last = main["pictures"][0], main["pictures"][-1]
     found = _readouts(first["readouts"], run["start"], "start")
-    if found is None and exact:
+    if found is None and run["last"] == kept["last"]:
         found = _readouts(last["readouts"], run["end"], "end")
     return found
 

@@ -1,46 +1,24 @@
-"""JavaScript expressions of lab code as Python.
+"""Expressions of lab code, which is JavaScript, as Python.
 
-Entry point: `Expressions.value(node)`. Calls are translated by a subclass, see `calls`.
-
-A Python expression made here has the same value as the one in JavaScript, as long as no error is
-raised. Where the two languages differ for numbers a helper takes over (see `helpers`), and
-where they differ otherwise the expression is refused.
+Entry points: `Expressions`, `engine_field`; see `translate`.
 """
 
 from __future__ import annotations
 
-import math
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+import ast
+import functools
+import keyword
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, Literal, TypeAlias
 
-from msgspec import Struct
+import numpy as np
 from tree_sitter import Node
 
-from coursebuild.features.lab.export.engine_names import ArrayField, Scalar, engine_field
-from coursebuild.features.lab.export.values import (
-    AND,
-    ARRAYS,
-    ATOM,
-    BITS,
-    COMPARISON,
-    CONDITIONAL,
-    NOT,
-    NUMBERS,
-    OR,
-    POWER,
-    PRODUCT,
-    SIGN,
-    Code,
-    Type,
-    arithmetic,
-    as_float,
-    join_texts,
-    literal,
-    text_literal,
-)
 from coursebuild.features.lab.javascript import (
     UntranslatableError,
+    arguments,
     array_items,
+    children,
     dotted_name,
     field,
     string_value,
@@ -48,284 +26,297 @@ from coursebuild.features.lab.javascript import (
     text_of,
 )
 
+ROOTS = frozenset("model data mj sim ctx lib Math".split())
+RESERVED = ROOTS.union(
+    """
+        abs copy ctx float format int len max math min mujoco np range str SimpleNamespace
+        energy linear_momentum angular_momentum normal_force qpos SECONDS DIVERGED XML
+        load start reset step simulate readouts report main set_up control model_path
+    """.split()
+)
+"""Names that every script may have, and nothing else in it."""
+_NUMPY = "sin cos tan sinh cosh tanh exp expm1 log log1p log2 log10 cbrt sqrt floor ceil trunc sign"
+_ARC = "sin cos tan sinh cosh tanh"
+_FUNCTIONS = {
+    **{f"Math.{name}": f"np.{name}(...)" for name in _NUMPY.split()},
+    **{f"Math.a{name}": f"np.arc{name}(...)" for name in _ARC.split()},
+    "Math.abs": "abs(...)",
+    "Math.atan2": "np.arctan2(...)",
+    "Math.hypot": "math.hypot(...)",
+    "Math.max": "max(...)",
+    "Math.min": "min(...)",
+    "Math.pow": "math.pow(...)",
+    "Math.round": "np.floor(0.5 + ...)",
+    "lib.angmom": "angular_momentum(model, data)",
+    "lib.bodyId": "model.body(...).id",
+    "lib.bodyPos": "data.body(...).xpos.copy()",
+    "lib.deg": "np.degrees(...)",
+    "lib.energy": "energy(model, data)",
+    "lib.jointId": "model.joint(...).id",
+    "lib.momentum": "linear_momentum(model, data)",
+    "lib.norm": "np.linalg.norm(...)",
+    "lib.normalForce": "normal_force(model, data, ...)",
+    "lib.qpos": "qpos(data, ...)",
+    "lib.rad": "np.radians(...)",
+    "lib.sitePos": "data.site(...).xpos.copy()",
+}
+"""Functions, with `...` for the arguments."""
 _CONSTANTS = {
     "PI": "math.pi",
     "E": "math.e",
-    "SQRT2": repr(math.sqrt(2)),
-    "SQRT1_2": repr(math.sqrt(0.5)),
-    "LN2": repr(math.log(2)),
-    "LN10": repr(math.log(10)),
-    "LOG2E": repr(1 / math.log(2)),
-    "LOG10E": repr(1 / math.log(10)),
+    "SQRT2": "math.sqrt(2)",
+    "SQRT1_2": "math.sqrt(0.5)",
+    "LN2": "math.log(2)",
+    "LN10": "math.log(10)",
+}
+_UNARY = {"-": "-", "+": "+", "~": "~", "!": "not "}
+_BINARY = {
+    **{sign: sign for sign in "+ - * / ** & | ^ < > <= >= == !=".split()},
+    **{"===": "==", "!==": "!=", "&&": "and", "||": "or"},
 }
 _UNBOUNDED = {"NaN": "math.nan", "Infinity": "math.inf"}
-_ROOTS = frozenset("model data mj sim ctx lib Math value".split())
-_SCALAR_TYPES: dict[Scalar, Type] = {"float": "num", "int": "int", "size": "nat"}
-_COMPARISONS = {
-    **{"===": "==", "!==": "!=", "==": "==", "!=": "!="},
-    **{"<": "<", ">": ">", "<=": "<=", ">=": ">="},
-}
-_LOGICAL = {"&&": ("and", AND), "||": ("or", OR)}
-_NEVER_NEGATIVE = frozenset(
-    """
-        jnt_qposadr jnt_dofadr jnt_bodyid dof_bodyid dof_jntid geom_bodyid site_bodyid cam_bodyid
-        body_parentid body_rootid body_weldid sensor_adr sensor_dim tendon_adr tendon_num
-        actuator_actnum body_jntnum body_dofnum body_geomnum
-    """.split()
-)
+_FLAT = ".reshape(-1)"
+
+EngineField: TypeAlias = Literal["number", "array", "rows", "single"]
+"""A number, an array, one with rows (which has none in JavaScript), one of 32-bit numbers."""
 
 
-class Variable(Struct, frozen=True):
-    """A variable of the code: what it is called in Python, and its type."""
+class Expressions:
+    """Translates the expressions of a piece of code."""
 
-    code: Code
-    constant: bool = True
+    def __init__(self, fields: Collection[str], value: str | None, button: bool) -> None:
+        self.fields, self.given, self.button = fields, value, button
+        self.scopes: list[set[str]] = []
+        self.counters: set[str] = set()
 
+    def part(self, node: Node, name: str) -> str:
+        """An expression that is part of a node."""
+        return self.expression(field(node, name))
 
-class Expressions(ABC):
-    """Translates expressions, given what is in scope."""
+    def all(self, nodes: Iterable[Node]) -> str:
+        """Expressions with commas between them."""
+        return ", ".join(map(self.expression, nodes))
 
-    def __init__(self, context: Mapping[str, Type], value: Code | None) -> None:
-        """`context`: the fields of `ctx`; `value`: what `value` stands for."""
-        self.context = context
-        self.given = value
-        self.scopes: list[dict[str, Variable]] = [{}]
-
-    # --- what is needed
-
-    def number(self, node: Node) -> Code:
-        """An expression whose value is a number."""
-        return _number(self.value(node, single=True))
-
-    def test(self, node: Node) -> Code:
-        """An expression that is only asked whether it is true."""
-        if node.type == "unary_expression" and _operator(node) == "!":
-            return Code(f"not {self.test(field(node, 'argument')).within(NOT)}", "bool", NOT)
-        if node.type == "binary_expression" and _operator(node) in _LOGICAL:
-            word, precedence = _LOGICAL[_operator(node)]
-            left, right = self.test(field(node, "left")), self.test(field(node, "right"))
-            text = f"{left.within(precedence)} {word} {right.within(precedence + 1)}"
-            return Code(text, "bool", precedence)
-        code = self.value(node, single=True)
-        if code.type in NUMBERS:  # NaN is false
-            return Code(f"abs({code.text}) > 0", "bool", COMPARISON)
-        if code.type != "bool":
-            raise UntranslatableError(f"{code.named} as a condition")
-        return code
-
-    def index(self, node: Node) -> str:
-        """An expression as an index; a negative one means something else in Python."""
-        code = self.number(node)
-        return code.text if code.type == "nat" else f"index({code.text})"
-
-    def integer(self, node: Node) -> str:
-        """An expression as a whole number, cut off where it is none."""
-        code = self.number(node)
-        return f"int({code.text})" if code.type == "num" else code.text
-
-    def array(self, node: Node) -> Code:
-        """An expression whose value is an array."""
-        code = self.value(node)
-        if code.type not in ARRAYS:
-            raise UntranslatableError(f"{code.named} where an array should be")
-        return code
-
-    def numbers(self, nodes: Iterable[Node]) -> str:
-        """Numbers, with commas between them."""
-        return ", ".join(self.number(node).text for node in nodes)
-
-    # --- expressions
-
-    def value(self, node: Node, *, single: bool = False) -> Code:
-        """Any expression; `single`: where one number will do, it is one."""
+    def expression(self, node: Node) -> str:
+        """An expression for its value."""
         match node.type:
             case "number":
-                return literal(text_of(node))
+                return _number(text_of(node))
             case "string":
-                return text_literal(string_value(node))
+                return repr(string_value(node))
             case "template_string":
                 parts = template_parts(node)
-                return join_texts(
-                    [text_literal(p) if isinstance(p, str) else self.value(p) for p in parts]
-                )
+                texts = (repr(p) if isinstance(p, str) else self.text(p) for p in parts)
+                return f"({' + '.join(texts) or repr('')})"
             case "true" | "false":
-                return Code(node.type.capitalize(), "bool")
+                return node.type.capitalize()
             case "identifier":
-                return self._name(text_of(node))
+                return self.name(text_of(node))
             case "member_expression":
-                return self._member(node)
+                return self.member(node)
             case "subscript_expression":
-                return self._element(self.array(field(node, "object")), field(node, "index"))
+                text = self.element(node)
+                is_single = engine_field(dotted_name(field(node, "object"))) == "single"
+                return f"float({text})" if is_single else text
             case "call_expression":
-                return self.call(node, single=single)
+                return self.call(node)
+            case "spread_element":
+                return f"*{self.expression(children(node)[0])}"
             case "array":
-                return Code(f"np.array([{self.numbers(array_items(node))}], dtype=float)", "vector")
-            case "unary_expression":
-                return self._unary(node)
-            case "binary_expression" if _operator(node) in _LOGICAL:
-                if any(self.value(field(node, side)).type != "bool" for side in ("left", "right")):
-                    raise UntranslatableError(f"`{_operator(node)}` for its value")
-                return self.test(node)
+                return f"np.array([{self.all(array_items(node))}], dtype=float)"
+            case "unary_expression" if operator_of(node) in _UNARY:
+                return f"({_UNARY[operator_of(node)]}{self.part(node, 'argument')})"
             case "binary_expression":
-                return self.binary(_operator(node), field(node, "left"), field(node, "right"))
+                return self.binary(node)
             case "ternary_expression":
-                branches = (field(node, name) for name in ("consequence", "alternative"))
-                values = (self.value(branch, single=True) for branch in branches)
-                return self.conditional(field(node, "condition"), *values)
+                # `null`, where a readout has nothing to show, is no number.
+                first, second = (
+                    "math.nan" if branch.type == "null" else self.expression(branch)
+                    for branch in _branches(node)
+                )
+                return f"({first} if {self.part(node, 'condition')} else {second})"
             case _:
                 raise UntranslatableError(f"`{text_of(node)}`")
 
-    def variable(self, name: str) -> Variable | None:
-        """The variable of this name that is in scope."""
-        return next((scope[name] for scope in reversed(self.scopes) if name in scope), None)
+    def binary(self, node: Node) -> str:
+        """Two operands with an operator between them."""
+        operator, sides = operator_of(node), (field(node, "left"), field(node, "right"))
+        if operator == "%":
+            return f"np.fmod({self.all(sides)})"
+        if operator not in _BINARY:
+            raise UntranslatableError(f"`{operator}`")
+        read = self.text if _is_text(node) else self.expression
+        return f"({read(sides[0])} {_BINARY[operator]} {read(sides[1])})"
 
-    def _name(self, name: str) -> Code:
-        variable = self.variable(name)
-        if variable is not None:
-            return variable.code
-        if name in _UNBOUNDED:
-            return Code(_UNBOUNDED[name], "num")
+    def text(self, node: Node) -> str:
+        """A value as it is written into a text."""
+        return self.expression(node) if _is_text(node) else f"str({self.expression(node)})"
+
+    def is_variable(self, name: str) -> bool:
+        """Whether a variable of this name is in scope."""
+        return any(python_name(name) in scope for scope in self.scopes)
+
+    def name(self, name: str) -> str:
+        """A name without dots."""
+        if self.is_variable(name):
+            return python_name(name)
         if name == "value" and self.given is not None:
             return self.given
-        raise UntranslatableError(f"`{name}`")
+        if name in ("model", "data"):
+            return name
+        if name not in _UNBOUNDED:
+            raise UntranslatableError(f"`{name}`")
+        return _UNBOUNDED[name]
 
-    def path(self, node: Node) -> tuple[str, ...]:
-        """The path of something that is known by its name: `("model", "opt", "timestep")`."""
-        names = dotted_name(node)
-        return names if names[:1] and names[0] in _ROOTS else ()
-
-    def _member(self, node: Node) -> Code:
-        path, name = self.path(node), text_of(field(node, "property"))
-        text = ".".join(path)
+    def member(self, node: Node) -> str:
+        """A name with dots."""
+        path, name = dotted_name(node), text_of(field(node, "property"))
         match path:
             case ("sim", "time"):
-                return Code("data.time", "num")
-            case ("ctx", own) if own in self.context:
-                return Code(text, self.context[own])
+                return "data.time"
+            case ("ctx", own) if own in self.fields:
+                return f"ctx.{own}"
             case ("Math", constant) if constant in _CONSTANTS:
-                return Code(_CONSTANTS[constant], "num")
+                return _CONSTANTS[constant]
             case ("mj", enumeration, member, "value") if enumeration.startswith("mjt"):
-                return Code(f"mujoco.{enumeration}.{member}.value", "int")
+                return f"mujoco.{enumeration}.{member}.value"
             case _:
                 pass
-        match engine_field(path):
-            case ArrayField() as array:
-                return Code(text, "rows" if array.rows else "vector", element=array.element)
-            case None:
-                pass
-            case scalar:
-                return Code(text, _SCALAR_TYPES[scalar])
+        known = engine_field(path)
+        if known is not None:
+            return ".".join(path) + (_FLAT if known in ("rows", "single") else "")
         if name == "length":
-            return Code(f"{self.array(field(node, 'object')).text}.size", "nat")
-        if path:
-            raise UntranslatableError(f"`{text}`")
-        whole = self.value(field(node, "object"))
-        if whole.type == "energy" and name in ("kinetic", "potential", "total"):
-            return Code(f"{whole.text}.{name}", "num")
-        raise UntranslatableError(f"`.{name}`")
+            return f"{self.part(node, 'object')}.size"
+        if name in ("kinetic", "potential", "total") and not path:
+            return f"{self.part(node, 'object')}.{name}"
+        raise UntranslatableError(f"`{'.'.join(path) or '.' + name}`")
 
-    def _element(self, array: Code, index: Node) -> Code:
-        text = f"{array.flat}[{self.index(index)}]"
-        match array.element:
-            case "f64":
-                return Code(text, "num")
-            case "f32":
-                return Code(f"float({text})", "num")
-            case "int":
-                owner, _, name = array.text.partition(".")
-                sure = owner == "model" and name in _NEVER_NEGATIVE
-                return Code(f"int({text})", "nat" if sure else "int")
+    def element(self, node: Node) -> str:
+        """An element of an array; one with rows is counted through, as in JavaScript."""
+        array = self.part(node, "object")
+        if array.endswith(_FLAT):
+            array = f"{array.removesuffix(_FLAT)}.flat"
+        return f"{array}[{self.index(field(node, 'index'))}]"
 
-    # --- operators
+    def index(self, node: Node) -> str:
+        """An expression as an index, which in Python must be a whole number by type."""
+        text = ast.unparse(ast.parse(self.expression(node)))
+        return text if self.is_whole(node) else f"int({text})"
 
-    def _unary(self, node: Node) -> Code:
-        operator, operand = _operator(node), field(node, "argument")
-        if operator == "!":
-            return self.test(node)
-        if operator not in ("-", "+", "~"):
-            raise UntranslatableError(f"`{operator}`")
-        code = self.number(operand)
-        if operator == "+":
-            return code
-        if operator == "~":
-            _check_bits(operator, code)
-            return Code(f"~{code.within(SIGN)}", "int", SIGN)
-        if operand.type == "number" and code.whole:
-            return Code(f"-{code.text}", "int", SIGN)
-        return Code(f"-{as_float(code).within(SIGN)}", "num", SIGN)
-
-    def binary(self, operator: str, left: Node, right: Node) -> Code:
-        """Two operands with an operator between them that is not `&&` or `||`."""
-        if operator in _COMPARISONS:
-            return self._comparison(operator, left, right)
-        a, b = self.value(left, single=True), self.value(right, single=True)
-        if operator == "+" and "str" in (a.type, b.type):
-            return join_texts((a, b))
-        a, b = _number(a), _number(b)
-        match operator:
-            case "+" | "-" | "*" | "/":
-                return arithmetic(operator, a, b)
-            case "&" | "|" | "^":
-                _check_bits(operator, a, b)
-                return Code(f"{a.within(ATOM)} {operator} {b.within(ATOM)}", "int", BITS)
-            case "**" if right.type == "number" and b.type == "nat" and b.whole <= 16:
-                return Code(f"{as_float(a).within(ATOM)}**{b.text}", "num", POWER)
-            case "**":
-                return Code(f"power({a.text}, {b.text})", "num")
-            case "%" if a.type == "nat" and right.type == "number" and b.whole:
-                return Code(f"{a.within(PRODUCT)} % {b.text}", "nat", PRODUCT)
-            case "%":
-                return Code(f"np.fmod({as_float(a).text}, {as_float(b).text})", "num")
+    def is_whole(self, node: Node) -> bool:
+        """Whether an expression is surely a whole number."""
+        match node.type:
+            case "number":
+                return text_of(node).isdecimal()
+            case "identifier":
+                return text_of(node) in self.counters
+            case "binary_expression":
+                sides = (field(node, "left"), field(node, "right"))
+                return operator_of(node) in "+-*" and all(map(self.is_whole, sides))
+            case "call_expression":
+                return dotted_name(field(node, "function"))[-1:] in (("bodyId",), ("jointId",))
+            case "member_expression":
+                return text_of(field(node, "property")) == "length"
             case _:
-                raise UntranslatableError(f"`{operator}`")
+                return False
 
-    def _comparison(self, operator: str, left: Node, right: Node) -> Code:
-        a, b = self.value(left, single=True), self.value(right, single=True)
-        python, equality = _COMPARISONS[operator], operator[0] in "=!"
-        kinds = {"number" if code.type in NUMBERS else code.type for code in (a, b)}
-        if kinds == {"bool"} and equality:
-            for code, other in ((a, right), (b, left)):
-                if other.type in ("true", "false"):
-                    if (other.type == "true") == (python == "=="):
-                        return code
-                    return Code(f"not {code.within(NOT)}", "bool", NOT)
-        elif kinds != {"number"} and not (kinds == {"str"} and equality):
-            raise UntranslatableError(f"`{operator}` between {a.named} and {b.named}")
-        return Code(f"{a.within(BITS)} {python} {b.within(BITS)}", "bool", COMPARISON)
+    def ends(self, nodes: Iterable[Node]) -> str:
+        """From and to an index, or only from one."""
+        texts = [self.index(node) for node in nodes]
+        return ":".join([*texts, ""][:2]) if texts else ""
 
-    def conditional(self, test: Node, a: Code, b: Code) -> Code:
-        """One value or another."""
-        type = a.type
-        if a.type != b.type:
-            if a.type not in NUMBERS or b.type not in NUMBERS:
-                raise UntranslatableError(f"{a.named} or {b.named}")
-            type = "int"
-            if "num" in (a.type, b.type):
-                type, a, b = "num", as_float(a), as_float(b)
-        if type not in (*NUMBERS, "bool", "str"):
-            raise UntranslatableError(f"{a.named} that depends on a condition")
-        condition = self.test(test).within(OR)
-        text = f"{a.within(OR)} if {condition} else {b.text}"
-        return Code(text, type, CONDITIONAL)
-
-    @abstractmethod
-    def call(self, node: Node, *, single: bool) -> Code:
-        """A call; `single`: where it may give one number, it does."""
+    def call(self, node: Node) -> str:
+        """A call for its value."""
+        function, given = field(node, "function"), arguments(node)
+        path = dotted_name(function)
+        if ".".join(path) in _FUNCTIONS:
+            return _FUNCTIONS[".".join(path)].replace("...", self.all(given))
+        if path[:1] == ("mj",) and hasattr(_mujoco(), path[-1]):
+            return f"mujoco.{path[-1]}({self.all(given)})"
+        match text_of(field(function, "property")) if "member" in function.type else "":
+            case "slice" | "subarray" as method if len(given) < 3:
+                part = f"{self.part(function, 'object')}[{self.ends(given) or ':'}]"
+                return part + ".copy()" * (method == "slice")
+            case "toFixed" if all(digits.type == "number" for digits in given):
+                digits = self.all(given) or "0"
+                return f"format({self.part(function, 'object')}, '.{digits}f')"
+            case _:
+                raise refused_call(path)
 
 
-def _operator(node: Node) -> str:
+@functools.cache
+def _engine_fields() -> Mapping[tuple[str, ...], EngineField]:
+    mujoco = _mujoco()
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    owners: dict[tuple[str, ...], Any] = {
+        ("model",): model,
+        ("data",): mujoco.MjData(model),
+        ("model", "opt"): model.opt,
+        ("model", "stat"): model.stat,
+    }
+    return {
+        (*owner, name): kind
+        for owner, values in owners.items()
+        for name in dir(values)
+        if not name.startswith("_") and (kind := _kind(getattr(values, name))) is not None
+    }
+
+
+def engine_field(path: tuple[str, ...]) -> EngineField | None:
+    """What `("model", "opt", "gravity")` is; `None` for anything but numbers."""
+    return _engine_fields().get(path)
+
+
+def _kind(value: object) -> EngineField | None:
+    if isinstance(value, np.ndarray):
+        is_single = value.dtype == np.float32
+        return "single" if is_single else "rows" if value.ndim > 1 else "array"
+    return "number" if isinstance(value, int | float) else None
+
+
+def _mujoco() -> Any:
+    import mujoco  # only where a lab is translated anew
+
+    return mujoco
+
+
+def _number(text: str) -> str:
+    if text.endswith("n"):
+        raise UntranslatableError(f"the number `{text}`")
+    return text
+
+
+def python_name(name: str) -> str:
+    """A variable's name; the constants of a script are in capitals."""
+    is_taken = name in RESERVED or keyword.iskeyword(name) or name.isupper()
+    return f"{name}_" if is_taken else name
+
+
+def operator_of(node: Node) -> str:
+    """The sign of an expression with one."""
     return text_of(field(node, "operator"))
 
 
-def _number(code: Code) -> Code:
-    if code.type not in NUMBERS:
-        raise UntranslatableError(f"{code.named} where a number should be")
-    return code
+def _branches(node: Node) -> tuple[Node, Node]:
+    return field(node, "consequence"), field(node, "alternative")
 
 
-def _check_bits(operator: str, *operands: Code) -> None:
-    """Bits are those of 32-bit integers in JavaScript."""
-    if any(code.type == "num" for code in operands):
-        raise UntranslatableError(
-            f"`{operator}` on a number that need not be a whole one of 32 bits"
-        )
+def _is_text(node: Node) -> bool:
+    """Whether an expression is surely a text."""
+    match node.type:
+        case "string" | "template_string":
+            return True
+        case "binary_expression" if operator_of(node) == "+":
+            return _is_text(field(node, "left")) or _is_text(field(node, "right"))
+        case "ternary_expression":
+            return any(map(_is_text, _branches(node)))
+        case "call_expression":
+            function = field(node, "function")
+            return "member" in function.type and text_of(field(function, "property")) == "toFixed"
+        case _:
+            return False
+
+
+def refused_call(path: tuple[str, ...]) -> UntranslatableError:
+    """A call of something that has no counterpart."""
+    return UntranslatableError(f"a call of `{'.'.join(path)}`" if path else "a call")

@@ -20,16 +20,16 @@ from coursebuild.core.run.versions import engine_version
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from coursebuild.features.lab.export.difference import difference
 from coursebuild.features.lab.export.script import (
+    ExportMetadata,
     export_script,
     file_name,
     filled,
     initial_values,
 )
-from coursebuild.features.lab.export.text import ExportMetadata
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.reply import MainRun
 from coursebuild.features.lab.schema import Select, Slider
-from coursebuild.features.lab.verdict import PARITY_RTOL, Parity
+from coursebuild.features.lab.verdict import PARITY_RTOL
 
 _SECONDS = 5.0
 _MOST_STEPS = 20_000
@@ -50,11 +50,10 @@ def exported(
     trial: Trial,
     lab: Lab,
     main: MainRun,
-    parity: Parity | None,
 ) -> LabExport:
     """The script of a lab, from the store where the same was tried before.
 
-    `main` is the main run of its trial, `parity` how that compares with native MuJoCo.
+    `main` is the main run of its trial.
     """
     metadata = ExportMetadata(
         file_name(trial.name),
@@ -63,17 +62,16 @@ def exported(
         engine_version(),
         _seconds(lab, main),
     )
-    same = parity is not None and parity.first is None
     # The model is in it by what the trial recorded.
     readouts = [picture["readouts"] for picture in main["pictures"]]
-    made_of = (_digest(), lab.config, asdict(metadata), main.get("recorded"), readouts, same)
+    made_of = (_digest(), lab.config, asdict(metadata), main.get("recorded"), readouts)
     key = hashlib.sha256(json.dumps(made_of).encode()).hexdigest()
     store = context.memory.store
     found = store.get_value("exports", key, LabExport)
     if found is not None:
         return found
     try:
-        offer = _offered(context.root, native, lab, metadata, main, same)
+        offer = _offered(context.root, native, lab, metadata, main)
     except NativeError as error:
         return LabExport(None, f"the script {error}")
     store.put_value("exports", key, offer)
@@ -86,7 +84,6 @@ def _offered(
     lab: Lab,
     metadata: ExportMetadata,
     main: MainRun,
-    same: bool,
 ) -> LabExport:
     export = export_script(lab, metadata)
     if isinstance(export, str):
@@ -107,7 +104,7 @@ def _offered(
     if run["failure"]:
         return LabExport(None, f"the script fails: {run['failure']}")
     rtol = PARITY_RTOL if lab.verify.rtol is None else lab.verify.rtol
-    reason = difference(main, run, exact=export.exact and same, rtol=rtol)
+    reason = difference(main, run, rtol)
     return LabExport(None, reason) if reason else LabExport((export.name, export.text))
 
 
@@ -147,5 +144,5 @@ def _others(lab: Lab) -> list[dict[int, float | str]]:
 @functools.cache
 def _digest() -> str:
     """A hash of how scripts are made, run and held against labs."""
-    files = sorted(Path(__file__).parents[1].rglob("*.py"))
+    files = sorted(file for file in Path(__file__).parents[1].rglob("*.*") if file.is_file())
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()

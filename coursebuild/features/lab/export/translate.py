@@ -1,0 +1,258 @@
+"""Lab code, which is JavaScript, as Python.
+
+Entry points: `translate_statements`, `translate_expression`; `context_fields`, what `ctx` holds.
+
+Each construct becomes the plainest Python that does the same with the numbers of a simulation.
+There are no types: whether a script does what the lab does is found out by running it, and one
+that fails or differs is not offered. What has no such counterpart is refused. Expressions are put
+together with all parentheses; `ast.unparse` leaves those that are needed.
+"""
+
+from __future__ import annotations
+
+import ast
+import keyword
+import textwrap
+from collections.abc import Collection, Iterable, Iterator
+
+from tree_sitter import Node
+
+from coursebuild.features.lab.export.expressions import (
+    ROOTS,
+    Expressions,
+    engine_field,
+    operator_of,
+    python_name,
+    refused_call,
+)
+from coursebuild.features.lab.javascript import (
+    UntranslatableError,
+    arguments,
+    array_items,
+    children,
+    counting_loop,
+    dotted_name,
+    field,
+    parse_expression,
+    parse_statements,
+    text_of,
+    walk,
+)
+
+_AUGMENTED = ("+=", "-=", "*=", "/=", "**=", "&=", "|=", "^=")
+
+
+def translate_statements(
+    code: str, fields: Collection[str], value: str | None = None, *, button: bool = False
+) -> list[str]:
+    """The lines of statements; `value`: what `value` is in them.
+
+    In the code of a `button` what only concerns the page's clock is left out.
+
+    Raises:
+        UntranslatableError: they cannot be translated.
+    """
+    lines = _Statements(fields, value, button).block(parse_statements(code))
+    return ast.unparse(ast.parse("\n".join(lines))).splitlines()
+
+
+def translate_expression(code: str, fields: Collection[str]) -> str:
+    """An expression.
+
+    Raises:
+        UntranslatableError: it cannot be translated.
+    """
+    text = _Statements(fields, None, button=False).expression(parse_expression(code))
+    return ast.unparse(ast.parse(text))
+
+
+def context_fields(pieces: Iterable[str]) -> dict[str, str]:
+    """The fields of `ctx`, those that code assigns to, with what they hold before."""
+    found: dict[str, str] = {}
+    for node in (node for code in pieces for node in _nodes(code)):
+        if node.type == "assignment_expression":
+            match dotted_name(field(node, "left")):
+                case ("ctx", name):
+                    is_truth = field(node, "right").type in ("true", "false")
+                    found.setdefault(name, "False" if is_truth else "math.nan")
+                case _:
+                    pass
+    for name in found:
+        if keyword.iskeyword(name) or name.startswith("__") or not name.isidentifier():
+            raise UntranslatableError(f"the name `ctx.{name}`")
+    return dict(sorted(found.items()))
+
+
+def _nodes(code: str) -> Iterator[Node]:
+    """All nodes of a piece of code that can be translated."""
+    for statement in parse_statements(code):
+        yield from walk(statement)
+
+
+class _Statements(Expressions):
+    """Translates a piece of code."""
+
+    def block(self, body: Iterable[Node]) -> Iterator[str]:
+        """Statements in a scope of their own."""
+        self.scopes.append(set())
+        for statement in body:
+            yield from self.statement(statement)
+        self.scopes.pop()
+
+    def indented(self, body: Node) -> str:
+        """The body of an `if` or a loop."""
+        inner = children(body) if body.type == "statement_block" else [body]
+        return textwrap.indent("\n".join(self.block(inner)) or "pass", "    ")
+
+    def statement(self, node: Node) -> Iterator[str]:
+        """The lines of a statement."""
+        match node.type:
+            case "empty_statement":
+                pass
+            case "expression_statement":
+                for expression in _in_sequence(children(node)[0]):
+                    yield from self.effect(expression)
+            case "lexical_declaration":
+                for declarator in children(node):
+                    yield self.declaration(declarator)
+            case "statement_block":
+                yield from self.block(children(node))
+            case "if_statement":
+                yield f"if {self.part(node, 'condition')}:"
+                yield self.indented(field(node, "consequence"))
+                if (clause := node.child_by_field_name("alternative")) is not None:
+                    yield "else:"
+                    yield self.indented(children(clause)[0])
+            case "while_statement":
+                yield f"while {self.part(node, 'condition')}:"
+                yield self.indented(field(node, "body"))
+            case "for_statement":
+                yield from self.loop(node)
+            case "break_statement" | "continue_statement" if not children(node):
+                yield node.type.removesuffix("_statement")
+            case "return_statement" if not (children(node) or self.given):
+                yield "return"
+            case _:
+                raise UntranslatableError(f"`{text_of(node).splitlines()[0]}`")
+
+    def declaration(self, node: Node) -> str:
+        """`name = value` of a `const` or `let`."""
+        name, given = field(node, "name"), node.child_by_field_name("value")
+        if name.type != "identifier" or given is None:
+            raise UntranslatableError(f"`{text_of(node)}` without a value")
+        value = self.part(node, "value")
+        return f"{self.declare(text_of(name))} = {value}"
+
+    def declare(self, name: str) -> str:
+        """A variable; its name in Python, where scopes are not nested."""
+        own = python_name(name)
+        if not own.isidentifier() or name in ROOTS or any(own in scope for scope in self.scopes):
+            raise UntranslatableError(f"a variable `{name}`")
+        self.scopes[-1].add(own)
+        return own
+
+    def loop(self, node: Node) -> Iterator[str]:
+        """A loop that counts."""
+        loop = counting_loop(node)
+        limit = self.expression(loop.limit)
+        if loop.inclusive:
+            by = 1 if loop.step > 0 else -1
+            limit = str(int(limit) + by) if limit.isdecimal() else f"{limit} + {by}"
+        ends = [self.expression(loop.start), limit, str(loop.step)]
+        if loop.step == 1:
+            ends = ends[:2] if ends[0] != "0" else ends[1:2]
+        self.scopes.append(set())
+        name = self.declare(loop.name)
+        self.counters.add(name)
+        yield f"for {name} in range({', '.join(ends)}):"
+        yield self.indented(field(node, "body"))
+        self.scopes.pop()
+
+    # --- what is done
+
+    def effect(self, node: Node) -> Iterator[str]:
+        """An expression for what it does."""
+        match node.type:
+            case "assignment_expression":
+                targets = []
+                while node.type == "assignment_expression":
+                    targets.append(self.target(field(node, "left")))
+                    node = field(node, "right")
+                yield " = ".join([*targets, self.expression(node)])
+            case "augmented_assignment_expression":
+                target, value = self.target(field(node, "left")), self.part(node, "right")
+                operator = operator_of(node)
+                if operator == "%=":
+                    yield f"{target} = np.fmod({target}, {value})"
+                elif operator in _AUGMENTED:
+                    yield f"{target} {operator} {value}"
+                else:
+                    raise UntranslatableError(f"`{operator}`")
+            case "update_expression":
+                yield f"{self.target(field(node, 'argument'))} {operator_of(node)[0]}= 1"
+            case "call_expression":
+                yield from self.call_statement(node)
+            case _:
+                raise UntranslatableError("an expression that does nothing")
+
+    def target(self, node: Node) -> str:
+        """What can be assigned to."""
+        match node.type:
+            case "identifier" if self.is_variable(text_of(node)):
+                return python_name(text_of(node))
+            case "subscript_expression":
+                return self.element(node)
+            case "member_expression":
+                path = dotted_name(node)
+                if path[:1] == ("ctx",) or engine_field(path) == "number":
+                    return self.member(node)
+            case _:
+                pass
+        raise UntranslatableError(f"an assignment to `{text_of(node)}`")
+
+    def call_statement(self, node: Node) -> Iterator[str]:
+        """A call for what it does."""
+        function, given = field(node, "function"), arguments(node)
+        match path := dotted_name(function):
+            case ("sim", "play" | "pause") if self.button:
+                return
+            case ("sim", "reset") if self.button:
+                yield "reset(model, data, ctx)" if self.fields else "reset(model, data)"
+                return
+            case ("mj", _):
+                yield self.call(node)
+                return
+            case _:
+                pass
+        match text_of(field(function, "property")) if "member" in function.type else "":
+            case "fill" if len(given) in (1, 3):
+                array, value = self.part(function, "object"), self.expression(given[0])
+                yield f"{array}[{self.ends(given[1:]) or ':'}] = {value}"
+            case "set" if len(given) in (1, 2):
+                yield self.set(self.part(function, "object"), *given)
+            case _:
+                raise refused_call(path)
+
+    def set(self, array: str, values: Node, offset: Node | None = None) -> str:
+        """`array.set(numbers, offset)`."""
+        if values.type == "array":
+            items = array_items(values)
+            text, count = f"[{self.all(items)}]", str(len(items))
+        else:
+            text = self.expression(values)
+            count = f"{text}.size"
+        start = "0" if offset is None else self.index(offset)
+        if start.isdecimal() and count.isdecimal():
+            end = str(int(start) + int(count))
+        else:
+            end = count if start == "0" else f"{start} + {count}"
+        return f"{array}[{'' if start == '0' else start}:{end}] = {text}"
+
+
+def _in_sequence(node: Node) -> Iterator[Node]:
+    """The expressions of `a, b, c`."""
+    if node.type == "sequence_expression":
+        for child in children(node):
+            yield from _in_sequence(child)
+    else:
+        yield node
