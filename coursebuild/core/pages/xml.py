@@ -1,15 +1,22 @@
 """Elements of XML, and names that it allows.
 
-Entry points: `element`, `document`; `identifier`, a name out of any text.
+Entry points: `element`, `document`; `render_xml`, a file by its template, in which `markup` stands
+for elements; `identifier`, a name out of any text.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import re
-from typing import TypeAlias
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeAlias
 from xml.etree.ElementTree import Element as Element
 from xml.etree.ElementTree import indent, tostring
+
+from jinja2 import Environment, StrictUndefined, Template
+from markupsafe import Markup, escape
 
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
@@ -49,6 +56,25 @@ def document(root: Element, *, pretty: bool = False) -> bytes:
         indent(root, " ")
     text = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+def render_xml(template: Path, **values: Any) -> bytes:
+    """A whole file; what is not `Markup` is escaped."""
+    return _clean(_template(template).render(values)).encode()
+
+
+@functools.cache
+def _template(path: Path) -> Template:
+    environment = Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
+    )
+    return environment.from_string(path.read_text(encoding="utf-8"))
+
+
+def markup(content: Iterable[Element | str]) -> Markup:
+    """Elements and texts as they stand in a file."""
+    parts = (escape(c) if isinstance(c, str) else Markup(tostring(c, "unicode")) for c in content)
+    return Markup("").join(parts)
 
 
 def identifier(prefix: str, text: str, *, most: int = 0) -> str:

@@ -3,41 +3,27 @@
 Entry point: `quiz_items(page, quiz, course)`.
 
 A quiz's texts are drawn as its page draws them, and brought into what QTI allows (`flow`). Names
-are those of the IMS QTI 2.1 Assessment Test, Section, and Item Information Model, 2012:
-
-1. A response and outcomes are declared: the points, and what to say.
-2. The body has the question, hints that are opened one by one (`infoControl`), and an interaction.
-3. Response processing (`processing`) compares, and says which feedback is shown: that of each
-   option that was chosen, and the explanation.
+are those of the IMS QTI 2.1 Assessment Test, Section, and Item Information Model, 2012; the
+template `item.jinja` holds them. Response processing says which feedback is shown: that of each
+option that was chosen, and the explanation.
 """
 
 from __future__ import annotations
 
 import posixpath
-from typing import assert_never
+from pathlib import Path
+from typing import Any, assert_never
 from urllib.parse import unquote, urlsplit
 
+from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.model import Block, Course, Inline
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.xml import XSI, Element, add, document, element, identifier
+from coursebuild.core.pages.xml import element, identifier, markup, render_xml
 from coursebuild.core.text.source import Span
 from coursebuild.features.qti.flow import Flow
-from coursebuild.features.qti.mathml import NAMESPACE as MATHML
-from coursebuild.features.qti.processing import (
-    EXPLANATION,
-    RESPONSE,
-    ResponseParts,
-    compared,
-    double,
-    feedback,
-    matches,
-    outcomes,
-    processing,
-    response,
-)
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
@@ -49,9 +35,8 @@ from coursebuild.features.quiz.model import (
 )
 from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_html
 
-NAMESPACE = "http://www.imsglobal.org/xsd/imsqti_v2p1"
-SCHEMA = "http://www.imsglobal.org/xsd/qti/qtiv2p1/imsqti_v2p1.xsd"
 STYLE = "style.css"
+_TEMPLATE = Path(__file__).with_name("item.jinja")
 _NAME = 32
 """Characters that an identifier should have at most, for systems that keep no more."""
 
@@ -101,64 +86,48 @@ class _Writer:
 
     def item(self, question: AnyQuestion) -> QuestionItem | None:
         """The item, or nothing where the question has no answer."""
-        parts = self._parts(question)
-        if parts is None:
+        response = self._response(question)
+        if response is None:
             return None
         name = identifier("q.", self.quiz.anchor(question.key), most=_NAME)
         title = question.label or self.words("package.question", n=self.number)
-        root = element(
-            "assessmentItem",
-            {
-                "xmlns": NAMESPACE,
-                "xmlns:m": MATHML,
-                "xmlns:xsi": XSI,
-                "xsi:schemaLocation": f"{NAMESPACE} {SCHEMA}",
-                "identifier": name,
-                "title": f"{self.quiz.title}: {title}" if self.quiz.title else title,
-                "adaptive": "false",
-                "timeDependent": "false",
-                "xml:lang": self.course.language or "en",
-            },
-        )
-        add(root, parts.response, *outcomes())
-        add(root, element("stylesheet", {"href": f"../{STYLE}", "type": "text/css"}))
-        add(root, self._body(question, parts))
-        explanation = self._explanation(question)
-        add(root, processing(parts, explained=explanation is not None))
-        add(root, *parts.feedback, explanation)
-        return QuestionItem(name, document(root), tuple(self.pictures))
+        values = {
+            "identifier": name,
+            "title": f"{self.quiz.title}: {title}" if self.quiz.title else title,
+            "language": self.course.language or "en",
+            "style": STYLE,
+            "text": self._blocks(question.text),
+            "task": "",
+            "hints": [
+                (self.words("package.hint", n=number), self._blocks(hint))
+                for number, hint in enumerate(question.hints, 1)
+            ],
+            "feedback": [],
+        }
+        data = render_xml(_TEMPLATE, **values | response | {"explanation": self._said(question)})
+        return QuestionItem(name, data, tuple(self.pictures))
 
-    def _body(self, question: AnyQuestion, parts: ResponseParts) -> Element:
-        body = element("itemBody", {}, *self._blocks(question.text), *parts.before)
-        for number, hint in enumerate(question.hints, 1):
-            title = self.words("package.hint", n=number)
-            add(body, element("infoControl", {"title": title}, *self._blocks(hint)))
-        add(body, *parts.interaction)
-        return body
-
-    def _explanation(self, question: AnyQuestion) -> Element | None:
-        inner = self._reference(question) if isinstance(question, OpenQuestion) else []
-        inner += self._blocks(question.explain)
+    def _said(self, question: AnyQuestion) -> Markup:
+        """What everyone is told in the end."""
+        said = self._reference(question) if isinstance(question, OpenQuestion) else Markup()
+        said += self._blocks(question.explain)
         if isinstance(question, ChoiceQuestion) and question.sim is not None:
             address = self._link(f"#{self.quiz.anchor(question.key)}")
             if address is None:
                 self.flow.lost.append("its simulation is on its page alone, and left out")
             else:
                 link = element("a", {"href": address}, self.words("package.simulation"))
-                inner.append(element("p", {}, link))
+                said += markup([element("p", {}, link)])
                 self.flow.lost.append("its simulation is on its page alone, and the item links it")
-        return feedback(EXPLANATION, inner) if inner else None
+        return said
 
     # --- texts
 
-    def _blocks(self, blocks: tuple[Block, ...]) -> list[Element]:
-        return self.flow.blocks(self.page.blocks(blocks))
+    def _blocks(self, blocks: tuple[Block, ...]) -> Markup:
+        return markup(self.flow.blocks(self.page.blocks(blocks)))
 
-    def _line(self, inlines: tuple[Inline, ...]) -> list[Element | str]:
-        return self.flow.line(self.page.inlines(inlines))
-
-    def _words(self, key: str, **values: str | int) -> Element:
-        return element("p", {}, self.words(key, **values))
+    def _line(self, inlines: tuple[Inline, ...]) -> Markup:
+        return markup(self.flow.line(self.page.inlines(inlines)))
 
     def _link(self, address: str) -> str | None:
         """An address on the page for someone who has the package alone, if there is one."""
@@ -188,96 +157,69 @@ class _Writer:
 
     # --- kinds of questions
 
-    def _parts(self, question: AnyQuestion) -> ResponseParts | None:
+    def _response(self, question: AnyQuestion) -> dict[str, Any] | None:
+        """What differs between the kinds: the response, the right ones, how it is asked for."""
         match question:
             case ChoiceQuestion():
-                return self._choice(question)
+                options = [(letter(index), option) for index, option in enumerate(question.options)]
+                feedback = [(name, o.feedback) for name, o in options if o.feedback]
+                return {
+                    "cardinality": "multiple" if question.several else "single",
+                    "base": "identifier",
+                    "right": [letter(index) for index in question.answers],
+                    "task": self.words("package.choose_all") if question.several else "",
+                    "options": [(name, self._line(option.text)) for name, option in options],
+                    "feedback": [(name, self._blocks(said)) for name, said in feedback],
+                }
             case NumericQuestion():
-                return self._numeric(question)
+                unit = self.flow.line(unit_html(question.unit)) if question.unit else []
+                return {
+                    "cardinality": "single",
+                    "base": "float",
+                    "right": [_double(question.answer)],
+                    "length": 12,
+                    "unit": markup([" ", *unit] if unit else []),
+                    "tolerance": _double(question.tolerance),
+                }
             case OutputQuestion():
                 return self._output(question)
             case OpenQuestion():
-                return self._open(question)
+                reference = self._reference(question)
+                return {
+                    "cardinality": "single", "base": "string", "right": [], "reference": reference
+                }  # fmt: skip
             case OrderQuestion():
-                return self._order(question)
+                shown = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
+                names = {index: letter(place) for place, index in enumerate(shown)}
+                return {
+                    "cardinality": "ordered",
+                    "base": "identifier",
+                    "right": [names[index] for index in range(len(names))],
+                    "task": self.words("package.order"),
+                    "options": [(names[i], self._line(question.items[i])) for i in shown],
+                }
             case _:
                 assert_never(question)
 
-    def _choice(self, question: ChoiceQuestion) -> ResponseParts:
-        options = [(letter(index), option) for index, option in enumerate(question.options)]
-        choices = (
-            element("simpleChoice", {"identifier": name}, *self._line(option.text))
-            for name, option in options
-        )
-        given = {"responseIdentifier": RESPONSE, "shuffle": "false"}
-        given["maxChoices"] = "0" if question.several else "1"
-        interaction = element("choiceInteraction", given, *choices)
-        answers = tuple(
-            feedback(name, self._blocks(option.feedback), title=name)
-            for name, option in options
-            if option.feedback
-        )
-        cardinality = "multiple" if question.several else "single"
-        return ResponseParts(
-            response(cardinality, "identifier", [letter(index) for index in question.answers]),
-            (interaction,),
-            before=(self._words("package.choose_all"),) if question.several else (),
-            test=matches(),
-            feedback=answers,
-        )
-
-    def _numeric(self, question: NumericQuestion) -> ResponseParts:
-        field = element("textEntryInteraction", {"responseIdentifier": RESPONSE})
-        field.set("expectedLength", "12")
-        line = element("p", {}, field)
-        if question.unit:
-            add(line, " ", *self.flow.line(unit_html(question.unit)))
-        within = double(question.tolerance)
-        how = {"toleranceMode": "absolute", "tolerance": f"{within} {within}"}
-        return ResponseParts(
-            response("single", "float", [double(question.answer)]),
-            (line,),
-            test=element("equal", how, *compared()),
-        )
-
-    def _output(self, question: OutputQuestion) -> ResponseParts | None:
+    def _output(self, question: OutputQuestion) -> dict[str, Any] | None:
         answer = output_line(self.page, question.script, question.line)
         if answer is None:
             self.flow.lost.append("it is left out: its script was not run, so nobody knows the key")
             return None
-        field = element("textEntryInteraction", {"responseIdentifier": RESPONSE})
-        field.set("expectedLength", str(min(max(len(answer), 12), 80)))
-        return ResponseParts(
-            response("single", "string", [answer]),
-            (element("p", {}, field),),
-            before=(self._words("package.output_of", path=question.script, line=question.line),),
-            test=element("stringMatch", {"caseSensitive": "true"}, *compared()),
-        )
+        return {
+            "cardinality": "single",
+            "base": "string",
+            "right": [answer],
+            "task": self.words("package.output_of", path=question.script, line=question.line),
+            "length": min(max(len(answer), 12), 80),
+            "unit": "",
+        }
 
-    def _open(self, question: OpenQuestion) -> ResponseParts:
-        given = {"responseIdentifier": RESPONSE, "expectedLines": "6"}
-        reference = element("rubricBlock", {"view": "scorer"}, *self._reference(question))
-        return ResponseParts(
-            response("single", "string", ()),
-            (reference, element("extendedTextInteraction", given)),
-        )
+    def _reference(self, question: OpenQuestion) -> Markup:
+        title = element("p", {}, self.words("package.reference"))
+        return markup([title]) + self._blocks(question.reference)
 
-    def _reference(self, question: OpenQuestion) -> list[Element]:
-        return [self._words("package.reference"), *self._blocks(question.reference)]
 
-    def _order(self, question: OrderQuestion) -> ResponseParts:
-        shown = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
-        names = {index: letter(place) for place, index in enumerate(shown)}
-        choices = (
-            element(
-                "simpleChoice", {"identifier": names[index]}, *self._line(question.items[index])
-            )
-            for index in shown
-        )
-        given = {"responseIdentifier": RESPONSE, "shuffle": "false"}
-        return ResponseParts(
-            response("ordered", "identifier", [names[index] for index in range(len(names))]),
-            (element("orderInteraction", given, *choices),),
-            before=(self._words("package.order"),),
-            test=matches(),
-        )
+def _double(value: float) -> str:
+    """As XML Schema writes a number, digit by digit; zero has no sign."""
+    return repr(float(value) + 0.0)

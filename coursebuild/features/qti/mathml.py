@@ -13,8 +13,6 @@ import re
 from coursebuild.core.pages.html_tree import HtmlElement
 from coursebuild.core.pages.xml import Element, add, element
 
-NAMESPACE = "http://www.w3.org/1998/Math/MathML"
-
 _TOKEN = "mathvariant mathsize mathcolor mathbackground"
 _SCRIPT = "subscriptshift superscriptshift"
 _ATTRIBUTES = {
