@@ -1,6 +1,6 @@
-"""What odd machines and poisoned entries do to a build: a table of what was tried and survived.
+"""What odd machines, kills and poisoned entries do to a build: what was tried and survived.
 
-Run: python benchmarks/attacks.py [--entries 500] [--seed 21]
+Run: python benchmarks/attacks.py [--kills 500] [--entries 500] [--seed 21]
 
 Each attack begins with a course whose site is built, and whose lesson has changed since. A build
 survives if it ends with status 0 or 1 and a message, without a traceback; if the lesson is as it
@@ -11,6 +11,9 @@ not odd, makes the new one.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import functools
+import itertools
 import json
 import random
 import shutil
@@ -18,8 +21,9 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import TypeAlias
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
@@ -27,8 +31,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 import msgspec  # noqa: E402
 
 from coursebuild.core.engine.memo import HASH, sealed, unsealed  # noqa: E402
-from support.poisoned_values import poisoned  # noqa: E402
-from support.scratch_course import Folder, block, command  # noqa: E402
+from support.mortal_commands import DIED, Mortals, mortal_commands  # noqa: E402
+from support.poisoned_values import changed  # noqa: E402
+from support.scratch_course import Folder, block, command, wait_until_alone  # noqa: E402
 
 LESSON = "## One\n\n$a_{1}$\n\n" + block("a.py", "print(1)", "1") + block("b.py", "print(2)", "2")
 CHANGED = LESSON.replace("print(2)", "print(1 + 1)") + "Now $a_{2}$ as well.\n"
@@ -64,6 +69,10 @@ MACHINES: dict[str, str] = {
 """What a shell does before it starts the build, in a mount namespace of its own where it can."""
 
 
+Try: TypeAlias = tuple[str, Callable[[], tuple[int, str]], bool]
+"""Its name, what does it, and whether what it leaves may be believed."""
+
+
 class Attack:
     """A course to attack, and what must be true afterwards."""
 
@@ -77,6 +86,8 @@ class Attack:
         self.template.write(self.template.lesson(), CHANGED)
         self.folder = Folder(top / "victim")
         self.outcome = ""
+        self.deaths = 0
+        """How many builds were killed: some got through before, as they made fewer calls."""
         self.again()
         self.build(self.folder)
         self.new = site(self.folder)
@@ -139,76 +150,128 @@ class Attack:
             return 70, traceback.format_exc()
         return done.status, done.out + done.err
 
+    def calls(self, mortals: Mortals, count: int) -> Iterator[tuple[str, bool, int]]:
+        """Calls at which to kill a build, spread over all.
+
+        With and without an exchange of two folders in one step.
+        """
+        found = []
+        for mortals.exchanges in (True, False):
+            self.again()
+            _, names = mortals.run(self.folder, "build", "-q")
+            found += [
+                (f"{name}, call {number}", mortals.exchanges, number)
+                for number, name in enumerate(names, 1)
+            ]
+        print(f"a build can be killed at {len(found)} calls", flush=True)
+        count = min(count, len(found))
+        return (found[len(found) * number // count] for number in range(count))
+
+    def killed(self, mortals: Mortals, exchanges: bool, fatal: int) -> tuple[int, str]:
+        self.again()
+        mortals.exchanges = exchanges
+        status, _ = mortals.run(self.folder, "build", "-q", fatal=fatal)
+        wait_until_alone(self.folder)
+        self.deaths += status == DIED
+        return 0 if status == DIED else status, mortals.said
+
     def entries(self, count: int, seed: int) -> Iterator[tuple[str, bytes, bool]]:
-        """Entries of the store in turn: with a bit wrong, cut, or with a seal and wrong data.
+        """Entries of each kind in turn: with a bit wrong, cut, or with a seal and wrong data.
 
         With each it is said whether its seal is true.
         """
         chance = random.Random(seed)
-        top = self.template.root / ".coursebuild"
-        found = [
-            path.relative_to(self.template.root).as_posix()
-            for path in sorted(top.rglob("*"))
-            if HASH.fullmatch(path.name) and path.is_file()
-        ]
-        for number in range(count):
-            path = found[number % len(found)]
+        kinds: dict[str, list[str]] = {}
+        for path in sorted((self.template.root / ".coursebuild").rglob("*")):
+            if HASH.fullmatch(path.name) and path.is_file():
+                name = path.relative_to(self.template.root).as_posix()
+                kinds.setdefault(name.split("/")[1], []).append(name)
+        for number, kind in zip(range(count), itertools.cycle(kinds), strict=False):
+            path = chance.choice(kinds[kind])
             whole = self.template.read(path)
             name = path.removeprefix(".coursebuild/")
             data = unsealed(name, whole)
             at = chance.randrange(len(whole))
-            if number % 3 == 0 or data is None:
+            damage = chance.random()
+            if damage < 0.1 or data is None:
                 flipped = bytes([whole[at] ^ 1 << number % 8])
                 yield path, whole[:at] + flipped + whole[at + 1 :], False
-            elif number % 9 == 1:
+            elif damage < 0.2:
                 yield path, whole[:at], False
             else:
-                yield path, sealed(name, changed(data, chance.randrange(10**6))), True
+                yield path, sealed(name, poisoned(data, chance)), True
 
 
-def changed(data: bytes, seed: int) -> bytes:
-    """Data that still looks like what it is: one value in it is another."""
+def poisoned(data: bytes, chance: random.Random) -> bytes:
+    """Data that still looks like what it is: one value in it is another, often of another type."""
     for decode, encode in (
         (json.loads, lambda value: json.dumps(value).encode()),
         (msgspec.msgpack.decode, msgspec.msgpack.encode),
     ):
-        try:
-            text = json.dumps(decode(data)).encode()
-            *_, last = poisoned(text, seed % 40 + 1)
-            return encode(json.loads(last))
-        except (ArithmeticError, ValueError, TypeError, msgspec.MsgspecError):
-            continue
+        with contextlib.suppress(ValueError, TypeError, RecursionError, msgspec.MsgspecError):
+            value = decode(data)
+            while True:
+                with contextlib.suppress(OverflowError, UnicodeEncodeError):
+                    return encode(changed(value, chance))
     return data[: len(data) // 2]
 
 
 def site(folder: Folder) -> dict[str, bytes]:
-    return folder.tree("public")
+    """What is published; between two renames it is what the next build puts back."""
+    return folder.tree("public") or folder.tree(".public.coursebuild-old")
+
+
+class Table:
+    """What was tried, and what was not survived."""
+
+    def __init__(self, attack: Attack) -> None:
+        self.attack = attack
+        self.failed: list[str] = []
+
+    def row(self, what: str, attacks: Iterable[Try], *, every: bool = False) -> None:
+        """Try attacks of a kind; `every` one gets a line."""
+        tried, before = 0, len(self.failed)
+        for name, run, believed in attacks:
+            wrong = self.attack.wrong(run, believed=believed)
+            tried += 1
+            if wrong:
+                self.failed.append(f"{name}: {wrong}")
+                print(self.failed[-1], flush=True)
+            elif every:
+                print(f"{name:36}{self.attack.outcome}", flush=True)
+        survived = tried - len(self.failed) + before
+        print(f"{what}: {tried} tried, {survived} survived", flush=True)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=520)
     parser.add_argument("--entries", type=int, default=500)
     parser.add_argument("--seed", type=int, default=21)
     chosen = parser.parse_args()
-    failed = []
     with tempfile.TemporaryDirectory() as top:
         attack = Attack(Path(top))
-        for name, oddity in MACHINES.items():
-            wrong = attack.wrong(lambda oddity=oddity: attack.machine(oddity))
-            failed += [f"{name}: {wrong}"] if wrong else []
-            said = attack.outcome if not wrong else "not survived"
-            print(f"{name:36}{said}", flush=True)
-        print(f"odd machines: {len(MACHINES)} tried, {len(MACHINES) - len(failed)} survived")
-        machines = len(failed)
-        for path, data, believed in attack.entries(chosen.entries, chosen.seed):
-            wrong = attack.wrong(
-                lambda path=path, data=data: attack.entry(path, data), believed=believed
+        table = Table(attack)
+        machines = (
+            (name, functools.partial(attack.machine, oddity), False)
+            for name, oddity in MACHINES.items()
+        )
+        table.row("odd machines", machines, every=True)
+        mortal = Folder(Path(top) / "mortal")
+        mortal.root.mkdir()
+        with mortal_commands(mortal) as mortals:
+            kills = (
+                (name, functools.partial(attack.killed, mortals, exchanges, at), False)
+                for name, exchanges, at in attack.calls(mortals, chosen.kills)
             )
-            failed += [f"{path[:40]}: {wrong}"] if wrong else []
-        survived = chosen.entries - len(failed) + machines
-        print(f"damaged or poisoned entries: {chosen.entries} tried, {survived} survived")
-    print("\n".join(failed))
-    return 1 if failed else 0
+            table.row("kills", kills)
+            print(f"killed: {attack.deaths}")
+        entries = (
+            (path[:40], functools.partial(attack.entry, path, data), believed)
+            for path, data, believed in attack.entries(chosen.entries, chosen.seed)
+        )
+        table.row("damaged or poisoned entries", entries)
+    return 1 if table.failed else 0
 
 
 if __name__ == "__main__":

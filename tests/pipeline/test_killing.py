@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from support.mortal_commands import Mortals, mortal_commands
 from support.scratch_course import GOOD, Folder, block, ended, wait_until_alone
 
 pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
 
-ROOT = Path(__file__).parents[2]
-DIED = 137
 STRUCTURAL = ("open", "mkdir", "link", "rename", "replace", "unlink", "rmdir", "exchange")
 """Calls that change what a folder holds."""
 
@@ -28,53 +25,11 @@ OLD = "## One\n\n" + block("kept.py", "print(1)", "1") + block("gone.py", "print
 NEW = OLD.replace("gone.py", "new.py").replace("print(1)", "print(1)  # edited") + "Edited.\n"
 
 
-class Mortals:
-    """Commands that die at a given call; see `support/killed_commands.py`."""
-
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        self.process = process
-        self.exchanges = True
-        """Whether two folders can be swapped in one step."""
-        self.said = ""
-        """What the last one wrote for its user."""
-
-    def run(
-        self, folder: Folder, *arguments: str, fatal: int = 0, fault: str = ""
-    ) -> tuple[int, list[str]]:
-        """The exit status, and the names of the calls where it got through."""
-        assert self.process.stdin is not None and self.process.stdout is not None
-        request = {"folder": str(folder.root), "arguments": arguments, "fatal": fatal}
-        request |= {"exchanges": self.exchanges, "fault": fault}
-        print(json.dumps(request), file=self.process.stdin, flush=True)
-        reply = json.loads(self.process.stdout.readline())
-        self.said = reply["said"]
-        return reply["status"], reply["calls"]
-
-    def die(self, folder: Folder, *arguments: str, fatal: int) -> None:
-        """Run a command that dies at this call.
-
-        What was saved a moment ago is not noted down, so that a run may have a few calls less: it
-        got through then, which leaves what a whole run leaves.
-        """
-        status, calls = self.run(folder, *arguments, fatal=fatal)
-        assert status == DIED or (status == 0 and fatal - 4 <= len(calls) < fatal), (status, fatal)
-        wait_until_alone(folder)
-
-
 @pytest.fixture(scope="module")
 def module_mortals(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mortals]:
     folder = Folder(tmp_path_factory.mktemp("mortals"))
-    folder.tmp.mkdir()
-    process = subprocess.Popen(
-        [sys.executable, str(ROOT / "tests/support/killed_commands.py")],
-        env=folder.environment(),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    with process:
-        yield Mortals(process)
-        process.kill()
+    with mortal_commands(folder) as mortals:
+        yield mortals
 
 
 @pytest.fixture(params=[True])

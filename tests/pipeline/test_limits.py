@@ -55,9 +55,27 @@ def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
     assert "error[script-failed]" in done.out and "MemoryError" in done.out
 
 
-@pytest.mark.parametrize("piece", ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `"])
+@pytest.mark.parametrize(
+    "piece",
+    ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `", "<script>\n", "<title>"],
+)
 def test_reading_takes_as_long_as_the_text_whatever_is_broken_in_it(piece: str) -> None:
     def read(count: int) -> None:
         parse_document(Source("x.md", piece * count), frozenset(), lesson=False)
 
     assert processor_time_growth(read, 250) < 24
+
+
+@pytest.mark.parametrize("quotes", ["> ", "> - ", "- > ", "> 1. "])
+def test_containers_that_hold_too_many_lines_together_are_told_and_read_no_further(
+    quotes: str,
+) -> None:
+    def read(depth: int) -> list[str]:
+        text = quotes * depth + "A\n" + "B\n" * 4_000
+        return [
+            d.rule
+            for d in parse_document(Source("x.md", text), frozenset(), lesson=False).diagnostics
+        ]
+
+    assert (read(2), read(16)) == ([], ["nesting-deep"])
+    assert processor_time_growth(read, 2) < 5, "the depth is another, the text is not"

@@ -24,17 +24,22 @@ def _places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
         yield from _places(child, (*path, index))
 
 
+def changed(value: Any, chance: random.Random) -> Any:
+    """A copy of a value of JSON in which something is put in one place, or taken away."""
+    path = (0, *chance.choice(list(_places(value))))
+    whole = [copy.deepcopy(value)]
+    parent: Any = whole
+    for step in path[:-1]:
+        parent = parent[step]
+    if chance.random() < 0.15 and len(path) > 1:
+        del parent[path[-1]]
+    else:
+        parent[path[-1]] = chance.choice(_PUT)
+    return whole[0]
+
+
 def poisoned(text: bytes, count: int) -> Iterator[bytes]:
-    """As many changes of a JSON text: each puts something in one place, or takes it away."""
+    """As many changes of a JSON text."""
     value, chance = json.loads(text), random.Random(21)
-    places = list(_places(value))
     for _ in range(count):
-        changed, path = [copy.deepcopy(value)], (0, *chance.choice(places))
-        parent: Any = changed
-        for step in path[:-1]:
-            parent = parent[step]
-        if chance.random() < 0.15 and len(path) > 1:
-            del parent[path[-1]]
-        else:
-            parent[path[-1]] = chance.choice(_PUT)
-        yield json.dumps(changed[0]).encode()
+        yield json.dumps(changed(value, chance)).encode()

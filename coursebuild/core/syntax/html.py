@@ -9,7 +9,9 @@ was opened in, as the page would be torn otherwise.
 
 from __future__ import annotations
 
+import functools
 import re
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator
 from html import unescape
@@ -64,10 +66,17 @@ def tag_at(text: str, at: int) -> Tag | None:
     name, closes = tag[2].lower(), bool(tag[1])
     complete = name in VOID or (tag[3].endswith("/") and not closes)
     if name in _RAW_TEXT and not closes and not complete:
-        end_tag = re.compile(rf"</{name}\s*>", re.IGNORECASE).search(text, tag.end())
-        if end_tag is not None:
-            return Tag(at, end_tag.end(), name, False, True)
+        ends = _ends(text, name)
+        following = bisect_right(ends, tag.end())
+        if following < len(ends):
+            return Tag(at, ends[following], name, False, True)
     return Tag(at, tag.end(), name, closes, complete)
+
+
+@functools.lru_cache(maxsize=4)
+def _ends(text: str, name: str) -> list[int]:
+    """Where the end tags of an element end."""
+    return [end.end() for end in re.finditer(rf"</{name}\s*>", text, re.IGNORECASE)]
 
 
 def tags(text: str) -> Iterator[Tag]:

@@ -5,7 +5,9 @@ what markdown-it does:
 
 1. The first token of a block gets its place, and the rows that its content was cut from.
 2. Link definitions keep the rows that hold them.
-3. What is nested deeper than `MAX_NESTING` becomes paragraphs: nothing is lost, nothing overflows.
+3. What is nested deeper than `MAX_NESTING` becomes paragraphs, which say so: nothing is lost, and
+   nothing overflows. The same becomes of what is in containers where these hold far more lines
+   together than the text has: each of them reads its lines again.
 """
 
 from __future__ import annotations
@@ -28,6 +30,11 @@ from coursebuild.core.text.source import Excerpt
 
 MAX_NESTING = 60
 """Containers inside each other; a list with its item counts as two."""
+TOO_DEEP = "too deep"
+"""The info of a paragraph that would be something else, did it not nest so deep."""
+_READINGS = 5
+_SPARE_LINES = 10_000
+"""How often containers may read the lines of a text, on average, and how many lines more."""
 
 BlockRule = Callable[[StateBlock, int, int, bool], bool]
 
@@ -58,6 +65,7 @@ def block_tokens(base: Excerpt, definitions: Definitions) -> list[PositionedToke
     """
     env: EnvType = {**environment(definitions), "definitions": definitions, "base": base}
     state = BlockState(base.text, _MARKDOWN, env)
+    state.lines_left = _READINGS * state.lineMax + _SPARE_LINES
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
     return cast(list[PositionedToken], state.tokens)
 
@@ -95,9 +103,25 @@ def _located_reference(state: StateBlock, start: int, end: int, silent: bool) ->
     return True
 
 
+class _BlockParser(ParserBlock):
+    """Counts the lines that containers read."""
+
+    def tokenize(self, state: StateBlock, startLine: int, endLine: int) -> None:
+        assert isinstance(state, BlockState)
+        state.lines_left -= endLine - startLine
+        super().tokenize(state, startLine, endLine)
+
+
 def _too_deep(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     """A paragraph, where containers nest deeper than anybody writes them."""
-    return not silent and state.level >= MAX_NESTING and paragraph(state, start, end, False)
+    assert isinstance(state, BlockState)
+    deep = state.level >= MAX_NESTING or (state.level > 0 and state.lines_left < 0)
+    if silent or not deep:
+        return False
+    at = len(state.tokens)
+    paragraph(state, start, end, False)
+    state.tokens[at].info = TOO_DEEP
+    return True
 
 
 def _placed(rule: BlockRule) -> BlockRule:
@@ -147,7 +171,7 @@ def _atx_row(state: BlockState, begin: int) -> list[SourceSlice]:
 def _configured() -> MarkdownIt:
     """The parser: markdown-it's rules and ours, each with the blocks that it may interrupt."""
     md = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
-    md.block = ParserBlock()
+    md.block = _BlockParser()
     rules = {known.name: (known.fn, known.alt) for known in md.block.ruler.__rules__}
     interrupts = ["paragraph", "reference", "blockquote"]
     rules["reference"] = (_located_reference, [])

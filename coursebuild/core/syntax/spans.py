@@ -54,6 +54,8 @@ class BlockState(StateBlock):
     def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
         super().__init__(src, md, env, [])
         self.rows: Sequence[SourceSlice] = ()
+        self.lines_left = 0
+        """How many lines containers may still read."""
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
         """Add a token; that of an item of a list, which has no rule of its own, gets its place."""

@@ -24,7 +24,7 @@ from coursebuild.core.syntax.figure import WORD, read_figure
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
 from coursebuild.core.syntax.html import Balance, media_of, tags
 from coursebuild.core.syntax.inlines import InlineReader
-from coursebuild.core.syntax.markdown import Definitions, block_tokens
+from coursebuild.core.syntax.markdown import TOO_DEEP, Definitions, block_tokens
 from coursebuild.core.syntax.parsing_state import ParsingState, Written
 from coursebuild.core.syntax.recording import (
     is_caption,
@@ -67,6 +67,11 @@ class TextReader:
                 label_span = self.base.span(at, at + len(label))
                 read = self._later(i + 1)
                 self.session.notes.write(Written(label, label_span, self._span(token), read))
+        deep = next((token for token in self.tokens if token.info == TOO_DEEP), None)
+        if deep is not None:
+            message = "quotes, lists or footnotes nest too deep here"
+            place = self._span(deep).first_line()
+            self.session.report(diagnose("nesting-deep", place, message))
 
     def _later(self, at: int) -> Callable[[], tuple[model.Block, ...]]:
         """Reads the footnote whose first token has the index `at`."""

@@ -89,6 +89,7 @@ _CATALOGUE: tuple[tuple[str, Literal["error", "warning"], str], ...] = (
         "error",
         "A heading of level 1 in a lesson, or one over a page that is not its title in the map.",
     ),
+    ("nesting-deep", "error", "Quotes, lists or footnotes nest too deep."),
     ("heading-skip", "warning", "A heading skips a level."),
     ("heading-empty", "error", "A heading has no text."),
     ("heading-attributes", "error", "The attributes after a heading cannot be read."),
