@@ -21,7 +21,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes, read_folder
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Course
-from coursebuild.core.model.theme import TEMPLATES, Theme, ThemeFile
+from coursebuild.core.model.theme import PICTURES, TEMPLATES, Theme, ThemeFile
 from coursebuild.core.pages.font_files import course_face
 from coursebuild.core.pages.templates import TemplateFailure, template_mistake
 from coursebuild.core.pages.theme import picture_size
@@ -53,10 +53,7 @@ def load_theme(root: Path, theme: Theme) -> Parsed[Theme]:
     templates = read_folder(root, TEMPLATES.rstrip("/"))
     whole = replace(
         theme,
-        logo=read(theme.logo),
-        logo_dark=read(theme.logo_dark),
-        icon=read(theme.icon),
-        touch_icon=read(theme.touch_icon),
+        **{name: read(getattr(theme, name)) for name in PICTURES},
         css=all_read(theme.css),
         fonts=tuple(
             replace(

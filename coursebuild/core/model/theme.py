@@ -64,7 +64,7 @@ class Theme(Struct, frozen=True):
     @property
     def pictures(self) -> tuple[ThemeFile, ...]:
         """Its logo and its icons."""
-        named = (self.logo, self.logo_dark, self.icon, self.touch_icon)
+        named = (getattr(self, name) for name in PICTURES)
         return tuple(file for file in named if file is not None)
 
     @property
@@ -73,4 +73,6 @@ class Theme(Struct, frozen=True):
         return tuple((one.path.removeprefix(TEMPLATES), one.text) for one in self.templates)
 
 
+PICTURES = ("logo", "logo_dark", "icon", "touch_icon")
+"""The fields of its pictures."""
 TEMPLATES = "theme/templates/"

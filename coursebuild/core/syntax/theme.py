@@ -9,9 +9,10 @@ from collections.abc import Iterator
 from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, LEAST, contrast, legible
-from coursebuild.core.model.theme import Accent, FontFamily, Theme, ThemeFile
+from coursebuild.core.model.theme import PICTURES, Accent, FontFamily, Theme, ThemeFile
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
@@ -71,11 +72,9 @@ def theme(node: Node | None, fields: ThemeTable | None) -> Theme:
     def accent(name: str, colour: str | None) -> Accent | None:
         return None if colour is None else Accent(colour.lower(), node.place(name))
 
-    return Theme(
-        logo=file("logo", fields.logo),
-        logo_dark=file("logo_dark", fields.logo_dark),
-        icon=file("icon", fields.icon),
-        touch_icon=file("touch_icon", fields.touch_icon),
+    return replace(
+        Theme(),
+        **{name: file(name, getattr(fields, name)) for name in PICTURES},
         accent=accent("accent", fields.accent),
         accent_dark=accent("accent_dark", fields.accent_dark),
         css=_files(node, "css", fields.css),
