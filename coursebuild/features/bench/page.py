@@ -123,15 +123,20 @@ def _view(page: PageContext, block: Bench) -> BenchView:
     if shown.report is None or shown.machine is None:
         return nothing
     made = where(words, shown.machine)
+    alone = block.shows == ("table",)
     if isinstance(shown.report, SweepReport):
         swept = sweep_view(words, shown.report)
         return replace(
-            nothing, title=swept.title, notes=swept.notes, folded=swept.table, where=made
+            nothing,
+            title=swept.title,
+            notes=swept.notes,
+            tables=(swept.table,) if alone else (),
+            folded=None if alone else swept.table,
+            where=made,
         )
     view = scenario_view(words, shown.report, "")
     grids = {"stable": view.stable, "orders": view.orders}
     tables = [grid for name in block.shows if (grid := grids.get(name)) is not None]
-    alone = block.shows == ("table",)
     settings = bool({"plot", "table"}.intersection(block.shows))
     return replace(
         nothing,
