@@ -31,7 +31,7 @@ class LabEngine:
     """Tries labs, one after the other; a context manager for use in one thread."""
 
     def __init__(self, memory: int = MEMORY, patience: float = _PATIENCE) -> None:
-        """`memory`: MiB, of which those of WebAssembly are a part.
+        """`memory`: MiB of JavaScript objects; WebAssembly's memory comes on top.
 
         `patience`: seconds of processor time for which a trial need not get on.
         """

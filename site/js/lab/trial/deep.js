@@ -4,8 +4,8 @@
  *   deepContact(engine, model, data) → {names, depth} | null
  *
  * How deep is too deep only the author knows. What can be said of any model: a contact deeper than half of what the thinner
- * of the two geoms measures in its shortest direction, so that its middle lies in the other one. (effects/mujoco_watching.py
- * says the same of scripts.)
+ * of the two geoms measures in its shortest direction, so that its middle lies in the other one.
+ * (core/run/mujoco_watching.py says the same of scripts.)
  */
 
 import { eachContact } from '../core/lib.js'
