@@ -1,4 +1,4 @@
-"""What a page decides about the HTML of Markdown.
+"""What the writer of HTML (`markup.py`) asks a page.
 
 Entry points: `Context`, which is asked what depends on the course; `HtmlOptions`, details of the
 HTML; `OwnBlock`, the blocks that are more than Markdown.
@@ -28,7 +28,7 @@ OwnBlock: TypeAlias = Callout | Mjcf | PlainCode | FeatureBlock | Recording | Sc
 
 
 class Context(Protocol):
-    """What a page decides. A `Markup` that it gives is HTML already, a string is not."""
+    """Answers for one page. A `Markup` is HTML already, a string is not."""
 
     def href(self, target: Target) -> str:
         """The address of a link."""
@@ -63,7 +63,7 @@ class Context(Protocol):
         ...
 
     def block(self, block: OwnBlock) -> Markup:
-        """A block of ours."""
+        """A block that is more than Markdown."""
         ...
 
 

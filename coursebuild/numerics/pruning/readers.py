@@ -27,14 +27,15 @@ _LEAVE_MODELS_ALONE = frozenset(
     " functools heapq itertools json math matplotlib mjcourse mpmath mujoco numbers numpy pathlib"
     " random scipy statistics sys textwrap time typing warnings".split(" ")
 )
-"""Modules that ask a model that they are given for nothing."""
+"""Modules that read nothing from a model that they are given."""
 _SIMULATION = frozenset(
     "mj_Euler mj_comPos mj_crb mj_differentiatePos mj_energyPos mj_energyVel mj_forward mj_fullM"
     " mj_fwdPosition mj_fwdVelocity mj_getState mj_integratePos mj_inverse mj_kinematics mj_mulM"
     " mj_normalizeQuat mj_resetData mj_resetDataKeyframe mj_rne mj_setConst mj_setState mj_solveM"
     " mj_stateSize mj_step mj_step1 mj_step2 mj_subtreeVel".split(" ")
 )
-"""Functions of MuJoCo's that tell nothing of the whole, and take no number but of a keyframe."""
+"""Functions of MuJoCo that reveal nothing of the model as a whole. A keyframe is the only thing
+that they take by its number."""
 _OPAQUE = frozenset(
     # reflection
     "__import__ breakpoint compile delattr dir eval exec format format_map getattr globals hasattr"
@@ -44,9 +45,9 @@ _OPAQUE = frozenset(
     " scandir walk MjSpec MjvScene Renderer rollout".split(" ")
 )
 _THING = re.compile(r"""\w+\s*\.\s*(\w+)\(\s*(?:"[^"\\]*"|'[^'\\]*')\s*\)(?:\s*\.\s*(\w+))?""")
-"""One thing that is asked for by a complete name, and what it is asked for."""
+"""An access to one thing by its complete name, and the attribute that is read from it."""
 _RESET = re.compile(r"""mj_resetDataKeyframe\(\w+, \w+, \w+\.key\(("[^"\\]*"|'[^'\\]*')\)\.id\)""")
-"""The number of a keyframe, which is asked for by a complete name."""
+"""A reset to a keyframe that is given by its complete name."""
 _TEXT = re.compile(r""""((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)'|`([^`]*)`""")
 _LITERAL = r"(?<![fF])(?:\"\"\"[\s\S]*?\"\"\"|\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*')"
 _PROSE = {
@@ -55,7 +56,7 @@ _PROSE = {
 }
 """Texts and comments, in which no code stands: of Python, and of JavaScript."""
 _FILLED = re.compile(r"([\"'])\s*\.format\(")
-"""A text that asks for fields of what it is given."""
+"""A text that may read attributes of its arguments."""
 _FUNCTION = re.compile(r"mj[dsprv]?_")
 _WORD = re.compile(r"[^\W\d]\w*")
 _MEMBER = re.compile(r"\.\s*([^\W\d]\w*)")
@@ -72,7 +73,7 @@ _REFERENCES = frozenset(
 )
 """Fields that hold numbers of things other than bodies and joints."""
 _NUMBERS = frozenset(("adr", "id", "num"))
-"""By which one thing may be told from the numbers of the others."""
+"""Attributes that may change when another thing is taken away: addresses, numbers, counts."""
 
 
 class Reader(Struct, frozen=True):
@@ -80,15 +81,15 @@ class Reader(Struct, frozen=True):
 
     path: str
     names: frozenset[str] = frozenset()
-    """Complete texts: things may be called so."""
+    """Its string literals: any may be the name of a thing."""
     words: frozenset[str] = frozenset()
-    """All that stand in it: fields may be called so."""
+    """Its words: any may be the name of a field."""
     members: frozenset[str] = frozenset()
-    """Words that it asks anything for."""
+    """Words after a dot."""
     parts: frozenset[tuple[str, str]] = frozenset()
-    """What it asks one thing for that it names, by the kind of the thing."""
+    """Attributes read from a thing that is given by its name, each with the kind of the thing."""
     kinds: frozenset[str] = frozenset()
-    """Of which it may ask for any thing."""
+    """Kinds of which it may read any thing."""
     opaque: str = ""
     """Why it may use everything; empty where it does not."""
 
