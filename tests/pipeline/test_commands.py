@@ -50,7 +50,7 @@ def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> N
     """The collector is set as before, and no file stays open that only garbage holds."""
     course = make(GOOD)
     folder = Path("/proc/self/fd") if Path("/proc/self/fd").exists() else Path("/dev/fd")
-    before = gc.get_threshold(), gc.get_freeze_count()
+    threshold, frozen = gc.get_threshold(), gc.get_freeze_count()
     course.main("check")
     gc.collect()
     opened = len(list(folder.iterdir()))
@@ -58,7 +58,8 @@ def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> N
         course.main("check", "--format", "json")
     gc.collect()
     assert len(list(folder.iterdir())) == opened
-    assert (gc.get_threshold(), gc.get_freeze_count()) == before
+    assert gc.get_threshold() == threshold
+    assert gc.get_freeze_count() <= frozen  # what was frozen before may have ended
 
 
 WRONG_USAGE = [
