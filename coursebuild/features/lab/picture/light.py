@@ -17,8 +17,9 @@ from msgspec import Struct
 
 from coursebuild.features.lab.picture.shapes import Array, unit
 
-_AMBIENT, _FRONT, _ABOVE = 0.45, 0.4, 0.4
-"""A model without lights: light from all sides, from the camera, and from above."""
+_AMBIENT, _FRONT, _ABOVE = 0.35, 0.25, 0.6
+"""A model without lights: light from all sides, from the camera, and from above, where most comes
+from, so that no two sides of a box look alike."""
 _FROM_ABOVE = (0.25, -0.35, 0.9)
 _WITHOUT_LIGHTS = 0.5
 """How strong highlights are there."""

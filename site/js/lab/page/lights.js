@@ -8,9 +8,9 @@
 import { AmbientLight, DirectionalLight, PointLight, SpotLight } from 'three'
 
 const FULL = Math.PI // see materials.js
-const AMBIENT = 0.45
-const FROM_CAMERA = 0.4
-const FROM_ABOVE = 0.4
+const AMBIENT = 0.35
+const FROM_CAMERA = 0.25
+const FROM_ABOVE = 0.6 // most of it, so that no two sides of a box look alike
 export const ABOVE = [0.25, -0.35, 0.9]
 const LIGHT = 7 // floats in a frame
 const SPOT = 0 // mjtLightType
