@@ -29,10 +29,3 @@ def test_importing_mjcourse_loads_numpy_and_nothing_else_that_is_installed() -> 
     # NumPy registers some of its compiled modules under top-level names of its own.
     loaded = [name for name in done.stdout.split() if not name.startswith("_")]
     assert loaded == ["mjcourse", "numpy"]
-
-
-def test_names_of_the_package() -> None:
-    assert mjcourse.__all__ == ["ModelNotFoundError", "model_path", "spatial"]
-    assert issubclass(mjcourse.ModelNotFoundError, FileNotFoundError)
-    assert mjcourse.spatial.quat_to_mat([1, 0, 0, 0]).shape == (3, 3)
-    assert (PACKAGE / "py.typed").is_file()

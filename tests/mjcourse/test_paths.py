@@ -55,26 +55,17 @@ def run(script: Path | str, *arguments: str, cwd: Path, code: str | None = None)
     return done.stdout.strip()
 
 
-@pytest.mark.parametrize(
-    ("name", "file"),
-    [
-        ("box", "box.xml"),
-        ("box.xml", "box.xml"),
-        ("arms/ur5", "arms/ur5.xml"),
-        ("arms/ur5.xml", "arms/ur5.xml"),
-        ("v1.2", "v1.2.xml"),
-        ("v1.2.xml", "v1.2.xml"),
-    ],
-)
-def test_names(course: Path, name: str, file: str) -> None:
-    assert ask(course / "examples" / "x.py", name) == course / "models" / file
-
-
-@pytest.mark.parametrize(
-    "folder", ["examples", "", "examples/deep/down", "content/lessons", "models"]
-)
-def test_from_anywhere_in_the_course(course: Path, folder: str) -> None:
-    assert ask(course / folder / "x.py") == course / "models" / "box.xml"
+def test_names_from_anywhere_in_the_course(course: Path) -> None:
+    for name, file in {
+        "box": "box.xml",
+        "box.xml": "box.xml",
+        "arms/ur5": "arms/ur5.xml",
+        "v1.2": "v1.2.xml",
+        "v1.2.xml": "v1.2.xml",
+    }.items():
+        assert ask(course / "examples" / "x.py", name) == course / "models" / file
+    for folder in ("", "examples/deep/down", "content/lessons", "models"):
+        assert ask(course / folder / "x.py") == course / "models" / "box.xml"
 
 
 def test_a_downloaded_course_has_no_content(tmp_path: Path) -> None:
@@ -102,8 +93,6 @@ def test_a_models_folder_alone_is_no_course(tmp_path: Path) -> None:
         ("tumbling_bx", "; did you mean 'tumbling_box'?"),
         ("Tumbling-Box.xml", "; did you mean 'tumbling_box'?"),
         ("ur5", "; did you mean 'arms/ur5'?"),
-        ("legs/panda", "; did you mean 'arms/panda'?"),
-        ("boxx", "; did you mean 'box'?"),
         ("lin", "; did you mean 'tumbling_box'?"),
         ("arms", "; did you mean 'arms/ur5' or 'arms/panda'?"),
         (
@@ -135,16 +124,12 @@ def test_a_course_without_models(course: Path) -> None:
     [
         ("../models/box", "leads out of models/"),
         ("arms/../box", "leads out of models/"),
-        ("..", "leads out of models/"),
         ("/etc/passwd", "is absolute; give it relative to models/"),
         ("", "is not the name of a file below models/"),
-        (".", "is not the name of a file below models/"),
         ("./box", "is not the name of a file below models/"),
-        ("arms//ur5", "is not the name of a file below models/"),
         ("arms/", "is not the name of a file below models/"),
         (".xml", "is not the name of a file below models/"),
         ("arms\\ur5", "holds a character that no portable file name has"),
-        ("C:box", "holds a character that no portable file name has"),
         ("box\0", "holds a character that no portable file name has"),
     ],
 )

@@ -15,31 +15,23 @@ from coursebuild.numerics.scene import scenes
 from support.bench_runs import FAMILY, MODELS, orders, row
 
 pytestmark = pytest.mark.site
-LONG = ("flips", "major")
 
 
 @functools.cache
-def of_box(name: str) -> ScenarioReport:
-    """A scenario of the tumbling box; only the first flip with all timesteps."""
+def of_box() -> ScenarioReport:
+    """The first flip of the tumbling box."""
     text = (MODELS / "tumbling_box.toml").read_text(encoding="utf-8")
     declared = parse_declarations(Source("models/tumbling_box.toml", text)).value
     model = mujoco.MjModel.from_xml_path(str(MODELS / "tumbling_box.xml"))
-    quick = name != "first-flip"
-    (scene,) = (one for one in scenes(model, declared, quick=quick) if one.name == name)
-    return measure_scenario(model, scene, quick=quick, clock=None)
+    (scene,) = (one for one in scenes(model, declared) if one.name == "first-flip")
+    return measure_scenario(model, scene, clock=None)
 
 
-@pytest.fixture(params=["first-flip", *(pytest.param(one, marks=pytest.mark.slow) for one in LONG)])
-def report(request: pytest.FixtureRequest) -> ScenarioReport:
-    return of_box(request.param)
-
-
-def test_a_report_on_the_tumbling_box(report: ScenarioReport) -> None:
+def test_a_report_on_the_tumbling_box() -> None:
     """Its references agree, no error lies below ten floors, what it conserves is found out."""
-    if report.name == "flips":
-        assert report.floor > 1e-7, "an ill-conditioned motion is not called well known"
-    else:
-        assert report.agreement is not None and report.agreement < 1e-10
+    report = of_box()
+    assert report.reference == "closed"
+    assert report.agreement is not None and report.agreement < 1e-10
     for one in report.rows:
         assert one.attitude is not None and one.velocity is not None
         assert min(one.attitude) >= 9.999 * max(report.floor, 1e-14)
@@ -50,24 +42,18 @@ def test_a_report_on_the_tumbling_box(report: ScenarioReport) -> None:
     assert (own.setting.integrator, own.setting.timestep) == ("RK4", 0.002)
     assert (own.setting.solver, own.setting.cone) == ("", ""), "nothing is solved"
     assert report.verdict.noticeable is False
-    count = 35 if report.name == "first-flip" else 20
-    assert len({one.setting for one in report.rows}) == len(report.rows) == count
+    assert len({one.setting for one in report.rows}) == len(report.rows) == 35
 
 
 def test_orders_of_the_tumbling_box() -> None:
-    report = of_box("first-flip")
-    assert report.reference == "closed"
-    for part in ("attitude", "velocity"):
-        found = orders(report, part)
-        for name in FAMILY:
-            assert found[name] == pytest.approx(1.0, abs=0.05)
-    assert orders(report, "attitude")["RK4"] == pytest.approx(2.0, abs=0.05)
-    assert orders(report, "velocity")["RK4"] == pytest.approx(4.0, abs=0.1)
-    assert orders(report, "position") == {}, "its centre does not move"
+    first = dict.fromkeys(FAMILY, 1.0)
+    assert orders(of_box(), "attitude") == pytest.approx({**first, "RK4": 2.0}, abs=0.05)
+    assert orders(of_box(), "velocity") == pytest.approx({**first, "RK4": 4.0}, abs=0.1)
+    assert orders(of_box(), "position") == {}, "its centre does not move"
 
 
 def test_an_error_that_can_be_seen() -> None:
-    coarse, fine = (row(of_box("first-flip"), "Euler", h) for h in (0.004, 0.0005))
+    coarse, fine = (row(of_box(), "Euler", h) for h in (0.004, 0.0005))
     assert coarse.attitude is not None and coarse.seen is not None and fine.seen is not None
     assert coarse.seen == pytest.approx(coarse.attitude[0] * 180 / 3.141592653589793)
     assert coarse.seen > 1 > fine.seen

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import Bands
@@ -34,20 +32,11 @@ def of_rows(old: WorkPrecisionRow, new: WorkPrecisionRow) -> list[tuple[str, ...
     return [(one.figure, one.recorded, one.measured, one.band) for one in found]
 
 
-def test_nothing_departs_from_itself() -> None:
-    assert between(swing(), swing()) == []
-
-
 def test_times_and_what_follows_from_them_do_not_matter() -> None:
-    slow = [
-        replace(r, cost=interval(9.0), seconds=None, front=not r.front, dominated_by=0)
-        for r in swing().rows
-    ]
+    slow = [replace(r, cost=interval(9.0), seconds=None, front=True) for r in swing().rows]
     other = replace(swing(), rows=tuple(slow), verdict=scenario([]).verdict, source="elsewhere")
     new = scene(other, machine=replace(MACHINE, cpu="another"), digest="1" * 64)
     assert scene_departures(scene(), new, BANDS) == ()
-    untimed = [replace(r, cost=None, seconds=None) for r in swing().rows]
-    assert between(swing(), replace(swing(), rows=tuple(untimed))) == []
 
 
 def test_an_error_that_left_its_band_is_told_exactly() -> None:
@@ -61,12 +50,9 @@ def test_an_error_that_left_its_band_is_told_exactly() -> None:
     ("was", "now", "departs"),
     [
         (1e-3, 1.0499e-3, False),
-        (1e-3, 0.9501e-3, False),
         (1e-3, 1.0501e-3, True),
-        (1e-3, 0.9499e-3, True),
         (1e-11, 1.9e-11, False),  # ten floors are 1e-11
         (1e-11, 2.1e-11, True),
-        (1e-3, 1e-11, True),
     ],
 )
 def test_the_band_of_an_error(was: float, now: float, departs: bool) -> None:
@@ -91,18 +77,8 @@ def test_a_status_says_all_of_its_row() -> None:
         ({"energy_drift": 1e-14}, {"energy_drift": -3e-13}, None),
         ({"momentum_drift": 1e-3}, {}, ("momentum drift", "0.001", "nothing", "± 5 %")),
         ({"penetration": 0.01}, {"penetration": 0.02}, ("penetration", "0.01", "0.02", "± 5 %")),
-        ({"slip": 1e-3}, {"slip": 2e-3}, ("slip", "0.001", "0.002", "± 5 %")),
-        (
-            {"model_error": 0.29},
-            {"model_error": 0.1},
-            ("model error", "0.29", "0.1", "± 5 %"),
-        ),
-        (
-            {"figure": (1.0, 1.0)},
-            {"figure": None},
-            ("error of figure", "1", "nothing", "± 5 %"),
-        ),
-        ({"growth": 1.0}, {"growth": 2.0}, None),
+        ({"model_error": 0.3}, {"model_error": 0.1}, ("model error", "0.3", "0.1", "± 5 %")),
+        ({"figure": (1, 1)}, {"figure": None}, ("error of figure", "1", "nothing", "± 5 %")),
     ],
 )
 def test_which_figures_of_a_row_depart_and_how_it_is_said(
@@ -123,19 +99,11 @@ def test_drifts_of_a_chaotic_scenario_or_a_lost_run_say_nothing() -> None:
 
 
 def test_no_error_is_known_better_than_the_worse_of_both_references() -> None:
-    old, new = row(velocity=(1e-3, 1e-3)), row(velocity=(2e-3, 2e-3))
-    assert len(between(scenario([old]), scenario([new]))) == 2
-    for floors in ((1e-4, 1e-11), (1e-11, 1e-4)):
-        one, other = (
-            scenario([line], velocity_floor=floor)
-            for line, floor in zip((old, new), floors, strict=True)
-        )
-        assert between(one, other) == []
-        one, other = (
-            scenario([row(position=error)], floor=floor)
-            for error, floor in zip(((1e-3, 1e-3), (2e-3, 2e-3)), floors, strict=True)
-        )
-        assert between(one, other) == []
+    old, new = (row(velocity=(x, x), position=(x, x)) for x in (1e-3, 2e-3))
+    assert len(between(scenario([old]), scenario([new]))) == 4
+    for floor, other in ((1e-4, 1e-11), (1e-11, 1e-4)):
+        one = scenario([old], floor=floor, velocity_floor=floor)
+        assert between(one, scenario([new], floor=other, velocity_floor=other)) == []
 
 
 def test_settings_and_scenarios_that_come_and_go() -> None:
@@ -169,8 +137,6 @@ def test_what_is_said_of_the_whole_scenario() -> None:
         (0.04, 0.041, ("0.04", "0.041", "± 1 %")),
         (0.04, None, ("40 ms", "all", "the same")),
         (None, 0.04, ("all", "40 ms", "the same")),
-        (0.0, 0.04, ("0", "0.04", "± 1 %")),
-        (None, None, None),
     ],
 )
 def test_largest_stable_timesteps(
@@ -192,13 +158,6 @@ def test_orders_that_can_be_fitted_no_more() -> None:
     assert found == Departure("swing", "RK4", "order of position", "1", "nothing", "± 0.05")
 
 
-@given(share=st.floats(-1, 1))
-def test_a_change_departs_exactly_beyond_the_band(share: float) -> None:
-    old, new = row(position=(1.0, 1.0)), row(position=(1.0 + share, 1.0))
-    if abs(abs(share) - 0.05) > 1e-6:
-        assert bool(of_rows(old, new)) == (abs(share) > 0.05)
-
-
 # --- hard cases
 
 
@@ -218,11 +177,9 @@ def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
     assert found == Departure(
         "spring", "Euler", "growth, against theory", "0.0001", "0.0002", "± 5 %"
     )
-    assert case_departures([figure(1.0)], [figure(1 + 1e-12)], BANDS) == ()
     assert case_departures([figure(-2e-15, 0.0)], [figure(3e-15, 0.0)], BANDS) == ()
     assert case_departures([figure(2.0, None)], [figure(2.05, None)], BANDS) == ()
     assert len(case_departures([figure(2.0, None)], [figure(2.2, None)], BANDS)) == 1
-    assert len(case_departures([figure(2.0)], [figure(None)], BANDS)) == 1
 
 
 def test_boundaries_and_runs_of_cases() -> None:

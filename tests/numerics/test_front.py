@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.numerics.front import front, verdict, words
-from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict, WorkPrecisionRow
+from coursebuild.numerics.front import front, verdict
+from coursebuild.numerics.reports.bench import RowVerdict, WorkPrecisionRow
 from support.bench_reports import lost, row
 
 Point = tuple[float, float] | None
@@ -111,8 +111,3 @@ def test_a_verdict_where_nothing_was_timed() -> None:
     found = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
     assert (found.on_front, found.noticeable) == (False, False)
     assert found.text.startswith("nothing was timed, so that no setting can be called better; a ")
-
-
-def test_settings_in_words() -> None:
-    full = MeasuredSetting("implicitfast", 0.002, "Newton", 20, "elliptic")
-    assert words(full) == "implicitfast at 2 ms, Newton, at most 20 iterations, elliptic cone"

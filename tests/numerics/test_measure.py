@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.numerics.cases import floor, measure, orders
+from coursebuild.numerics.cases import measure, orders
 from coursebuild.numerics.measure import Errors, Sizes, errors, fitted_order, raised
 from coursebuild.numerics.problem import STANDARD, Integrator, Motion
 from coursebuild.numerics.problems import (
@@ -25,7 +25,6 @@ from coursebuild.numerics.problems import (
     tops,
     tumbling_box,
 )
-from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.reports.cases import ErrorLine
 
 FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)
@@ -60,29 +59,19 @@ def test_the_euler_family_is_of_first_order() -> None:
 
 
 @pytest.mark.site
-def test_rk4_is_of_fourth_order_in_velocity_and_of_second_in_attitude() -> None:
-    for name in ("tumbling-box", "free-top", "thin-rod", "coin", "flat-plate"):
+def test_orders_of_rk4() -> None:
+    """Second in attitude; fourth in velocity, unless the torque depends on the attitude."""
+    turning = {"velocity": 4.0, "attitude": 2.0}
+    for name, expected in {
+        **dict.fromkeys(("tumbling-box", "free-top", "coin", "flat-plate"), turning),
+        "thin-rod": {"attitude": 2.0},  # of its velocities three errors are above the floor
+        "heavy-top": {"velocity": 2.0, "attitude": 2.0},
+        "damped-spring-0.1": {"position": 4.0, "velocity": 4.0},
+        "pendulum-hinge-90": {"position": 3.9},
+    }.items():
         found = slopes(name, Integrator.RK4)
-        if name != "thin-rod":  # of whose errors three are above the floor
-            assert found["velocity"] == pytest.approx(4.0, abs=0.1), name
-        assert found["attitude"] == pytest.approx(2.0, abs=0.05), name
-
-
-@pytest.mark.site
-def test_where_torque_depends_on_attitude_rk4_is_of_second_order_in_velocity_too() -> None:
-    assert slopes("heavy-top", Integrator.RK4)["velocity"] == pytest.approx(2.0, abs=0.05)
-
-
-def test_rk4_is_of_fourth_order_on_springs() -> None:
-    for name in ("damped-spring-0", "damped-spring-0.1", "damped-spring-1"):
-        expected = {"position": 4.0, "velocity": 4.0}
-        assert slopes(name, Integrator.RK4) == pytest.approx(expected, abs=0.1), name
-
-
-@pytest.mark.site
-def test_rk4_is_nearly_of_fourth_order_on_a_pendulum_from_90_degrees() -> None:
-    assert slopes("pendulum-hinge-90", Integrator.RK4)["position"] >= 3.8
-    assert slopes("pendulum-ball-90", Integrator.RK4)["attitude"] >= 3.8
+        known = {part: found[part] for part in expected}
+        assert known == pytest.approx(expected, abs=0.1), name
 
 
 def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
@@ -95,6 +84,7 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     assert max(found.uncertainty, found.bend) < 1e-9
     assert fitted_order(steps[2:5], clean[2:5], 0.0) is None  # three are often on one
     assert fitted_order(steps, [1e-12] * 12, 1e-12) is None
+    assert fitted_order(steps, clean, 0.0, extent=1e-7) is None  # as large as the motion
     bent = [h**2 + 50 * h**4 for h in steps]
     assert fitted_order(steps, bent, 0.0) is None
     wavy = [h**2 * (1.3 if n % 2 else 1) for n, h in enumerate(steps)]
@@ -105,16 +95,6 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
 
 
 # --- errors and floors
-
-
-@pytest.mark.site
-def test_no_error_lies_below_ten_floors() -> None:
-    for name in ("projectile", "millimetre-cube", "damped-spring-10"):
-        known = floor(problem_named(name))
-        for one in measured(name, Integrator.RK4):
-            for part in ("position", "attitude", "velocity"):
-                pair = getattr(one, part)
-                assert pair is None or min(pair) >= FLOORS * getattr(known, part)
 
 
 def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
@@ -139,12 +119,6 @@ def test_a_timestep_that_misses_the_end_is_refused() -> None:
     longer = replace(problem, scenario=replace(problem.scenario, duration=1.05))
     with pytest.raises(ValueError, match=r"the duration \(1\.05 s\) is no multiple"):
         measure(longer, Integrator.EULER, 0.01)
-
-
-def test_commands_are_held_on_a_grid_that_all_timesteps_share() -> None:
-    found = orders(problem_named("stiff-servo-1"), measured("stiff-servo-1", Integrator.RK4))
-    assert found.velocity is not None
-    assert found.velocity.value > 3.9  # a command taken anew at every step would make it 1
 
 
 # --- invariants
@@ -178,27 +152,15 @@ def test_the_box_drifts_to_four_digits() -> None:
     assert abs(drift[Integrator.RK4]) < 1e-8
 
 
-def test_rk4_hits_the_first_crossing() -> None:
-    errors = {}
+def test_flips_and_growth_of_tops_are_those_of_theory() -> None:
+    errors: dict[object, float] = {}
     for nudge in tumbling_box.NUDGES:
         exact = tumbling_box.Tumbling(nudge).first_crossing
-        errors[nudge] = abs(tumbling_box.measured_crossing(Integrator.RK4, nudge) - exact)
-    assert max(errors.values()) < 1e-8, errors
-
-
-def test_the_flip_interval_grows_by_a_constant_for_each_decade() -> None:
-    forms = [tumbling_box.Tumbling(nudge) for nudge in tumbling_box.NUDGES]
-    for smaller, larger in itertools.pairwise(forms[:-1]):
-        grown = smaller.flip_interval - larger.flip_interval
-        assert grown == pytest.approx(2 * math.log(10) / smaller.rate, rel=2e-5)
-
-
-def test_growth_of_the_transverse_velocity() -> None:
-    errors = {}
+        errors[nudge] = tumbling_box.measured_crossing(Integrator.RK4, nudge) - exact
     for name, integrator, z in itertools.product(tops.TOPS, STANDARD, (0.03, 0.1, 0.3)):
         exact = tops.transverse_growth(integrator, z)
-        errors[name, integrator, z] = abs(tops.measured_growth(name, integrator, z) - exact)
-    assert max(errors.values()) < 1e-9, errors
+        errors[name, integrator, z] = tops.measured_growth(name, integrator, z) - exact
+    assert {case: error for case, error in errors.items() if not abs(error) < 1e-8} == {}
 
 
 def test_a_projectile_is_off_by_half_a_step() -> None:
@@ -262,7 +224,7 @@ def test_a_stack_comes_to_rest_at_the_depth_of_its_soft_contacts() -> None:
         assert sinking.measure(Integrator.EULER) == pytest.approx(exact, rel=1e-6), ratio
 
 
-@pytest.mark.site
+@pytest.mark.slow
 def test_the_horizon_of_the_double_pendulum() -> None:
     euler, rk4 = (double_pendulum.horizons(one) for one in (Integrator.EULER, Integrator.RK4))
     assert 2.0 < min(euler) <= max(euler) < 2.5

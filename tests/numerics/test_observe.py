@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coursebuild.numerics.engine import EngineStates
-from coursebuild.numerics.observe import slip, speeds_of, sticking
+from coursebuild.numerics.observe import slip, sticking
 from coursebuild.numerics.scene import Scene, scenes
 
 BALL = """\
@@ -35,15 +35,6 @@ def moving(speed: list[float], spin: list[float]) -> EngineStates:
     qvel = np.zeros((3, 6))
     qvel[:, 0], qvel[:, 4] = speed, spin
     return EngineStates(times, qpos, qvel, np.empty((3, 0)))
-
-
-def test_speeds_are_those_of_the_point_that_touches() -> None:
-    model, scene = ball()
-    found = speeds_of(model, scene, moving([1, 1, 0], [0, 10, 10]))
-    assert [one[0, 1] for one in found] == pytest.approx([1, 0, 1], abs=1e-3)
-    lifted = moving([1, 1, 1], [0, 0, 0])
-    lifted.qpos[:, 2] = 0.5
-    assert speeds_of(model, scene, lifted) == [{}, {}, {}]
 
 
 def test_only_what_sticks_in_the_reference_creeps() -> None:

@@ -7,14 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import DisagreementError, floor
-from coursebuild.numerics.engine import EngineStates, compiled, motion_of
-from coursebuild.numerics.problem import Array, Integrator, Motion, Problem, Solution
+from coursebuild.numerics.engine import compiled
+from coursebuild.numerics.problem import Integrator, Problem
 from coursebuild.numerics.problems import all_problems, problem_named, problem_names
 
 OFF = 1 + 1e-6
@@ -79,27 +77,7 @@ def said_to_be_known(problem: Problem) -> bool:
     return 0 < known.largest < 2e-6
 
 
-class Slow(Struct, frozen=True):
-    """A motion that is late."""
-
-    solution: Solution
-
-    def motion(self, times: Array) -> Motion:
-        return self.solution.motion(times / OFF)
-
-
-@pytest.mark.site
-def test_a_reference_that_is_slow_by_a_millionth_is_noticed() -> None:
-    unnoticed = []
-    for problem in all_problems():
-        late = replace(problem.reference, solution=Slow(problem.reference.solution))
-        if said_to_be_known(replace(problem, reference=late)):
-            unnoticed.append(problem.name)
-    at_rest = ("stack", "sticking", "distant-body")
-    assert [name for name in unnoticed if not name.startswith(at_rest)] == []
-
-
-@pytest.mark.site
+@pytest.mark.slow
 def test_each_number_of_each_problem_that_is_off_by_a_millionth_is_noticed() -> None:
     """Of the model, the scenario and the solution, one after the other."""
     wrong = {}
@@ -143,37 +121,12 @@ def changed(value: Any, names: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]
                 yield f"{name} {n}", replace(value, **{name: (*field[:n], new, *field[n + 1 :])})
 
 
-def test_the_reference_begins_where_the_scenario_does() -> None:
-    for problem in all_problems():
-        scenario = problem.scenario
-        model = compiled(problem.mjcf, Integrator.EULER, 1e-3)
-        qpos = np.array([scenario.qpos or model.qpos0], dtype=float)
-        qvel = np.array([scenario.qvel or [0.0] * model.nv], dtype=float)
-        begun = motion_of(model, EngineStates(np.zeros(1), qpos, qvel, np.empty((1, 0))))
-        soon = problem.reference.solution.motion(np.array([1e-9, 2e-9]))
-        assert soon.position.shape[1:] == begun.position.shape[1:], problem.name
-        for found, expected, rtol, atol in (
-            (soon.position, begun.position, 1e-12, 1e-5),
-            (np.abs(soon.attitude), np.abs(begun.attitude), 0, 1e-5),
-            (soon.velocity, begun.velocity, 1e-6, 1e-4),
-        ):
-            name = problem.name
-            np.testing.assert_allclose(found[0], expected[0], rtol=rtol, atol=atol, err_msg=name)
-
-
-def test_timesteps_divide_the_looks_and_models_say_neither_timestep_nor_integrator() -> None:
-    for problem in all_problems():
-        looks = len(problem.scenario.times)
-        assert looks * problem.scenario.sample == pytest.approx(problem.scenario.duration)
-        for timestep in problem.timesteps:
-            count = problem.scenario.sample / timestep
-            assert count == pytest.approx(round(count), rel=1e-9), problem.name
-        assert not re.search("timestep|integrator", problem.mjcf), problem.name
-
-
-def test_problems_are_small_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_problems_are_small_models_that_timesteps_divide(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)  # where MuJoCo would write what it warns of
     for problem in all_problems():
+        assert all(problem.scenario.steps(step) for step in problem.timesteps)
+        assert not re.search("timestep|integrator|file=", problem.mjcf), problem.name
         assert compiled(problem.mjcf, Integrator.RK4, 1e-3).nbody <= 12
-        assert "file=" not in problem.mjcf
     assert list(tmp_path.iterdir()) == []

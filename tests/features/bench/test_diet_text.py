@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 from msgspec.structs import replace
 
-from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
-from coursebuild.features.bench.commands.measurement import (
-    Measurement,
-    measured_json,
-    measured_text,
-)
+from coursebuild.features.bench.commands.diet.text import diet_text
 from coursebuild.numerics.reports.diet import (
-    SAME,
     DietReport,
     DietScenario,
     ModelPlace,
@@ -22,7 +14,6 @@ from coursebuild.numerics.reports.diet import (
     TextEdit,
     Tried,
 )
-from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.report import Style
 from support.model_reports import diet, finding
 
@@ -62,14 +53,6 @@ def test_a_finding_is_told_with_its_saving_reason_and_change() -> None:
     ]
 
 
-def test_a_saving_that_is_none_or_uncertain_is_said_to_be_so() -> None:
-    none = replace(FINDING, saving=Saving(None, None, False, 0, 0))
-    assert "    proved; saves nothing that is measured" in lines(replace(REPORT, findings=(none,)))
-    more = replace(FINDING, label=SAME, difference=3e-12, saving=Saving(1.01, 0.1, False, -5, 0))
-    text = "    the same in what was run (3.0e-12); no measurable time, 5 bytes of memory more"
-    assert text in lines(replace(REPORT, findings=(more,)))
-
-
 def test_what_is_kept_lost_or_kept_for_nothing() -> None:
     report = replace(
         REPORT,
@@ -107,24 +90,3 @@ def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:
     told = lines(replace(REPORT, findings=(odd,)), width=60)
     assert not any("\x1b" in line for line in told)
     assert all(len(line) <= 60 for line in told if "models/" not in line)
-
-
-def test_json_and_record_hold_everything() -> None:
-    value = json.loads(
-        measured_json(
-            diet_values([REPORT]),
-            Measurement((), failures=(ReportFailure("no", "yes"),), remarks=("said",)),
-        )
-    )
-    assert value["models"][0]["findings"][0]["edits"][0]["old"] == EDIT.old
-    assert value["failures"] == [{"message": "no", "help": "yes"}] and value["remarks"] == ["said"]
-    assert value["models"][0]["ok"] is False
-    assert DIET.decode(DIET.encode(REPORT)) == REPORT
-    assert DIET.encode(REPORT) == DIET.encode(DIET.decode(DIET.encode(REPORT)))
-
-
-def test_a_report_on_no_model() -> None:
-    assert diet_text([], Style()) == ""
-    failure = ReportFailure("models/a.xml was changed in the meantime")
-    failed = measured_text("", Measurement((), failures=(failure,)), Style())
-    assert failed == "error: models/a.xml was changed in the meantime\n"

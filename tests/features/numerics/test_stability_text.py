@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 from coursebuild.features.numerics.commands.text import stability_text
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import FittedOrder, OrderRow
@@ -16,7 +14,6 @@ from coursebuild.numerics.reports.cases import (
     StepCost,
 )
 from coursebuild.report import Style
-from coursebuild.report.values import json_text
 from support.bench_reports import FIRST, MACHINE
 
 TRIED = (1e-3, 10.0)
@@ -103,12 +100,3 @@ spring  case 5: A spring
 
 def test_text_puts_integrators_with_equal_figures_together() -> None:
     assert stability_text([REPORT], Style()) == TEXT
-
-
-def test_json_has_every_column_and_no_number_that_is_none() -> None:
-    (found,) = json.loads(json_text([REPORT, REPORT]))[:1]
-    assert found["boundaries"][3]["largest"] is None
-    assert found["boundaries"][2]["islands"] == [0.4, 0.5]
-    assert found["errors"][1]["position"] == [0.1, 0.01]
-    assert found["reference"]["attitude"] == 2e-14
-    assert found["machine"]["engine"] == "3.14.0"

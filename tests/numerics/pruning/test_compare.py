@@ -12,11 +12,9 @@ from coursebuild.core.model.scenarios import Visible
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import (
-    TOLERANCE,
     compare,
     pruning_scenes,
     steps_of,
-    watch,
 )
 from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
@@ -56,13 +54,6 @@ def test_chaos_is_no_difference() -> None:
     assert np.max(np.abs(ends[0] - ends[1])) > 1e5 * found.difference
 
 
-def test_the_same_and_another_model() -> None:
-    one = double()
-    assert compare(one, double(), same(one), [SHORT]) == compare(one, one, same(one), [])
-    other = compare(one, double(1.001), same(one), [SHORT])
-    assert not other.identical and TOLERANCE < other.difference < 1
-
-
 def test_a_changed_model_that_diverges_is_not_equal() -> None:
     one, other = double(), double()
     other.dof_damping[:] = -1e6
@@ -82,16 +73,6 @@ def test_contacts_count_though_nothing_moves() -> None:
     assert compare(one, one, same(one), [scene]).identical
     found = compare(one, other, same(one), [scene])
     assert not found.identical
-
-
-def test_what_a_run_shows() -> None:
-    text = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .3"><freejoint/>
-      <geom size=".1"/></body></worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(text)
-    seen = watch(model, lasting(1.0))
-    assert seen.judgement.ok and seen.touching == {(0, 1)} and seen.constrained
-    seen = watch(model, lasting(0.1))
-    assert not seen.touching and not seen.constrained
 
 
 FULL = """<mujoco><worldbody>
@@ -134,10 +115,3 @@ controls = [[1, 0, 0], [2, 0, 0]]\nqvel = [0, 0, 0, 0, 0, 0, 0, 0, 0, 5]\n"""
     assert given == [(step, 1 if step < 100 else 2) for step in range(500)]
     (short,) = pruning_scenes(model, declared(text), quick=True)
     assert len(list(steps_of(short))) == 250
-
-
-def test_scenarios_where_none_is_written() -> None:
-    names = [scene.name for scene in pruning_scenes(double(), None, quick=True)]
-    assert names == ["keyframe-0"]
-    (still,) = pruning_scenes(mujoco.MjModel.from_xml_string("<mujoco/>"), None, quick=True)
-    assert (still.scenario.keyframe, len(list(steps_of(still)))) == (-1, 10)

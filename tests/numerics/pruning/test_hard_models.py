@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelTextError
 from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet import PROVED
@@ -117,13 +116,6 @@ def test_what_is_new_is_written_into_the_models_own_file() -> None:
 def test_what_is_no_model_of_its_own(files: Mapping[str, str], words: str) -> None:
     with pytest.raises(ModelTextError, match=words.replace(".", r"\.")):
         opened(files)
-
-
-def test_what_does_not_compile_or_is_no_xml() -> None:
-    with pytest.raises(ValueError, match="Schema violation"):
-        opened({PATH: "<mujoco><wörldbody/></mujoco>"})
-    with pytest.raises(MarkupError, match="mismatched tag"):
-        opened({PATH: "<mujoco><worldbody></mujoco>"})
 
 
 REPLICATED = f"""<mujoco>
@@ -314,7 +306,7 @@ def random_model(random: np.random.Generator) -> str:
 
 
 def test_random_models_move_as_before() -> None:
-    for seed in range(8):
+    for seed in range(4):
         text = random_model(np.random.default_rng(seed))
         survey, left = whole(text, lesson='data.actuator("drive")' if seed % 2 else "")
         if survey.seen[0].judgement.ok:

@@ -9,7 +9,6 @@ from coursebuild.numerics.pruning.edits import (
     apply_edits,
     drop_numbers,
     remove,
-    set_option,
 )
 from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup, place_of
 
@@ -55,16 +54,6 @@ def test_places_in_an_odd_text() -> None:
     assert found.data[start:end].decode() == "🎈"
 
 
-@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
-def test_lines_and_columns(newline: str) -> None:
-    text = newline.join(("<a>", "", " é<b/>", "</a>"))
-    found = document(text)
-    inner = found.root.children[0]
-    assert found.position(inner.start) == (3, 3)
-    assert found.position(len(found.data)) == (4, 5)
-    assert found.position(0) == (1, 1)
-
-
 def test_ways_to_elements() -> None:
     found = document(
         '<mujoco><default><default class="c"/></default><worldbody><body><geom/><geom name="g"/>'
@@ -107,12 +96,9 @@ def test_what_is_no_xml_is_refused(text: str, line: int, column: int, words: str
         ("<a>\n  <x/>\n  <y/>\n</a>", "<a>\n  <y/>\n</a>"),
         ("<a>\r\n\t<x\r\n\tb='1'/>\r\n\t<y/>\r\n</a>", "<a>\r\n\t<y/>\r\n</a>"),
         ("<a>\r  <x/>\r</a>", "<a>\r</a>"),
-        ("<a><x/><y/></a>", "<a><y/></a>"),
         ("<a><y/> <x/></a>", "<a><y/></a>"),
         ("<a>\n  <x/> <!-- why -->\n</a>", "<a>\n  <!-- why -->\n</a>"),
         ("<a>\n  <!-- why -->\n  <x> <!-- in --> <y/></x>  \n</a>", "<a>\n  <!-- why -->\n</a>"),
-        ("<a>\n  <y/>  <x/>  \n</a>", "<a>\n  <y/>  \n</a>"),
-        ("<a><x>é</x>ü</a>", "<a>ü</a>"),
         ("<a><x><x/></x><y/></a>", "<a><y/></a>"),
     ],
 )
@@ -143,45 +129,16 @@ def test_only_empty_sections_go_with_the_last_of_them(before: str, left: str | N
     ("gone", "left"),
     [
         ([0], ' q="2\n 3  4"'),
-        ([3], ' q="1 2\n 3"'),
         ([1, 2], ' q="1 4"'),
-        ([2, 3], ' q="1 2"'),
         ([0, 2, 3], ' q="2"'),
         ([0, 1, 2, 3], ""),
-        ([7], ' q="1 2\n 3  4"'),
         ([3, 4, 5], ' q="1 2\n 3"'),
-        ([], ' q="1 2\n 3  4"'),
     ],
 )
 def test_numbers_go_out_of_a_list(gone: list[int], left: str) -> None:
     text = '<k q="1 2\n 3  4"/>'
     assert after(text, *drop_numbers(document(text).root, "q", gone)) == f"<k{left}/>"
     assert drop_numbers(document(text).root, "other", gone) == ()
-
-
-@pytest.mark.parametrize(
-    ("before", "tag", "name", "value", "left"),
-    [
-        (
-            "<m>\n  <y/>\n</m>",
-            "flag",
-            "contact",
-            "disable",
-            '<m>\n  <option><flag contact="disable"/></option>\n  <y/>\n</m>',
-        ),
-        ("<m><option a='1'/></m>", "option", "b", "2", "<m><option a='1' b=\"2\"/></m>"),
-        (
-            "<m><option a='1'/><option a='2'/></m>",
-            "option",
-            "a",
-            "3",
-            "<m><option a='1'/><option a='3'/></m>",
-        ),
-        ("<m><y/></m>", "option", "a", "3", '<m><option a="3"/><y/></m>'),
-    ],
-)
-def test_options_and_flags(before: str, tag: str, name: str, value: str, left: str) -> None:
-    assert after(before, *set_option(document(before), tag, name, value)) == left
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:

@@ -23,15 +23,6 @@ def test_actuators_that_nobody_commands() -> None:
     assert '<key name="up" qpos="1" ctrl="0 0"/>' in fixed(model, survey)
 
 
-def test_an_actuator_with_a_state_of_its_own_stays() -> None:
-    rest = """<actuator><general name="slow" joint="pivot" dyntype="integrator" gainprm="5"/>
-    <motor name="push" joint="pivot"/></actuator>
-  <keyframe><key name="go" act="0" ctrl="0 0"/></keyframe>"""
-    model, survey = tried(scene(rest=rest))
-    assert names(found(survey)["actuator-idle"]) == ["push"]
-    assert '<key name="go" act="0" ctrl="0"/>' in fixed(model, survey)
-
-
 def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> None:
     rest = '<actuator><motor name="push" joint="pivot"/></actuator>'
     model, survey = tried(scene(rest=rest), has_commands=True)

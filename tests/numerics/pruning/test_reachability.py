@@ -51,7 +51,7 @@ def random_state(random: np.random.Generator, model: mujoco.MjModel, data: mujoc
 @pytest.mark.site
 def test_what_is_said_to_be_separate_never_touches() -> None:
     wrong = []
-    for seed in range(20):
+    for seed in range(10):
         random = np.random.default_rng(seed)
         fixed = "".join(
             f'<geom size="0.1" pos="{x:.3f} {y:.3f} {z:.3f}"/>'
@@ -64,7 +64,7 @@ def test_what_is_said_to_be_separate_never_touches() -> None:
         assert apart < pairs or not pairs, seed
         flat = set(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist())
         data = mujoco.MjData(model)
-        for _ in range(60):
+        for _ in range(40):
             random_state(random, model, data)
             mujoco.mj_forward(model, data)
             touching = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
@@ -109,15 +109,9 @@ def test_only_bounded_joints_keep_a_body_away() -> None:
     ):
         model = compiled(f'<geom size=".1" pos="6 0 0"/><body>{joint}<geom size=".1"/></body>')
         assert bool(separate(model, possible_pairs(model))) is bounded, joint
-
-
-def test_what_a_user_moves_can_be_anywhere() -> None:
-    model = compiled(
-        """<body mocap="true" pos="50 0 0"><geom size=".1"/></body>
-        <body><joint/><geom size=".1" pos=".2 0 0"/></body>"""
-    )
-    assert len(possible_pairs(model)) == 1
-    assert not separate(model, possible_pairs(model))
+    mocap = '<body mocap="true" pos="50 0 0"><geom size=".1"/></body>'
+    model = compiled(f'{mocap}<body><joint/><geom size=".1" pos=".2 0 0"/></body>')
+    assert len(possible_pairs(model)) == 1 and not separate(model, possible_pairs(model))
 
 
 def test_margins_count() -> None:
@@ -163,10 +157,3 @@ def everything_touching(seed: int, flag: str) -> mujoco.MjModel:
         <pair geom1="g2" geom2="g3" margin="1000"/></contact>"""
     size = '<size memory="50M"/>'
     return compiled(trees, option=flag, rest=contact, root=size)
-
-
-def test_nothing_is_possible_where_contact_is_off() -> None:
-    body = '<geom size=".1"/><body><freejoint/><geom size=".1"/></body>'
-    for flag in ("contact", "constraint"):
-        model = compiled(body, option=f'<flag {flag}="disable"/>')
-        assert possible_pairs(model) == frozenset()

@@ -6,7 +6,6 @@ import textwrap
 
 import pytest
 
-from coursebuild.numerics.pruning.readers import read_code
 from support.surveys import declared, names, scene, tried
 
 MODEL = scene(
@@ -35,25 +34,12 @@ GO = declared('[[scenario]]\nname = "go"\nkeyframe = "up"\nduration = 0.1\n')
 HOSTILE = {
     # What of the model it uses, by the kind of a finding, and the script.
     "concatenation": ("sensor", 'print([data.sensor("hip_" + s).data for s in "lr"])'),
-    "percent": ("sensor", 'print(data.sensor("hip_%s" % "l").data)'),
     "f-string": ("sensor", 's = "r"\nprint(data.sensor(f"hip_{s}").data)'),
-    "format": ("sensor", 'print(data.sensor("hip_{}".format("r")).data)'),
-    "join": ("sensor", 'print(data.sensor("_".join(["hip", "l"])).data)'),
     "number": ("sensor", "print(data.sensor(0).data)"),
-    "keyword": ("sensor", 'print(model.sensor(name="hip_l").adr)'),
-    "slice": ("sensor", "print(data.sensordata[:2])"),
-    "alias": ("sensor", "d = data\nvalues = d.sensordata\nprint(values.sum())"),
-    "walrus": ("sensor", "if (n := model.nsensor) > 1: print(n)"),
-    "getattr": ("sensor", 'print(getattr(data, "sensordata"))'),
-    "getattr built": ("sensor", 'print(getattr(data, "sensor" + "data"))'),
-    "vars": ("sensor", 'print({k: getattr(data, k) for k in dir(data) if "sens" in k})'),
+    "getattr": ("sensor", 'print(getattr(data, "sensor" + "data"))'),
     "format field": ("sensor", 'print("{0.sensordata}".format(data))'),
-    "format method": ("sensor", 'show = "{0.sensordata}".format\nprint(show(data))'),
     "pattern": ("sensor", "match data:\n    case object(sensordata=s): print(s)"),
     "function handed on": ("sensor", 'print([f(n).data for f in (data.sensor,) for n in ("at",)])'),
-    "attrgetter": ("sensor", 'from operator import attrgetter\nprint(attrgetter("x" + "y")(data))'),
-    "names of a file": ("sensor", 'for n in json.load(open("names.json")): print(data.sensor(n))'),
-    "helper": ("sensor", "from tools import log\nlog(model, data)"),
     "unknown package": ("sensor", "import observe\nobserve.everything(model, data)"),
     "name2id": ("sensor", 'i = mujoco.mj_name2id(model, 20, "hip" + "_l")\nprint(i)'),
     "id of another": ("sensor", 'print(model.sensor("at").id)'),
@@ -62,42 +48,26 @@ HOSTILE = {
         "mujoco.mj_step(model, data)\nprint(data.subtree_angmom)",
     ),
     "spec": ("sensor", "spec = mujoco.MjSpec.from_file('x')\nprint(len(spec.sensors))"),
-    "rollout": ("sensor", "from mujoco import rollout\nprint(rollout.rollout(model, data, [0]))"),
     "exec": ("sensor", 'exec("print(data." + "sensor" + "data)")'),
     "dunder": ("sensor", 'print(data.__getattribute__("sensor" + "data"))'),
-    "text of the model": ("sensor", 'print(model_path("leg").read_text().count("<"))'),
     "include": ("sensor", "x = '<mujoco><include file=\"leg.xml\"/></mujoco>'"),
-    "size of the model": ("sensor", "print(mujoco.mj_sizeModel(model))"),
     "derivatives": ("sensor", "mujoco.mjd_transitionFD(model, data, 1e-6, True, *[None] * 4)"),
-    "reduction": ("sensor", "from functools import reduce\nreduce(getattr, ['energy'], data)"),
-    "members": ("sensor", "import inspect\nprint(inspect.getmembers(data))"),
     "names of all": ("site", "print(model.names)"),
     "number of a site": ("site", "model.actuator_trnid[0, 0] = 1"),
-    "site by number": ("site", "print(data.site(1).xpos)"),
-    "site name built": ("site", 'print(data.site("tip_" + str("l")).xpos)'),
     "jacobian of a site": ("site", "mujoco.mj_jacSite(model, data, None, None, 0)"),
     "keyframes in a loop": (
         "keyframe",
         "for k in range(2): mujoco.mj_resetDataKeyframe(model, data, k)",
     ),
-    "keyframe by star": ("keyframe", "a = (model, data, 1)\nmujoco.mj_resetDataKeyframe(*a)"),
     "keyframe array": ("keyframe", "data.qpos[:] = model.key_qpos[-1]"),
     "material by number": ("material", "model.geom_matid[0] = 1"),
     "material of a view": ("material", 'model.geom("wall").matid = 1'),
-    "mesh by number": ("mesh", "model.geom_dataid[0] = 0"),
     "wall moved": ("contact-off", 'model.geom("wall").pos[0] = .3'),
-    "wall moved by alias": ("contact-off", "m = model\nm.geom_pos[:] = 0"),
-    "wall moved by copyto": ("contact-off", "np.copyto(model.body_pos, 0)"),
     "wall grown": ("contact-off", 'g = model.geom("wall")\ng.size[:] = 3'),
     "joint changed": ("contact-off", 'model.joint("hip").pos = [9, 9, 9]'),
-    "margin grown": ("contact-off", "model.geom_margin += 5"),
-    "loop over a field": ("contact-off", "for model.geom_size[0, 0] in (1, 2): pass"),
     "tendon changed": ("tendon", 'model.tendon("cord").stiffness = 4'),
-    "actuator changed": ("actuator", "model.actuator_biasprm[0, 0] = 1"),
     "commands": ("actuator", "data.ctrl[0] = 1"),
-    "command of a view": ("actuator", 'for n in ("push",): data.actuator(n).ctrl = 1'),
     "tendon": ("tendon", "print(data.ten_length)"),
-    "energy": ("energy", "print(data.energy.sum())"),
     "energy flag": ("energy", "print(model.opt.enableflags)"),
 }
 
@@ -138,7 +108,3 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
         "unused-material": ["spare"],
         "unused-mesh": ["cube"],
     }
-
-
-def test_python_that_names_nothing_else_uses_nothing_else() -> None:
-    assert not read_code("a.py", "import numpy\nprint(numpy.pi)").opaque

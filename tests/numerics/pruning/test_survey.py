@@ -4,21 +4,12 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Mapping
 
 import pytest
 
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.reports.diet import PROVED
 from support.surveys import PATH, PENDULUM, field, fixed, found, names, scene, tried
-
-
-def test_a_model_without_anything_in_vain() -> None:
-    model, survey = tried(scene())
-    assert survey.findings == () and survey.edits == () and survey.stale == ()
-    assert survey.fixed is None and survey.slim is None
-    assert [one.judgement.status for one in survey.seen] == [RunStatus.OK]
-    assert fixed(model, survey) == scene()
 
 
 @pytest.mark.parametrize("world", ["", "<!-- nothing -->", "<geom size='1'/>"])
@@ -63,13 +54,6 @@ def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
     assert len(left.splitlines()) == len(text.splitlines()) - 4
     again, second = tried(left)
     assert second.findings == () and fixed(again, second) == left
-
-
-def test_an_asset_that_a_lesson_mentions_is_used() -> None:
-    lesson = 'model.mat("curtain").rgba[:] = 1; model.mesh("ünüsed"); "cloth", "hill"'
-    text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
-    _, survey = tried(text, lesson=lesson)
-    assert survey.findings == ()
 
 
 def test_a_texture_of_a_kept_material_is_used() -> None:
@@ -137,14 +121,6 @@ def test_sites_and_sensors() -> None:
     assert tried(left, lesson='print(data.site("read").xpos)')[1].edits == ()
 
 
-def test_of_two_sensors_the_one_that_is_read_stays() -> None:
-    sensors = '<sensor><clock name="clock"/><jointpos name="angle" joint="pivot"/></sensor>'
-    model, survey = tried(scene(rest=sensors), lesson="print(data.sensor('angle').data)")
-    assert names(found(survey)["sensor-unread"]) == ["clock"]
-    left = fixed(model, survey)
-    assert '<sensor><jointpos name="angle" joint="pivot"/></sensor>' in left
-
-
 @pytest.mark.parametrize(
     ("option", "left"),
     [
@@ -164,13 +140,6 @@ def test_flags_for_nobody(option: str, left: str) -> None:
     assert left in rest and rest.count("<flag") == left.count("<flag")
     assert rest.count("<option") == left.count("<option")
     assert tried(scene(head=option), lesson="print(model.opt.enableflags)")[1].edits == ()
-
-
-def test_an_element_that_gets_another_attribute_stays() -> None:
-    head = '<option><flag energy="enable"/></option>'
-    model, survey = tried(scene(PENDULUM + '<geom size=".1" pos="9 0 0"/>', head=head))
-    assert set(found(survey)) == {"energy-flag", "contact-off"}
-    assert '<option><flag contact="disable"/></option>' in fixed(model, survey)
 
 
 # ----------------------------------------------------------------------- runs and their labels
@@ -193,47 +162,12 @@ def test_a_keep_that_keeps_nothing_is_told() -> None:
     assert survey.stale == ("unused-site", "contact")
 
 
-def test_of_a_kind_one_may_be_kept_and_another_found() -> None:
-    sensors = '<sensor><clock name="t"/><clock name="u"/></sensor>'
-    model, survey = tried(scene(rest=sensors), keeps={"sensor-unread t": "shown in class"})
-    by_name = {names(one)[0]: one for one in survey.findings if one.kind == "sensor-unread"}
-    assert by_name["t"].kept and not by_name["u"].kept
-    assert '<sensor><clock name="t"/></sensor>' in fixed(model, survey)
-
-
-def test_a_file_that_is_not_to_be_changed() -> None:
-    text = scene(rest='<sensor><clock name="t"/></sensor>')
-    model, survey = tried(text, locked={PATH: "models/b.xml uses models/a.xml too"})
-    finding = found(survey)["sensor-unread"]
-    assert finding.unfixed == "models/b.xml uses models/a.xml too" and finding.counts
-    assert fixed(model, survey) == text
-
-
 def test_what_only_runs_speak_for_is_told_for_the_time_that_it_saves() -> None:
     world = """<geom type="plane" size="1 1 1"/>
     <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1" condim="4"/></body>"""
     _, survey = tried(scene(world), clock=itertools.count(step=10**6).__next__)
     assert survey.findings == ()
     assert {"island", "cone"} <= {one.kind for one in survey.tried if "no time" in one.reason}
-
-
-@pytest.mark.site
-def test_what_a_script_says_otherwise_without_is_no_finding() -> None:
-    text = scene(rest='<sensor><clock name="t"/><clock name="u"/></sensor>', head=UNUSED)
-    said: list[bytes] = []
-
-    def rerun(files: Mapping[str, bytes]) -> str:
-        said.append(files[PATH])
-        return "" if b'name="spare"' in files[PATH] else "examples/a.py"
-
-    model, survey = tried(text, rerun=rerun)
-    assert set(found(survey)) == {"sensor-unread"} and said
-    assert "spare" in fixed(model, survey) and "<sensor" not in fixed(model, survey)
-    (needed,) = [one for one in survey.tried if one.kind == "unused-material"]
-    assert needed.reason == "examples/a.py says something else then"
-
-
-UNUSED = '<asset><material name="spare"/></asset>'
 
 
 @pytest.mark.slow
