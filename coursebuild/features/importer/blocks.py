@@ -1,6 +1,6 @@
 """Fences, directives and callouts of other tools as Markdown of coursebuild.
 
-Entry points: `block_text`, `plain_fence`.
+Entry point: `block_text`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import json
 import re
 from collections.abc import Mapping
 
+from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.pages.marks import fence, quoted
 from coursebuild.features.importer.cells import shown_text
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.prose import displayed, rewrite
@@ -17,9 +19,7 @@ from coursebuild.features.importer.segments import read_markdown
 from coursebuild.features.importer.values import Segment, read_yaml
 
 _CALLOUTS = {
-    **{kind: kind for kind in ("note", "tip", "important", "warning", "caution", "try")},
-    **{kind: kind for kind in ("established", "derivation", "implementation", "version")},
-    **{kind: kind for kind in ("recommendation", "research", "unverified", "solution")},
+    **{callout.name: callout.name for callout in CALLOUTS},
     **dict.fromkeys(("hint",), "tip"),
     **dict.fromkeys(("attention", "failure", "bug"), "caution"),
     **dict.fromkeys(("danger", "error"), "warning"),
@@ -32,31 +32,31 @@ _TITLED = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", 
 """Directives whose argument is a title, and not the first line."""
 _KNOWN_FENCES = ("python", "text", "io", "lab", "quiz", "mjcf", "bench")
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
-_ATTRIBUTES = re.compile(r"\{?(?P<all>[^{}]*)\}?.*")
 _TITLE = re.compile(r"title=(?:\"([^\"]*)\"|'([^']*)')")
 _OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
+_ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
 _QUOTED_KIND = re.compile(r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(\])", re.MULTILINE)
 
 
 def block_text(segment: Segment, context: LessonContext) -> str:
     """A segment that is no cell, as Markdown."""
-    match segment.kind:
-        case "prose":
-            text = rewrite(segment.text, context, segment.place)
-            return _QUOTED_KIND.sub(lambda m: m[1] + _kind(m[2], context) + m[3], text)
-        case "admonition":
+    if segment.kind == "prose":
+        text = rewrite(segment.text, context, segment.place)
+        return _QUOTED_KIND.sub(lambda m: m[1] + _kind(m[2], context) + m[3], text)
+    if segment.kind == "cell":
+        context.leave(segment.place, "a cell inside another block is shown and not run")
+        return fence("python fragment", shown_text(segment))
+    directive = _DIRECTIVE.fullmatch(segment.head)
+    if directive is not None:
+        return _directive(directive["name"], directive["argument"], segment, context)
+    match segment.mark[0]:
+        case ":":
+            return _div(segment, context)
+        case "!" | "?":
             name, _, title = segment.head.partition(" ")
             return _callout(name, title.strip().strip('"'), segment.text, segment, context)
-        case "div":
-            return _div(segment, context)
-        case "cell":
-            context.leave(segment.place, "a cell inside another block is shown and not run")
-            return plain_fence("python fragment", shown_text(segment))
         case _:
-            directive = _DIRECTIVE.fullmatch(segment.head)
-            if directive is not None:
-                return _directive(directive["name"], directive["argument"], segment, context)
             return _fence(segment, context)
 
 
@@ -77,18 +77,12 @@ def _callout(
 ) -> str:
     title = rewrite(title, context, segment.place)
     head = f"[!{_kind(kind, context)}]{folded} {title}".rstrip()
-    lines = [head, *_inside(text, segment, context).strip("\n").split("\n")]
-    return "\n".join(f"> {line}".rstrip() for line in lines)
+    return quoted(f"{head}\n{_inside(text, segment, context)}".rstrip("\n"))
 
 
 def _div(segment: Segment, context: LessonContext) -> str:
     """What stands between lines of colons."""
-    directive = _DIRECTIVE.fullmatch(segment.head)
-    if directive is not None:
-        return _directive(directive["name"], directive["argument"], segment, context)
-    attributes = _ATTRIBUTES.fullmatch(segment.head)
-    words = attributes["all"] if attributes is not None else segment.head
-    kind = re.search(r"callout-(\w+)", words)
+    kind = re.search(r"callout-(\w+)", segment.head)
     text = segment.text
     if kind is None:
         return _inside(text, segment, context)
@@ -127,11 +121,11 @@ def _directive(name: str, argument: str, segment: Segment, context: LessonContex
             alt = options.get("alt", "")
             return rewrite(f"![{alt}]({argument.strip()})", context, place) + caption
         case "code" | "code-block" | "sourcecode":
-            return plain_fence(argument or "text", text)
+            return fence(argument or "text", text)
         case "tableofcontents" | "toctree" | "contents":
             return ""  # the map says it
         case "epigraph" | "pull-quote" | "blockquote":
-            return "\n".join(f"> {line}" for line in _inside(text, segment, context).split("\n"))
+            return quoted(_inside(text, segment, context))
         case "div" | "container" | "card" | "grid" | "grid-item" | "tab-set" | "tab-item":
             return _inside(text, segment, context)
         case _ if name in _CALLOUTS:
@@ -141,11 +135,11 @@ def _directive(name: str, argument: str, segment: Segment, context: LessonContex
             return _callout(name, title, text, segment, context, folded=folded)
         case _ if name in _languages():
             context.leave(place, f"a block of `{name}` is shown and not run")
-            return plain_fence(name, text)
+            return fence(name, text)
         case _:
             what = f"the directive `{{{name}}}`, whose text is shown as it was written"
             context.leave(place, what)
-            return plain_fence("text", f"{argument}\n{text}".strip("\n"))
+            return fence("text", f"{argument}\n{text}".strip("\n"))
 
 
 @functools.cache
@@ -157,25 +151,16 @@ def _languages() -> frozenset[str]:
 
 
 def _fence(segment: Segment, context: LessonContext) -> str:
-    if not segment.fence:  # of a quotation
-        return segment.text
-    kind = segment.head.partition(" ")[0]
-    text = segment.text
+    kind, text = segment.head.partition(" ")[0], segment.text
     if kind == "lab" and context.camera_is_position:
         text = _CAMERA.sub(_directed, text)
     if kind in _KNOWN_FENCES:
-        return f"{segment.fence}{segment.head}\n{text}\n{segment.fence}"
+        return f"{segment.mark}{segment.head}\n{text}\n{segment.mark}"
     name = segment.head.strip("{}. ").partition(" ")[0].rstrip(",}")
-    if _is_json(text) and name != "json":
+    if name != "json" and _is_json(text):
         context.leave(segment.place, f"a block `{name}`, which is shown as JSON")
         name = "json"
-    return plain_fence(name, text)
-
-
-def plain_fence(head: str, text: str) -> str:
-    """A fence that is longer than any in its text."""
-    mark = "`" * max(3, *(len(ticks) + 1 for ticks in re.findall("`{3,}", text)), 3)
-    return f"{mark}{head}\n{text}\n{mark}"
+    return fence(name, text)
 
 
 def _is_json(text: str) -> bool:
@@ -185,15 +170,11 @@ def _is_json(text: str) -> bool:
         return False
 
 
-def _directed(match: re.Match[str]) -> str:
+def _directed(camera: re.Match[str]) -> str:
     """A camera by its direction: the other way round."""
 
-    def other(name: str, turn: float, found: re.Match[str]) -> str:
-        angle = float(found[2])
-        value = (angle + turn + 180) % 360 - 180 if turn else -angle
-        return f"{found[1]}{value:g}"
+    def turned(match: re.Match[str]) -> str:
+        angle = float(match[3])
+        return f"{match[1]}{angle % 360 - 180 if match[2] == 'azimuth' else -angle:g}"
 
-    text = match[0]
-    number = r"(-?\d+(?:\.\d+)?)"
-    text = re.sub(rf'("azimuth"\s*:\s*){number}', lambda m: other("azimuth", 180, m), text)
-    return re.sub(rf'("elevation"\s*:\s*){number}', lambda m: other("elevation", 0, m), text)
+    return _ANGLE.sub(turned, camera[0])

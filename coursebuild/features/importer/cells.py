@@ -9,7 +9,6 @@ the last of them stood; the ones before are shown where they stood, as parts of 
 from __future__ import annotations
 
 import ast
-import itertools
 import re
 from collections.abc import Sequence
 
@@ -23,18 +22,20 @@ _TIMED = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
-def script_of(cells: Sequence[Segment], title: str, context: LessonContext) -> tuple[str, int]:
-    """The script, and the number of its last cell; no text and -1 where no cell is for one."""
-    parts = [(number, _code(cell, context).strip()) for number, cell in enumerate(cells)]
-    parts = [(number, code) for number, code in parts if code]
-    if not parts:
-        return "", -1
+def script_of(
+    cells: Sequence[Segment], title: str, context: LessonContext
+) -> tuple[str, list[int]]:
+    """The script, and the numbers of the cells that it runs."""
+    codes = {number: _code(cell, context).strip() for number, cell in enumerate(cells)}
+    run = [number for number, code in codes.items() if code]
     summary = re.sub(r'[\\"]', "", title).strip().rstrip(".") or "The cells of this lesson"
-    script = f'"""{summary}."""\n\n' + parts[0][1]
-    for (_, before), (_, code) in itertools.pairwise(parts):
-        apart = before.split("\n")[-1].startswith((" ", "\t")) or _DEFINES.match(code)
-        script += ("\n\n\n" if apart else "\n\n") + code
-    return script + "\n", parts[-1][0]
+    script = f'"""{summary}."""\n'
+    before = ""
+    for number in run:
+        apart = before.split("\n")[-1].startswith((" ", "\t")) or _DEFINES.match(codes[number])
+        script += ("\n\n" if before and apart else "\n") + codes[number] + "\n"
+        before = codes[number]
+    return script, run
 
 
 def shown_text(cell: Segment) -> str:

@@ -20,11 +20,11 @@ from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course, Recording, Script
 from coursebuild.core.model.results import Outcome, ScriptRun, Sign
+from coursebuild.core.pages.marks import fence
 from coursebuild.core.scripts.edit import apply_edits, updated_body
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.features.importer.blocks import plain_fence
 from coursebuild.features.importer.convert import convert, write_course
 from coursebuild.features.importer.values import Leftover
 from coursebuild.pipeline.check import check
@@ -169,5 +169,5 @@ def _outputs(
                 yield edit
     if not recordings and printed.strip() and not script.prefix:
         end = script.span.end
-        text = "Output:\n\n" + plain_fence("text", printed.rstrip("\n"))
+        text = "Output:\n\n" + fence("text", printed.rstrip("\n"))
         yield Edit(Span(script.span.source, end, end), f"\n\n{text}")

@@ -10,46 +10,34 @@ import re
 from collections.abc import Mapping
 from urllib.parse import unquote, urlsplit
 
+from msgspec import Struct, field
+
 from coursebuild.features.importer.values import Leftover, stem_of
 
 
-class LessonContext:
-    """A lesson under way: resolves what it names, and collects files and leftovers.
+class LessonContext(Struct):
+    """A lesson under way: resolves what it names, and collects files and leftovers."""
 
-    Args:
-        path: its file, relative to the folder that is imported.
-        targets: what is linked to instead of a file, by its path without extension.
-        ids: ids of lessons as coursebuild has them, by those of the course.
-        labels: the lesson or page that sets an anchor, as `targets` has it.
-        files: paths of all files of the folder.
-        folder: where the text will stand, as `content/lessons`.
-    """
-
-    def __init__(
-        self,
-        path: str,
-        targets: Mapping[str, str],
-        ids: Mapping[str, str],
-        labels: Mapping[str, str],
-        files: frozenset[str],
-        folder: str,
-        *,
-        camera_is_position: bool,
-    ) -> None:
-        self.path = path
-        self.ids = ids
-        self.folder = folder
-        self.camera_is_position = camera_is_position
-        self.left: list[Leftover] = []
-        self.copied: dict[str, str] = {}
-        """Where files of the folder go, by their path there."""
-        self.pictures: dict[str, str] = {}
-        """Where pictures go that its file holds itself, by their names."""
-        self.callouts: dict[str, str] = {}
-        """Labels of kinds of callouts that coursebuild does not have."""
-        self._targets = targets
-        self._labels = labels
-        self._files = files
+    path: str
+    """Its file, relative to the folder that is imported."""
+    targets: Mapping[str, str]
+    """What is linked to instead of a file, by its path without extension."""
+    ids: Mapping[str, str]
+    """Ids of lessons as coursebuild has them, by those of the course."""
+    labels: Mapping[str, str]
+    """The lesson or page that sets an anchor, as `targets` has it."""
+    files: frozenset[str]
+    """Paths of all files of the folder."""
+    folder: str
+    """Where the text will stand, as `content/lessons`."""
+    camera_is_position: bool
+    left: list[Leftover] = field(default_factory=list)
+    copied: dict[str, str] = field(default_factory=dict)
+    """Where files of the folder go, by their path there."""
+    pictures: dict[str, str] = field(default_factory=dict)
+    """Where pictures go that its file holds itself, by their names."""
+    callouts: dict[str, str] = field(default_factory=dict)
+    """Labels of kinds of callouts that coursebuild does not have."""
 
     def leave(self, place: str, what: str) -> None:
         """Note that something has no counterpart."""
@@ -65,10 +53,10 @@ class LessonContext:
             return address
         path = self.resolve(parts.path)
         anchor = f"#{parts.fragment.lower()}" if parts.fragment else ""
-        target = self._targets.get(stem_of(path)) or self._targets.get(path)
+        target = self.targets.get(stem_of(path)) or self.targets.get(path)
         if target is not None:
             return target + anchor
-        if path in self._files:
+        if path in self.files:
             return self.file(path)
         self.leave(place, f"a link to `{address}`, which is not in the folder")
         return ""
@@ -82,10 +70,10 @@ class LessonContext:
 
     def labelled(self, anchor: str) -> str:
         """The address of an anchor that a text of the course sets; empty where none does."""
-        target = self._labels.get(anchor)
+        target = self.labels.get(anchor)
         if target is None:
             return ""
-        here = target == self._targets.get(stem_of(self.path))
+        here = target == self.targets.get(stem_of(self.path))
         return f"#{anchor}" if here else f"{target}#{anchor}"
 
     def resolve(self, path: str) -> str:
@@ -94,13 +82,9 @@ class LessonContext:
         beside = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path))
         if path.startswith("/"):
             beside = posixpath.normpath(path.lstrip("/"))
-        if beside in self._files or stem_of(beside) in self._targets:
+        if beside in self.files or stem_of(beside) in self.targets:
             return beside
-        return next((f for f in sorted(self._files) if f.endswith("/" + path.lstrip("./"))), beside)
-
-    def has(self, path: str) -> bool:
-        """Whether the folder has a file."""
-        return path in self._files
+        return next((f for f in sorted(self.files) if f.endswith("/" + path.lstrip("./"))), beside)
 
     def picture(self, name: str) -> str:
         """The address of a picture that the file of the lesson holds itself."""

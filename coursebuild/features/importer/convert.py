@@ -17,7 +17,7 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_json import read_course_json
-from coursebuild.features.importer.course_map import ImportedText, map_text, texts_of
+from coursebuild.features.importer.course_map import ImportedText, map_lines, texts_of
 from coursebuild.features.importer.lesson import lesson_text
 from coursebuild.features.importer.prose import labels
 from coursebuild.features.importer.values import (
@@ -67,8 +67,8 @@ def convert(folder: Path) -> Converted:
         ]
     packages = dict(_packages(files, texts))
     out |= {**packages, **dict(_models(files))}
-    toml = map_text(course, texts, ids, callouts, has_packages=bool(packages))
-    out["content/course.toml"] = toml.encode()
+    lines = map_lines(course, texts, ids, callouts, ("src",) if packages else ())
+    out["content/course.toml"] = "".join(f"{line}\n" for line in lines).encode()
     out[".gitignore"] = _IGNORED
     return Converted(dict(sorted(out.items())), (*course.left, *left))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import posixpath
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
 from typing import Any
 
 from coursebuild.core.files.errors import UsageError
@@ -23,59 +23,23 @@ from coursebuild.features.importer.values import (
     stem_of,
 )
 
-_NAMES = {
-    "id": ("id", "number", "key"),
-    "slug": ("slug",),
-    "title": ("title", "name"),
-    "summary": ("summary", "description", "subtitle", "tagline", "goal"),
-    "file": ("file", "path", "source", "markdown"),
-    "objectives": ("objectives", "outcomes", "goals", "learning_objectives"),
-    "prerequisites": ("prerequisites", "prereqs", "requires", "depends_on", "dependencies"),
-    "minutes": ("minutes", "estimated_minutes", "duration", "time", "estimatedMinutes"),
-    "status": ("status", "state"),
-    "checkpoint": ("checkpoint",),
-    "lessons": ("lessons", "units", "chapters"),
-    "levels": ("levels", "modules", "parts"),
-    "pages": ("pages",),
-    "level": ("level", "module", "part"),
-    "language": ("language", "lang", "locale"),
+_NAMES: dict[str, str] = {
+    "number": "id",
+    "name": "title",
+    **dict.fromkeys(("description", "subtitle", "tagline", "goal"), "summary"),
+    **dict.fromkeys(("path", "source", "markdown"), "file"),
+    **dict.fromkeys(("outcomes", "goals", "learning_objectives"), "objectives"),
+    **dict.fromkeys(("prereqs", "requires", "depends_on", "dependencies"), "prerequisites"),
+    **dict.fromkeys(("estimated_minutes", "estimatedMinutes", "duration", "time"), "minutes"),
+    "state": "status",
+    **dict.fromkeys(("units", "chapters"), "lessons"),
+    **dict.fromkeys(("modules", "parts"), "levels"),
+    **dict.fromkeys(("module", "part"), "level"),
+    **dict.fromkeys(("lang", "locale"), "language"),
 }
-
-
-class _Fields:
-    """The fields of an object, by the names that they have here."""
-
-    def __init__(self, value: object, unknown: dict[str, int], *known: str) -> None:
-        if not isinstance(value, Mapping):
-            raise UsageError("course.json: a level or a lesson is no object")
-        self._values: dict[str, Any] = {}
-        for key, item in value.items():
-            name = next((name for name in known if key in _NAMES[name]), None)
-            if name is None or name in self._values:
-                unknown[key] = unknown.get(key, 0) + 1
-            else:
-                self._values[name] = item
-
-    def text(self, name: str) -> str:
-        value = self._values.get(name)
-        return " ".join(str(value).split()) if isinstance(value, str | int | float) else ""
-
-    def texts(self, name: str) -> tuple[str, ...]:
-        value = self._values.get(name) or ()
-        items = value if isinstance(value, list) else [value] if isinstance(value, str) else []
-        return tuple(str(item).strip() for item in items if str(item).strip())
-
-    def objects(self, name: str) -> Sequence[Any]:
-        value = self._values.get(name) or ()
-        if isinstance(value, Mapping):  # by their ids
-            return [{"id": key, **item} for key, item in value.items() if isinstance(item, Mapping)]
-        return value if isinstance(value, list) else ()
-
-    def minutes(self) -> int | None:
-        number = re.search(r"\d+", self.text("minutes"))
-        return int(number[0]) if number is not None and 1 <= int(number[0]) <= 100_000 else None
-
-
+"""What fields are called here, by other names that they have."""
+_COURSE = ("id", "title", "summary", "levels", "lessons", "pages", "language")
+_LEVEL = ("id", "title", "summary", "lessons", "checkpoint")
 _LESSON = (
     *("id", "slug", "title", "summary", "file", "objectives", "prerequisites", "minutes"),
     *("status", "checkpoint", "level"),
@@ -91,94 +55,114 @@ def read_course_json(path: str, files: Files) -> SourceCourse:
     text = read_text(files[path], path)
     try:
         # A number such as 4.10 is the name of a lesson.
-        data = json.loads(text, parse_float=str)
+        data = json.loads(text, parse_float=str, parse_int=str)
     except RecursionError:
         raise UsageError(f"{path} is no JSON: the text is nested too deeply") from None
     except ValueError as error:
         raise UsageError(f"{path} is no JSON: {error}") from None
-    unknown: dict[str, int] = {}
-    course = data.get("course", data) if isinstance(data, dict) else {"levels": data}
-    course = {**data, **course} if isinstance(data, dict) and isinstance(course, dict) else course
-    top = _Fields(
-        {key: value for key, value in course.items() if key != "course"},
-        unknown,
-        *("id", "title", "summary", "levels", "lessons", "pages", "language"),
-    )
-    apart = [_Fields(item, unknown, *_LESSON) for item in top.objects("lessons")]
-    levels = tuple(
-        _level(
-            _Fields(item, unknown, "id", "title", "summary", "lessons", "checkpoint"),
-            apart,
-            files,
-            unknown,
-        )
-        for item in top.objects("levels")
-    )
+    if isinstance(data, dict) and isinstance(data.get("course"), dict):
+        data |= data.pop("course")
+    reader = _Reader(files)
+    course = reader.fields(data, _COURSE)
+    apart = [reader.fields(item, _LESSON) for item in _items(course, "lessons")]
+    levels = tuple(reader.level(item, apart) for item in _items(course, "levels"))
     if not levels:
         raise UsageError(f"{path} has no `levels`")
-    pages = (_Fields(item, unknown, "id", "slug", "title", "file") for item in top.objects("pages"))
     return SourceCourse(
-        title=top.text("title") or "Course",
-        summary=top.text("summary"),
-        language=top.text("language"),
+        title=_text(course, "title") or "Course",
+        summary=_text(course, "summary"),
+        language=_text(course, "language"),
         levels=levels,
-        pages=tuple(_lesson(page, files) for page in pages),
+        pages=tuple(
+            reader.lesson(reader.fields(item, _LESSON)) for item in _items(course, "pages")
+        ),
         camera_is_position=True,
         left=tuple(
             Leftover(path, "", f"`{key}` ({count} times), which a course map does not have")
-            for key, count in unknown.items()
+            for key, count in reader.unknown.items()
         ),
     )
 
 
-def _level(
-    fields: _Fields, apart: Sequence[_Fields], files: Files, unknown: dict[str, int]
-) -> SourceLevel:
-    inside = [_Fields(item, unknown, *_LESSON) for item in fields.objects("lessons")]
-    inside += [lesson for lesson in apart if lesson.text("level") == fields.text("id")]
-    return SourceLevel(
-        id=fields.text("id"),
-        title=fields.text("title"),
-        summary=_with_checkpoint(fields),
-        lessons=tuple(_lesson(lesson, files) for lesson in inside),
-    )
+class _Reader:
+    """Reads objects of the file."""
+
+    def __init__(self, files: Files) -> None:
+        self.files = files
+        self.unknown: Counter[str] = Counter()
+        """How often there are fields that nothing here knows."""
+
+    def fields(self, value: Any, known: tuple[str, ...]) -> dict[str, Any]:
+        """The fields of an object, by the names that they have here."""
+        if not isinstance(value, dict):
+            raise UsageError("course.json: a level or a lesson is no object")
+        self.unknown.update(key for key in value if _name(key) not in known)
+        return {_name(key): item for key, item in value.items()}
+
+    def level(self, value: object, apart: list[dict[str, Any]]) -> SourceLevel:
+        """A level, with those of the lessons that stand apart that name it."""
+        level = self.fields(value, _LEVEL)
+        lessons = [self.fields(item, _LESSON) for item in _items(level, "lessons")]
+        lessons += [lesson for lesson in apart if _text(lesson, "level") == _text(level, "id")]
+        return SourceLevel(
+            id=_text(level, "id"),
+            title=_text(level, "title"),
+            summary=_summary(level),
+            lessons=tuple(map(self.lesson, lessons)),
+        )
+
+    def lesson(self, lesson: dict[str, Any]) -> SourceLesson:
+        """A lesson, or a page."""
+        minutes = re.search(r"\d+", _text(lesson, "minutes"))
+        return SourceLesson(
+            id=_text(lesson, "id"),
+            path=self.file(lesson),
+            title=_text(lesson, "title"),
+            slug=_text(lesson, "slug"),
+            summary=_summary(lesson),
+            status=_text(lesson, "status"),
+            objectives=_texts(lesson, "objectives"),
+            prerequisites=_texts(lesson, "prerequisites"),
+            minutes=int(minutes[0]) if minutes and 1 <= int(minutes[0]) <= 100_000 else None,
+        )
+
+    def file(self, lesson: dict[str, Any]) -> str:
+        """The Markdown file of a lesson: that named, or that whose name begins with its id."""
+        named, name, slug = (_text(lesson, key) for key in ("file", "id", "slug"))
+        texts = [path for path in self.files if path.endswith((".md", ".qmd", ".ipynb"))]
+        end = "/" + named.lstrip("./")
+        found = [path for path in texts if named and f"/{path}".endswith(end)]
+        begins = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(name)}(?![\w.])|{re.escape(slug)}$")
+        for path in texts:
+            if name and begins.match(posixpath.basename(stem_of(path))):
+                found.append(path)
+        return found[0] if found else ""
 
 
-def _with_checkpoint(fields: _Fields) -> str:
+def _name(key: str) -> str:
+    return _NAMES.get(key, key)
+
+
+def _texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
+    """The texts of a field, each on one line: the items of a list, or the value."""
+    value = fields.get(name)
+    items = value if isinstance(value, list) else [value]
+    texts = (" ".join(item.split()) for item in items if isinstance(item, str))
+    return tuple(text for text in texts if text)
+
+
+def _text(fields: dict[str, Any], name: str) -> str:
+    return "; ".join(_texts(fields, name))
+
+
+def _items(fields: dict[str, Any], name: str) -> list[Any]:
+    value = fields.get(name)
+    if isinstance(value, dict):  # by their ids
+        return [{"id": key, **item} for key, item in value.items() if isinstance(item, dict)]
+    return value if isinstance(value, list) else []
+
+
+def _summary(fields: dict[str, Any]) -> str:
     """The summary, with what a learner is to be able to do at this place."""
-    checkpoint = "; ".join(fields.texts("checkpoint")) or fields.text("checkpoint")
-    if checkpoint in ("", "True", "False"):
-        return fields.text("summary")
-    return f"{fields.text('summary')} Checkpoint: {checkpoint}".strip()
-
-
-def _lesson(fields: _Fields, files: Files) -> SourceLesson:
-    name = fields.text("id")
-    return SourceLesson(
-        id=name,
-        path=_file_of(fields, files),
-        title=fields.text("title"),
-        slug=fields.text("slug"),
-        summary=_with_checkpoint(fields),
-        status=fields.text("status"),
-        objectives=fields.texts("objectives"),
-        prerequisites=fields.texts("prerequisites"),
-        minutes=fields.minutes(),
-    )
-
-
-def _file_of(fields: _Fields, files: Files) -> str:
-    """The Markdown file of a lesson: the one named, or the one whose name begins with its id."""
-    named, name, slug = fields.text("file"), fields.text("id"), fields.text("slug")
-    texts = [path for path in files if path.endswith((".md", ".qmd", ".ipynb"))]
-    for path in texts:
-        if named and (path == named.lstrip("./") or path.endswith("/" + named.lstrip("./"))):
-            return path
-    if not name:
-        return ""
-    beginning = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(name)}(?![\w.]|$)|{re.escape(name)}$")
-    for path in texts:
-        stem = posixpath.basename(stem_of(path))
-        if stem in (slug, f"{name}-{slug}") or beginning.match(stem):
-            return path
-    return ""
+    checkpoint = _text(fields, "checkpoint")
+    return f"{_text(fields, 'summary')} {checkpoint and f'Checkpoint: {checkpoint}'}".strip()

@@ -1,6 +1,6 @@
 """The map of the new course.
 
-Entry points: `ImportedText`, a lesson or page on its way; `texts_of`, `map_text`.
+Entry points: `ImportedText`, a lesson or page on its way; `texts_of`, `map_lines`.
 """
 
 from __future__ import annotations
@@ -84,26 +84,14 @@ def _text(source: SourceLesson, id: str, files: Files, *, page: bool = False) ->
     return ImportedText(source, id, slug, title, path, tuple(segments), pictures)
 
 
-def map_text(
-    course: SourceCourse,
-    texts: Sequence[ImportedText],
-    ids: Mapping[str, str],
-    callouts: Mapping[str, str],
-    *,
-    has_packages: bool,
-) -> str:
-    """The text of `course.toml`; `ids` are those of lessons now, by those that they had."""
-    packages = ("src",) if has_packages else ()
-    return "\n".join(_map(course, texts, ids, callouts, packages)) + "\n"
-
-
-def _map(
+def map_lines(
     course: SourceCourse,
     texts: Sequence[ImportedText],
     ids: Mapping[str, str],
     callouts: Mapping[str, str],
     packages: tuple[str, ...],
 ) -> Iterator[str]:
+    """The lines of `course.toml`; `ids` are those of lessons now, by those that they had."""
     yield "[course]"
     yield from _fields(
         title=course.title, summary=course.summary, language=course.language, packages=packages

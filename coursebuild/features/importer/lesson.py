@@ -1,6 +1,6 @@
 """A lesson of another tool → its Markdown.
 
-Entry point: `read_segments`, `lesson_text`.
+Entry points: `read_segments`, `lesson_text`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from coursebuild.features.importer.blocks import block_text, plain_fence
+from coursebuild.core.pages.marks import fence
+from coursebuild.features.importer.blocks import block_text
 from coursebuild.features.importer.cells import script_of, shown_text
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.notebook import read_notebook
@@ -38,42 +39,33 @@ def read_segments(path: Path, name: str) -> tuple[str, list[Segment], dict[str, 
 def lesson_text(
     segments: Sequence[Segment], title: str, script_path: str, context: LessonContext
 ) -> str:
-    """Markdown of coursebuild; its cells are the script of this path."""
+    """Markdown of coursebuild; its cells are the script of this path.
+
+    The script stands where its last cell stood. Cells before are shown where they stood, but for
+    those directly before it.
+    """
     cells = [segment for segment in segments if segment.kind == "cell"]
-    script, last = script_of(cells, title, context)
-    row = _row(segments, last)
+    script, run = script_of(cells, title, context)
     parts: list[str] = []
-    number = -1
+    number, shown = 0, 0
     for segment in segments:
         if segment.kind != "cell":
             parts.append(block_text(segment, context).strip("\n"))
+            shown = len(parts)
             continue
-        number += 1
-        if number == last:
-            parts.append(plain_fence(f"python file={script_path}", script.rstrip("\n")))
-        elif number not in row:
+        if run and number == run[-1]:
+            parts[shown:] = [fence(f"python file={script_path}", script)]
+        else:
             parts.append(_shown(segment))
-    return "\n\n".join(part for part in parts if part.strip()) + "\n"
-
-
-def _row(segments: Sequence[Segment], last: int) -> frozenset[int]:
-    """Numbers of the cells directly before the last one of the script, which shows them."""
-    row: set[int] = set()
-    number = -1
-    for segment in segments:
-        if segment.kind != "cell":
-            row = set() if number < last else row
-            continue
+            shown = shown if number in run else len(parts)
         number += 1
-        if number <= last:
-            row.add(number)
-    return frozenset(row)
+    return "\n\n".join(part for part in parts if part.strip()) + "\n"
 
 
 def _shown(cell: Segment) -> str:
     """A cell as a part of the script that stands below."""
     magic = re.match(r"\s*%%(\w+).*\n", cell.text)
     if magic is not None:
-        return plain_fence(magic[1], cell.text[magic.end() :].strip("\n"))
+        return fence(magic[1], cell.text[magic.end() :].strip("\n"))
     text = shown_text(cell)
-    return plain_fence("python fragment", text) if text else ""
+    return fence("python fragment", text) if text else ""

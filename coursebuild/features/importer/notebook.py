@@ -45,7 +45,7 @@ def _read(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, bytes]]
             shown = any(one.get("output_type") == "execute_result" for one in outputs)
             segments.append(Segment(kind="cell", place=place, text=source, head=tags, value=shown))
         elif source.strip():
-            segments.append(Segment(kind="fence", place=place, text=source, head="text"))
+            segments.append(Segment(kind="block", place=place, text=source, head="text"))
     return segments, attached
 
 

@@ -2,7 +2,8 @@ r"""Lines of prose as coursebuild reads them: links, pictures, mentions, formula
 
 Entry points: `rewrite`, `displayed`, `labels`.
 
-Code in a line is left alone, and so is what nothing here knows.
+Code in a line is left alone, and so are blocks of it in quotations and lists, and what nothing here
+knows.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
 )
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
+_FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
+"""That begins or ends a block of code in a quotation or a list."""
 _PERCENT = re.compile(r"^%[^\n]*\n?", re.MULTILINE)
 
 
@@ -50,10 +53,14 @@ def rewrite(text: str, context: LessonContext, place: str) -> str:
     text = formulas(_PERCENT.sub("", text))
     text = _TARGET.sub(_target, text)
     first = int(place.removeprefix("line ")) if place.startswith("line ") else 0
-    out = []
+    out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
-        where = f"line {first + number}" if first else place
-        out.append(_line(line, context, where))
+        fence = _FENCE.match(line)
+        if fence is None and not mark:
+            line = _line(line, context, f"line {first + number}" if first else place)
+        elif fence is not None and fence[1].startswith(mark):
+            mark = "" if mark else fence[1]
+        out.append(line)
     return "\n".join(out)
 
 
@@ -176,7 +183,7 @@ def _image(alt: str, source: str, context: LessonContext, place: str) -> str:
     if source.startswith("attachment:"):
         return f"![{alt}]({context.picture(source.removeprefix('attachment:'))})"
     path = context.resolve(source)
-    if not context.has(path):
+    if path not in context.files:
         context.leave(place, f"the picture `{source}`, which is not in the folder")
         return alt
     return f"![{alt}]({context.file(path)})"

@@ -31,14 +31,15 @@ class Leftover(Struct, frozen=True, order=True):
 class Segment(Struct, frozen=True, kw_only=True):
     """A stretch of a lesson."""
 
-    kind: Literal["prose", "fence", "div", "admonition", "cell"]
-    """`div`: between lines of colons; `admonition`: behind `!!!`; `cell`: Python that is run."""
+    kind: Literal["prose", "block", "cell"]
+    """`cell`: Python that is run; `block`: what else stands between marks."""
     place: str
     text: str
     """The prose, or what stands inside."""
     head: str = ""
     """What stands behind the marks that begin it."""
-    fence: str = "```"
+    mark: str = "```"
+    """Which these are: backticks, tildes, colons, or `!!!`."""
     value: bool | None = None
     """Of a cell: whether the value of its last expression was shown; `None` where that is not
     known, since nothing is recorded."""

@@ -139,6 +139,12 @@ REWRITTEN = {
     "\\begin{align}\na &= b \\label{eq:it}\n\\end{align}": (
         "$$\\begin{align}\na &= b \n\\end{align}$$ {#eq:it}"
     ),
+    "> [!tip] Go\n> A $a$5.\n> ```text\n> $a$5\n> ```\n> Then.": (
+        "> [!tip] Go\n> A $a5$.\n> ```text\n> $a$5\n> ```\n> Then."
+    ),
+    "1. one\n\n   ```python\n   x = '$a$5'\n   ```\n2. $a$5": (
+        "1. one\n\n   ```python\n   x = '$a$5'\n   ```\n2. $a5$"
+    ),
     "```mermaid\ngraph LR\n```": "```mermaid\ngraph LR\n```",
     "~~~js\n1\n~~~": "```js\n1\n```",
     "an open fence\n\n```text\nto the end": "an open fence\n\n```text\nto the end\n```",
