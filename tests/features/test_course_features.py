@@ -72,27 +72,19 @@ def course(tmp_path: Path, stores: Path) -> Folder:
     return folder
 
 
-def test_a_fence_of_a_feature_is_on_the_page_and_in_the_copy(course: Folder) -> None:
+def test_a_fence_of_a_feature_follows_its_code_and_the_map(course: Folder) -> None:
     done = course.main("build")
     assert done.status == 0, done.out
     assert "<p>LISTEN &lt;NOW&gt;</p>" in course.text(PAGE)
     assert "LISTEN <NOW>" in course.text("public/lessons/1.1-one.md")
     styles = [text for path, text in course.tree("public").items() if path.endswith(".css")]
     assert any(b".shout { color: red }" in text for text in styles)
-
-
-def test_a_change_of_a_feature_changes_the_page(course: Folder) -> None:
-    course.main("build")
     course.replace("features/shout.py", "<p>{escape", "<p class='loud'>{escape")
     assert course.main("build").status == 0
     assert "<p class='loud'>LISTEN &lt;NOW&gt;</p>" in course.text(PAGE)
-
-
-def test_without_the_map_naming_it_a_feature_is_not_there(course: Folder) -> None:
-    course.main("build")
     course.replace(MAP, 'features = ["features/shout.py"]\n', "")
     assert course.main("build").status == 0
-    assert "LISTEN" not in course.text(PAGE)
+    assert "LISTEN" not in course.text(PAGE), "a file that the map does not name is no feature"
 
 
 def test_a_mistake_in_a_fence_of_a_feature_has_its_rule_and_place(course: Folder) -> None:
@@ -104,55 +96,43 @@ def test_a_mistake_in_a_fence_of_a_feature_has_its_rule_and_place(course: Folder
     )
 
 
-@pytest.mark.parametrize(
-    ("code", "message"),
-    [
-        ("1 / 0\n", "features/shout.py fails at line 1: ZeroDivisionError: division by zero"),
-        ("def (\n", "features/shout.py fails: SyntaxError: "),
-        ("FEATURE = 'shout'\n", "features/shout.py has no FEATURE"),
-        ("raise SystemExit\n", "features/shout.py fails at line 1: SystemExit: "),
-        (
-            SHOUT.replace('"shout",\n    f', '"quiz",\n    f'),
-            "features/shout.py: two features are called `quiz`",
-        ),
-        (
-            SHOUT.replace('Rule("shout"', 'Rule("output-drift"'),
-            "features/shout.py: there is a rule",
-        ),
-        (
-            SHOUT.replace('name="shout",\n    f', 'name="shout",\n    check=print,\n    f'),
-            "features/shout.py: it would see no `shout` of the course: its block has no `summary`",
-        ),
-        (
-            SHOUT.replace('name="shout",\n            b', 'name="lab",\n            b'),
-            "features/shout.py: the fence `lab` is read already",
-        ),
-    ],
-)
-def test_a_feature_that_cannot_be_loaded_is_told_at_its_place_in_the_map(
-    course: Folder, code: str, message: str
-) -> None:
-    course.write("features/shout.py", code)
-    done = course.main("check")
-    assert done.status == 1
-    assert f"error[feature-broken]: {message}" in done.out
-    assert f"  --> {MAP}:2:13\n" in done.out
+BROKEN = {
+    "1 / 0\n": " fails at line 1: ZeroDivisionError: division by zero",
+    "def (\n": " fails: SyntaxError: ",
+    "FEATURE = 'shout'\n": " has no FEATURE",
+    "raise SystemExit\n": " fails at line 1: SystemExit: ",
+    SHOUT.replace('"shout",\n    f', '"quiz",\n    f'): ": two features are called `quiz`",
+    SHOUT.replace('Rule("shout"', 'Rule("output-drift"'): ": there is a rule",
+    SHOUT.replace('name="shout",\n    f', 'name="shout",\n    check=print,\n    f'): (
+        ": it would see no `shout` of the course: its block has no `summary`"
+    ),
+    SHOUT.replace('name="shout",\n            b', 'name="lab",\n            b'): (
+        ": the fence `lab` is read already"
+    ),
+}
 
 
-def test_a_feature_whose_file_is_not_there_is_told(course: Folder) -> None:
+def test_a_feature_that_cannot_be_loaded_is_told_at_its_place_in_the_map(course: Folder) -> None:
+    def told(path: str = "features/shout.py") -> tuple[str, str]:
+        done = course.main("check")
+        assert done.status == 1, path
+        message, place, *_ = done.out.splitlines()
+        return message, place
+
+    for code, wrong in BROKEN.items():
+        course.write("features/shout.py", code)
+        message, place = told()
+        assert message.startswith(f"error[feature-broken]: features/shout.py{wrong}"), message
+        assert place == f"  --> {MAP}:2:13"
     (course.root / "features/shout.py").unlink()
-    done = course.main("check")
-    assert done.status == 1
-    assert "error[feature-broken]: features/shout.py cannot be read: " in done.out
-
-
-@pytest.mark.parametrize("path", ["shout.py", "../shout.py", "features/shout", "features/../a.py"])
-def test_a_feature_stands_in_its_folder(course: Folder, path: str) -> None:
-    course.replace(MAP, "features/shout.py", path)
-    done = course.main("check")
-    assert done.status == 1
-    assert "error[field-value]: " in done.out
-    assert "a Python file in `features/`, as in `features/tabs.py`" in done.out
+    message, _ = told()
+    assert message.startswith("error[feature-broken]: features/shout.py cannot be read: ")
+    text = course.text(MAP)
+    for path in ("shout.py", "../shout.py", "features/shout", "features/../a.py"):
+        course.write(MAP, text.replace("features/shout.py", path))
+        message, _ = told(path)
+        assert message.startswith("error[field-value]: "), path
+        assert "a Python file in `features/`, as in `features/tabs.py`" in message, path
 
 
 def test_the_example_of_the_docs_works(course: Folder) -> None:
@@ -247,17 +227,16 @@ def test_a_broken_link_of_a_page_of_a_feature_is_told(inventory: Folder) -> None
     assert "error[link-broken]: `../models/box.htmll` leads nowhere" in done.out
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
+def test_a_page_that_cannot_be_added_is_told(inventory: Folder) -> None:
+    code = inventory.text("features/inventory.py")
+    for name, message in (
         ("search", "there is a page `search` already"),
         ("lessons", "there is a page `lessons` already"),
         ("home", "there is a page `home` already"),
         ("../x", "a page cannot be called `../x`: use small letters, digits and `-`"),
-    ],
-)
-def test_a_page_that_cannot_be_added_is_told(inventory: Folder, name: str, message: str) -> None:
-    inventory.replace("features/inventory.py", 'name="inventory",\n    v', f'name="{name}",\n    v')
-    done = inventory.main("check")
-    assert done.status == 1
-    assert f"error[feature-broken]: features/inventory.py: {message}" in done.out
+    ):
+        named = code.replace('name="inventory",\n    v', f'name="{name}",\n    v')
+        inventory.write("features/inventory.py", named)
+        done = inventory.main("check")
+        assert done.status == 1
+        assert f"error[feature-broken]: features/inventory.py: {message}" in done.out

@@ -6,11 +6,11 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, expect
 
 from support.axe import violations
 from support.scratch_course import GOOD, ROOT, Done, Folder
@@ -73,29 +73,19 @@ def run(folder: Folder, packages: Path, *arguments: str) -> Done:
     return folder.run(*arguments, env={"PYTHONPATH": f"{packages}:{ROOT}"})
 
 
-def test_tabs_are_complete_without_a_script(course: Folder) -> None:
+def test_pages_show_tabs_and_diagrams_without_a_script(course: Folder) -> None:
     html = course.text(PAGE)
     assert html.count('<p class="tab-title">') == 3
     assert "Energy &amp; more" in html
     assert '<a href="#below">below</a>' in html
-
-
-def test_a_diagram_is_a_picture_with_its_text(course: Folder) -> None:
-    html = course.text(PAGE)
     assert '<img src="data:image/svg+xml;base64,' in html
     assert 'alt="A lesson is read, and &lt;run&gt;"' in html
     assert "<summary>The diagram as text</summary>" in html
-
-
-def test_a_copy_in_markdown_has_what_other_readers_understand(course: Folder) -> None:
-    text = course.text("public/lessons/1.1-one.md")
-    assert "**Energy & more**\n\nThe energy is" in text
-    assert "```mermaid\nflowchart LR\n  read --> run\n```" in text
-
-
-def test_only_pages_with_tabs_load_their_script(course: Folder) -> None:
-    assert "/tabs." in course.text(PAGE)
-    assert "/tabs." not in course.text("public/index.html")
+    assert "/tabs." in html
+    assert "/tabs." not in course.text("public/index.html"), "a page without tabs"
+    copy = course.text("public/lessons/1.1-one.md")
+    assert "**Energy & more**\n\nThe energy is" in copy
+    assert "```mermaid\nflowchart LR\n  read --> run\n```" in copy
 
 
 def test_an_edit_of_an_installed_feature_is_seen(
@@ -135,66 +125,48 @@ def test_example_of_the_docs_adds_a_command(tmp_path: Path, stores: Path) -> Non
     assert "there is a command `check` already" in run(folder, tmp_path, "--help").err
 
 
-@pytest.mark.parametrize(
-    ("fence", "message"),
-    [
-        ("~~~tabs\n=== One\nText.\n~~~\n", "error[tabs]: there is only one tab"),
-        ("~~~tabs\nText.\n=== One\n=== Two\n~~~\n", "error[tabs]: this text stands in no tab"),
-        ("~~~tabs\n=== One\n$\\x$\n=== Two\n~~~\n", "error[math-syntax]: "),
-        ("~~~tabs\n=== One\n[a](lesson:9)\n=== Two\n~~~\n", "error[link-lesson]: "),
-        ("```mermaid\nflowchart LR\n  a --> b\n```\n", "error[mermaid-alt]: "),
-        ('```mermaid alt="x"\nnonsense\n```\n', "error[mermaid-syntax]: Mermaid: No Mermaid "),
-        ('```mermaid alt="x" size=3\ngraph TD\n  a\n```\n', "error[fence-key-unknown]: "),
-    ],
-)
-def test_mistakes_have_rules_and_places(
-    tmp_path: Path, stores: Path, packages: Path, fence: str, message: str
-) -> None:
+MISTAKES = {
+    "~~~tabs\n=== One\nText.\n~~~\n": "error[tabs]: there is only one tab",
+    "~~~tabs\nText.\n=== One\n=== Two\n~~~\n": "error[tabs]: this text stands in no tab",
+    "~~~tabs\n=== One\n$\\x$\n=== Two\n~~~\n": "error[math-syntax]: ",
+    "~~~tabs\n=== One\n[a](lesson:9)\n=== Two\n~~~\n": "error[link-lesson]: ",
+    "```mermaid\nflowchart LR\n  a --> b\n```\n": "error[mermaid-alt]: ",
+    '```mermaid alt="x"\nnonsense\n```\n': "error[mermaid-syntax]: Mermaid: No Mermaid ",
+    '```mermaid alt="x" size=3\ngraph TD\n  a\n```\n': "error[fence-key-unknown]: ",
+}
+
+
+def test_mistakes_have_rules_and_places(tmp_path: Path, stores: Path, packages: Path) -> None:
     folder = Folder(tmp_path / "a course")
-    folder.fill([f"## Hello\n\n{fence}"], stores)
+    folder.fill([f"## Hello\n\n{fence}" for fence in MISTAKES], stores)
     done = run(folder, packages, "check")
     assert done.status == 1
-    assert message in done.out
-    assert "  --> content/lessons/1.1-one.md:" in done.out
+    told = re.findall(r"(error\[.*)\n  --> (.*?):", done.out)
+    assert [path for _, path in told] == [folder.lesson(n) for n in range(1, len(MISTAKES) + 1)]
+    wanted = [*MISTAKES.values()]
+    assert [one for one, (said, _) in zip(wanted, told, strict=True) if one not in said] == []
 
 
-# --- in a browser
-
-
-@pytest.fixture
-def page(browsers: Mapping[str, Browser], course: Folder) -> Iterator[Page]:
+@pytest.mark.browser
+def test_keys_and_links_choose_tabs(browsers: Mapping[str, Browser], course: Folder) -> None:
     with (
         Host(course.root / "public") as host,
         browsers["plain"].new_context(service_workers="block") as context,
     ):
         page = context.new_page()
         page.goto(f"{host.url}lessons/1.1-one.html")
-        yield page
-
-
-@pytest.mark.browser
-def test_keys_choose_tabs(page: Page) -> None:
-    tabs = page.get_by_role("tab")
-    expect(tabs).to_have_count(3)
-    expect(page.get_by_role("tabpanel")).to_have_count(1)
-    tabs.first.focus()
-    for key, chosen in (("ArrowLeft", 2), ("ArrowRight", 0), ("ArrowRight", 1), ("End", 2)):
-        page.keyboard.press(key)
-        expect(tabs.nth(chosen)).to_have_attribute("aria-selected", "true")
-        expect(tabs.nth(chosen)).to_be_focused()
-    expect(page.get_by_text("Nothing else.")).to_be_visible()
-    expect(page.get_by_text("The energy is")).to_be_hidden()
-
-
-@pytest.mark.browser
-def test_a_link_into_a_hidden_tab_shows_it(page: Page) -> None:
-    page.get_by_role("tab").nth(1).click()
-    expect(page.get_by_role("heading", name="Inside")).to_be_hidden()
-    page.evaluate("location.hash = '#inside'")
-    expect(page.get_by_role("heading", name="Inside")).to_be_visible()
-
-
-@pytest.mark.browser
-def test_axe_finds_nothing(page: Page) -> None:
-    expect(page.get_by_role("tab")).to_have_count(3)
-    assert violations(page, "main") == []
+        tabs = page.get_by_role("tab")
+        expect(tabs).to_have_count(3)
+        expect(page.get_by_role("tabpanel")).to_have_count(1)
+        assert violations(page, "main") == []
+        tabs.first.focus()
+        for key, chosen in (("ArrowLeft", 2), ("ArrowRight", 0), ("ArrowRight", 1), ("End", 2)):
+            page.keyboard.press(key)
+            expect(tabs.nth(chosen)).to_have_attribute("aria-selected", "true")
+            expect(tabs.nth(chosen)).to_be_focused()
+        expect(page.get_by_text("Nothing else.")).to_be_visible()
+        expect(page.get_by_text("The energy is")).to_be_hidden()
+        inside = page.get_by_role("heading", name="Inside")
+        expect(inside).to_be_hidden()
+        page.evaluate("location.hash = '#inside'")
+        expect(inside).to_be_visible()

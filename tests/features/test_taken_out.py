@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from support.scratch_course import GOOD, ROOT, Folder
+from support.scratch_course import GOOD, ROOT, Done, Folder
 
 pytestmark = pytest.mark.site
 
@@ -18,84 +18,49 @@ QUIZ = """
 """
 
 
-@pytest.fixture
-def course(tmp_path: Path, stores: Path) -> Folder:
-    folder = Folder(tmp_path / "a course")
-    folder.fill([GOOD, GOOD.replace("hello.py", "again.py")], stores)
-    return folder
+TAKEN = {"bench": ("numerics",), "markdown": ("notebook",), "quiz": (), "search": ()}
+"""Features, and those that need them."""
 
 
-@pytest.fixture(scope="module")
-def environments(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
-    """Those of installations of the tool that lack the folder of a feature, by its name."""
-    made = {}
-    taken = {"bench": ("numerics",), "markdown": ("notebook",), "quiz": (), "search": ()}
-    for feature, others in taken.items():
-        installed = tmp_path_factory.mktemp("installed")
-        for name in ("coursebuild", "mjcourse", "templates"):
-            shutil.copytree(ROOT / name, installed / name)
-        (installed / "site").mkdir()
-        (installed / "site" / "dist").symlink_to(ROOT / "site" / "dist")
-        for name in (feature, *others):
-            shutil.rmtree(installed / "coursebuild" / "features" / name)
-        made[feature] = {"PYTHONPATH": str(installed)}
-    return made
+@pytest.mark.parametrize("feature", TAKEN)
+def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, stores: Path) -> None:
+    course, installed = Folder(tmp_path / "a course"), tmp_path / "installed"
+    course.fill([GOOD, "## Two\n"], stores)
+    for name in ("coursebuild", "mjcourse", "templates"):
+        shutil.copytree(ROOT / name, installed / name)
+    (installed / "site").mkdir()
+    (installed / "site" / "dist").symlink_to(ROOT / "site" / "dist")
+    for name in (feature, *TAKEN[feature]):
+        shutil.rmtree(installed / "coursebuild" / "features" / name)
 
+    def run(*arguments: str) -> Done:
+        return course.run(*arguments, env={"PYTHONPATH": str(installed)})
 
-@pytest.fixture
-def without_quizzes(environments: dict[str, dict[str, str]]) -> dict[str, str]:
-    return environments["quiz"]
-
-
-def test_a_course_is_built_without_a_feature(
-    course: Folder, environments: dict[str, dict[str, str]]
-) -> None:
-    for feature, environment in environments.items():
-        done = course.run("build", env=environment)
-        said = done.status, done.out.splitlines()[-1].partition(": ")[2]
-        assert said == (0, "everything holds"), feature
-        assert "<h2" in course.text("public/lessons/1.1-one.html")
-    assert "there is no command `bench`" in course.run("bench", env=environments["bench"]).err
-
-
-def test_without_copies_no_page_offers_them(
-    course: Folder, environments: dict[str, dict[str, str]]
-) -> None:
-    assert course.run("build", env=environments["markdown"]).status == 0
+    done = run("build")
+    assert (done.status, done.out.splitlines()[-1].partition(": ")[2]) == (0, "everything holds")
     site = course.tree("public")
-    assert not [path for path in site if path.endswith((".md", ".ipynb")) or path == "llms.txt"]
-    for path, data in site.items():
-        if path.endswith(".html"):
-            assert b"markdown" not in data.lower() and b"Jupyter" not in data, path
-
-
-def test_without_the_search_no_page_offers_it(
-    course: Folder, environments: dict[str, dict[str, str]]
-) -> None:
-    assert course.run("build", env=environments["search"]).status == 0
-    site = course.tree("public")
-    assert not [path for path in site if "search" in path]
-    for path, data in site.items():
-        if path.endswith(".html"):
-            assert b"search/index.html" not in data and b"data-search" not in data, path
-
-
-def test_a_quiz_says_what_is_missing(course: Folder, without_quizzes: dict[str, str]) -> None:
-    course.write(course.lesson(1), GOOD + QUIZ)
-    done = course.run("check", env=without_quizzes)
-    assert done.status == 1
-    assert "nothing that is installed reads a block of kind `quiz`" in done.out
-    assert "help: install coursebuild with its quizzes" in done.out
-
-
-def test_there_is_no_schema_and_no_export_of_quizzes(
-    course: Folder, without_quizzes: dict[str, str]
-) -> None:
-    done = course.run("export", "qti", env=without_quizzes)
-    reason = "`export qti` needs quiz: install coursebuild with its quizzes"
-    assert (done.status, done.err) == (2, f"coursebuild: {reason}\n")
-    done = course.run("schema", "quiz", env=without_quizzes)
-    assert (done.status, done.err) == (
-        2,
-        "coursebuild: there is no schema 'quiz': choose from course, lab, model\n",
-    )
+    pages = {path: data.lower() for path, data in site.items() if path.endswith(".html")}
+    assert b"<h2" in pages["lessons/1.1-one.html"]
+    match feature:
+        case "bench":
+            assert "there is no command `bench`" in run("bench").err
+        case "markdown":
+            copies = [path for path in site if path.endswith((".md", ".ipynb", "llms.txt"))]
+            offers = [p for p, data in pages.items() if b"markdown" in data or b"jupyter" in data]
+            assert (copies, offers) == ([], [])
+        case "search":
+            assert not [path for path in site if "search" in path]
+            sought = b"search/index.html", b"data-search"
+            assert not [p for p, data in pages.items() if any(mark in data for mark in sought)]
+        case "quiz":
+            said = {
+                ("export", "qti"): "`export qti` needs quiz: install coursebuild with its quizzes",
+                ("schema", "quiz"): "there is no schema 'quiz': choose from course, lab, model",
+            }
+            for arguments, reason in said.items():
+                assert run(*arguments) == Done(2, "", f"coursebuild: {reason}\n")
+            course.write(course.lesson(1), GOOD + QUIZ)
+            done = run("check")
+            assert done.status == 1
+            assert "nothing that is installed reads a block of kind `quiz`" in done.out
+            assert "help: install coursebuild with its quizzes" in done.out

@@ -22,7 +22,6 @@ _LINE = re.compile(
     r"\((?P<address>[^()\s]+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
-    r"|(?P<wiki>\[\[(?P<page>[^\[\]\n|]+)(?:\|(?P<words>[^\[\]\n]+))?\]\])"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
     r"|(?P<cite>\[-?@[\w:.-]+(?:[;,][^\[\]\n]*)?\])"
     r"|(?P<substitution>\{\{[^{}\n]*\}\})"
@@ -117,7 +116,7 @@ def labels(text: str) -> set[str]:
 
 def _rewritten(match: re.Match[str], context: LessonContext, place: str) -> str:
     whole = match[0]
-    match match.lastgroup and next(kind for kind in _KINDS if match[kind] is not None):
+    match match.lastgroup:
         case "role":
             return _role(match["name"], match["body"], context, place)
         case "image":
@@ -127,8 +126,6 @@ def _rewritten(match: re.Match[str], context: LessonContext, place: str) -> str:
             return _linked(text, context.link(match["address"], place), match["title"] or "")
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
-        case "wiki":
-            return _wiki(match["page"], match["words"], context, place)
         case "cross":
             return _cross(match["kind"], match["label"], whole, context, place)
         case "cite" | "substitution":
@@ -141,12 +138,6 @@ def _rewritten(match: re.Match[str], context: LessonContext, place: str) -> str:
             return context.link(whole, place) or whole
         case _:
             return whole
-
-
-_KINDS = (
-    *("role", "code", "image", "link", "digits", "math", "wiki", "cross", "cite"),
-    *("substitution", "mention", "route"),
-)
 
 
 def _linked(text: str, address: str, title: str = "") -> str:
@@ -187,15 +178,6 @@ def _image(alt: str, source: str, context: LessonContext, place: str) -> str:
         context.leave(place, f"the picture `{source}`, which is not in the folder")
         return alt
     return f"![{alt}]({context.file(path)})"
-
-
-def _wiki(page: str, words: str | None, context: LessonContext, place: str) -> str:
-    name = page.strip()
-    known = context.ids.get(name) or context.ids.get(re.split(r"[\s_-]", name)[0])
-    if known is not None:
-        return f"[{words or f'lesson {known}'}](lesson:{known})"
-    address = context.link(f"{name}.md", place)
-    return _linked(words or name, address) if address else f"`{page}`"
 
 
 def _cross(kind: str, label: str, whole: str, context: LessonContext, place: str) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from support.archives import told
 from support.built_sites import BuiltCourses
-from support.scratch_course import GOOD, ROOT, Folder
+from support.scratch_course import ROOT, Folder
 
 pytestmark = pytest.mark.site
 
@@ -110,25 +110,31 @@ def test_page_of_every_construct_and_of_wild_html_needs_no_other_file(everything
     assert page.index('id="_1.1--_top"') < page.index('id="_1.9--_top"')
 
 
-def arabic_book(make_course: Make) -> Path:
-    """The e-book of a course that is read from the right and has no `base_url`."""
-    folder = make_course(GOOD)
+@pytest.fixture
+def arabic(make_course: Make) -> Folder:
+    """A course that is read from the right and has no `base_url`."""
+    folder = make_course("## One\n\nText.\n")
     with_wild_lesson(folder, '[[level.lesson]]\nid = "1.1"')
     folder.replace("content/course.toml", "[course]\n", '[course]\nlanguage = "ar"\n')
-    return exported(folder, "epub")
+    return folder
 
 
-def test_ebook_in_arabic_is_read_from_the_right_and_links_no_files(make_course: Make) -> None:
-    book = arabic_book(make_course)
+def test_ebook_begins_as_it_must_is_read_from_the_right_and_links_no_files(arabic: Folder) -> None:
+    book = exported(arabic, "epub")
+    assert book.read_bytes()[30:58] == b"mimetypeapplication/epub+zip"
     with zipfile.ZipFile(book) as archive:
+        assert archive.testzip() is None
+        first = archive.infolist()[0]
+        assert (first.filename, first.compress_type) == ("mimetype", zipfile.ZIP_STORED)
+        assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         assert 'page-progression-direction="rtl"' in archive.read("EPUB/package.opf").decode()
     assert 'href="1.1-one.xhtml"' in wild_chapter(book)
     assert "data.csv" not in wild_chapter(book)
 
 
 @pytest.mark.slow
-def test_ebook_in_arabic_is_valid(make_course: Make) -> None:
-    assert told(arabic_book(make_course)) == []
+def test_ebook_in_arabic_is_valid(arabic: Folder) -> None:
+    assert told(exported(arabic, "epub")) == []
 
 
 @pytest.mark.slow
@@ -140,17 +146,7 @@ def test_ebook_of_course_is_valid(name: str, tmp_path: Path, stores: Path) -> No
     assert told(exported(folder, "epub")) == []
 
 
-def test_an_ebook_begins_as_it_must(make_course: Make) -> None:
-    book = exported(make_course(GOOD), "epub")
-    assert book.read_bytes()[30:58] == b"mimetypeapplication/epub+zip"
-    with zipfile.ZipFile(book) as archive:
-        assert archive.testzip() is None
-        first = archive.infolist()[0]
-        assert (first.filename, first.compress_type) == ("mimetype", zipfile.ZIP_STORED)
-        assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-
-
-def test_export_is_as_the_course_is_now(make_course: Make) -> None:
+def test_export_follows_edits_and_can_be_offered_by_a_link(make_course: Make) -> None:
     folder = make_course("## One\n\n![a dot](dot.png)\n\nText.\n")
     folder.write("content/lessons/dot.png", DOT)
     first = {kind: exported(folder, kind).read_bytes() for kind in ("epub", "page")}
@@ -158,13 +154,7 @@ def test_export_is_as_the_course_is_now(make_course: Make) -> None:
     assert [kind for kind in first if exported(folder, kind).read_bytes() == first[kind]] == []
     folder.write("content/lessons/dot.png", DOT)
     assert {kind: exported(folder, kind).read_bytes() for kind in first} == first
-
-
-def test_exported_book_can_be_offered_by_a_link(make_course: Make) -> None:
-    folder = make_course(GOOD)
     assert folder.main("export", "epub", "--out", "content/files/course.epub").status == 0
-    text = folder.text(folder.lesson(1))
-    folder.write(folder.lesson(1), f"{text}\n[The book](../files/course.epub).\n")
+    folder.write(folder.lesson(1), "[The book](../files/course.epub).\n")
     assert folder.main("build", "--quiet").status == 0
-    book = folder.root / "public" / "files" / "files" / "course.epub"
-    assert book.read_bytes() == folder.read("content/files/course.epub")
+    assert folder.read("public/files/files/course.epub") == first["epub"]
