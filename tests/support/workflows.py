@@ -153,6 +153,8 @@ class Runner:
             shutil.copytree(self.caches[wanted[0]], place, symlinks=True, dirs_exist_ok=True)
 
     def _save(self, place: Path, given: dict[str, str]) -> None:
+        if given["key"] in self.caches:  # which is never replaced
+            return
         kept = self.folder / "caches" / given["key"]
         for path in given["path"].split():
             shutil.copytree(place / path, kept / path, symlinks=True)

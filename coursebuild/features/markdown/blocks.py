@@ -86,16 +86,8 @@ def write_footnotes(footnotes: Iterable[model.Footnote], context: MarkdownContex
 
 
 _APART = (
-    *(
-        model.HtmlBlock,
-        model.Callout,
-        model.PlainCode,
-        model.Script,
-        model.Recording,
-        model.Mjcf,
-        model.FeatureBlock,
-    ),
-    *(model.Table, model.MathBlock),
+    *(model.Callout, model.PlainCode, model.Script, model.Recording, model.Mjcf),
+    *(model.FeatureBlock, model.HtmlBlock, model.Table, model.MathBlock),
 )
 """Blocks that an empty line parts from others, even in a tight list."""
 
@@ -112,20 +104,15 @@ class _Writer:
     # --- blocks
 
     def blocks(self, blocks: Iterable[model.Block], *, tight: bool = False) -> str:
-        parts: list[tuple[model.Block, str]] = []
+        written, before = "", None
         for block in blocks:
-            before = parts[-1][0] if parts else None
             text = self.block(block, before)
-            if text:
-                parts.append((block, text))
-        written = ""
-        for at, (block, text) in enumerate(parts):
-            if at:
-                apart = (
-                    not tight or isinstance(parts[at - 1][0], _APART) or isinstance(block, _APART)
-                )
+            if text and written:
+                apart = not tight or isinstance(before, _APART) or isinstance(block, _APART)
                 written += "\n\n" if apart else "\n"
-            written += text
+            if text:
+                written += text
+                before = block
         return written
 
     def block(self, block: model.Block, after: model.Block | None = None) -> str:
@@ -151,18 +138,8 @@ class _Writer:
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case model.Table():
                 return self._table(block)
-            case (
-                model.Callout()
-                | model.PlainCode()
-                | model.Script()
-                | model.Recording()
-                | model.Mjcf()
-            ):
-                return self.context.own(block)
-            case model.FeatureBlock():
-                return self.context.own(block)
             case _:
-                assert_never(block)
+                return self.context.own(block)
 
     def _in_html(self, inline: model.Inline) -> str:
         """An inline in HTML, where text is no Markdown."""
