@@ -11,25 +11,27 @@ import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import runner
+from coursebuild.core.run.runner import ScriptServer
 
 SOURCE_TREE = Path(runner.__file__).parents[3]
 Run = Callable[..., ScriptRun]
 both_ways = pytest.mark.parametrize("server", ["forking", "spawning"], indirect=True)
 """Scripts are run forked from a server, and each with an interpreter of its own: a smoke test."""
+forked_or_not = pytest.mark.parametrize("fork", [True, False], ids=["forked", "spawned"])
 TOOL = """
 import sys
 from pathlib import Path
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.model.results import ScriptJob
-jobs = [ScriptJob(f"examples/x.py", (), 60.0, (), False)] * int(sys.argv[2])
 try:
-    with ScriptServer(fork=sys.argv[3] == "True") as server:
-        for run in server.run(Path(sys.argv[1]), jobs, parallel=2):
+    with ScriptServer(fork=sys.argv[2] == "True") as server:
+        job = ScriptJob("examples/x.py", (), 60.0, (), False)
+        for run in server.run(Path(sys.argv[1]), [job], parallel=2):
             print(run.outcome, run.stdout)
 except KeyboardInterrupt:
     print("interrupted")
 """
-"""A command that runs scripts; its arguments: a folder, how many, and whether forked."""
+"""A command that runs a script; its arguments: a folder, and whether forked."""
 
 
 def job(
@@ -39,8 +41,9 @@ def job(
     timeout: float = 120.0,
     requires: Sequence[str] = (),
     norun: bool = False,
+    perturbation: int = 0,
 ) -> ScriptJob:
-    return ScriptJob(path, tuple(args), timeout, tuple(requires), norun)
+    return ScriptJob(path, tuple(args), timeout, tuple(requires), norun, perturbation)
 
 
 def alive(pid: int) -> bool:
@@ -81,12 +84,17 @@ def gone(pid: int) -> bool:
     return True
 
 
-def hangs(run: Run, code: str, said: Callable[[str], object] = bool) -> ScriptRun:
-    """What a script that does not end does, given a limit that lets it say something before."""
+def hanging(
+    server: ScriptServer, root: Path, *codes: str, said: Callable[[str], object] = bool
+) -> list[ScriptRun]:
+    """What scripts that do not end do, given a limit that lets each say something before."""
+    paths = [f"examples/hanging{number}.py" for number in range(len(codes))]
+    for path, code in zip(paths, codes, strict=True):
+        (root / path).write_text(code)
     for limit in (0.5, 8.0, 120.0):
-        result = run(code, timeout=limit)
-        assert result.outcome is Outcome.TIMEOUT
-        assert result.seconds >= limit
-        if said(result.stdout):
+        jobs = [job(path, timeout=limit) for path in paths]
+        runs = server.run(root, jobs, parallel=len(jobs))
+        assert all(run.outcome is Outcome.TIMEOUT and run.seconds >= limit for run in runs)
+        if all(said(run.stdout) for run in runs):
             break
-    return result
+    return list(runs)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run.runner import ScriptServer
+from support.runners import Run
 
 pytestmark = pytest.mark.site
 
@@ -70,26 +68,20 @@ def spring(timestep: float, force: float = 2.0) -> tuple[float, float]:
     return x, v
 
 
-def test_steps_are_halved_however_they_are_made(server: ScriptServer, tmp_path: Path) -> None:
-    (tmp_path / "examples").mkdir()
-
-    def run(text: str, number: int) -> tuple[ScriptRun, Any]:
+def test_steps_are_halved_however_they_are_made(run: Run) -> None:
+    def ends(text: str, number: int) -> tuple[bool, Any]:
         end = "print(json.dumps([*data.qpos, *data.qvel, data.time, model.opt.timestep]))\n"
-        (tmp_path / "examples/a.py").write_text(f"{HEAD}data.ctrl[0] = 2\n{text}{end}")
-        job = ScriptJob("examples/a.py", (), 120.0, (), False, number)
-        [done] = server.run(tmp_path, [job], parallel=1)
-        assert done.outcome is Outcome.OK, done.stderr
-        return done, json.loads(done.stdout)
+        done = run(f"{HEAD}data.ctrl[0] = 2\n{text}{end}", perturbation=number)
+        assert done.trace is not None and done.stdout, done.stderr
+        return done.trace.moved, json.loads(done.stdout)
 
     for name, text in TEN.items():
         timestep = 0.05 if "its own timestep" in name else 0.1
         for number, part in ((0, 1.0), (-1, 0.5)):
-            done, (x, v, time, told) = run(text, number)
+            moved, (x, v, time, told) = ends(text, number)
             assert (x, v) == pytest.approx(spring(timestep * part), rel=1e-9), (name, number)
             assert time == pytest.approx(1.0, rel=1e-12), name
-            assert told == timestep, name
-            assert done.trace is not None and done.trace.moved == (number < 0), name
-    done, _ = run("mujoco.mj_forward(model, data)\n", -1)
-    assert done.trace is not None and not done.trace.moved, "there is no step"
-    done, (_, _, time, _) = run("mujoco.mj_step(model, data, nstep=1000)\nx = data.time\n", 0)
-    assert run("mujoco.mj_step(model, data, nstep=1000)\n", -1)[1][2] == time, "to the last bit"
+            assert (told, moved) == (timestep, number < 0), name
+    assert not ends("mujoco.mj_forward(model, data)\n", -1)[0], "there is no step"
+    many = "mujoco.mj_step(model, data, nstep=1000)\n"
+    assert ends(many, 0)[1][2] == ends(many, -1)[1][2], "the time to the last bit"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -19,96 +20,87 @@ MAIN = """<mujoco><compiler meshdir="assets"/><include file="part.xml"/>
 <asset><mesh name="m" file="m.obj"/></asset>
 <worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>"""
 PART = '<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>'
+TEXT = '<mujoco><include file="part.xml"/></mujoco>'
+BROKEN = "<mujoco><nonsense/></mujoco>"
+
+
+class Course:
+    """A course of two models, and commands that compile them."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.asked: list[str] = []
+        """What MuJoCo was asked to compile since it was last looked at."""
+
+    def compile(self, *more: str, fresh: bool = False) -> dict[str, CompileResult]:
+        """The results by the name of a model, or by a text."""
+        found = {path.stem: path.read_text() for path in sorted(self.root.glob("models/*.xml"))}
+        given = [(f"models/{name}.xml", text) for name, text in found.items()]
+        given += [(mjcf.TEXT_PATH, text) for text in more]
+        results = compile_kept(self.root, Memo(self.root, fresh=fresh), given)
+        return dict(zip([*found, *more], results, strict=True))
+
+    def compiled(self) -> list[str]:
+        asked, self.asked = self.asked, []
+        return sorted(asked)
 
 
 @pytest.fixture
-def root(tmp_path: Path) -> Path:
-    root = tmp_path / "course"
-    (root / "models/assets").mkdir(parents=True)
-    (root / "models/assets/m.obj").write_text(TETRAHEDRON)
-    (root / "models/part.xml").write_text(PART)
-    (root / "models/main.xml").write_text(MAIN)
-    return root
-
-
-@pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What MuJoCo is asked to compile: names of models, and texts."""
-    asked: list[str] = []
+def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Course:
+    course = Course(tmp_path / "course")
+    (course.root / "models/assets").mkdir(parents=True)
+    for path, text in {"assets/m.obj": TETRAHEDRON, "part.xml": PART, "main.xml": MAIN}.items():
+        (course.root / "models" / path).write_text(text)
     real = mjcf.compile_all
 
-    def compile(root: Path, texts: list[tuple[str, str]], **limits: int) -> object:
-        asked.extend(text if path == mjcf.TEXT_PATH else Path(path).stem for path, text in texts)
+    def compile(root: Path, texts: Sequence[tuple[str, str]], **limits: int) -> object:
+        course.asked += [t if path == mjcf.TEXT_PATH else Path(path).stem for path, t in texts]
         return real(root, texts, **limits)
 
     monkeypatch.setattr(mjcf, "compile_all", compile)
-    return asked
+    return course
 
 
-def run(
-    root: Path, texts: tuple[str, ...] = (), *, fresh: bool = False
-) -> dict[str, CompileResult]:
-    found = {path.stem: path.read_text() for path in sorted((root / "models").glob("*.xml"))}
-    given = [(f"models/{name}.xml", text) for name, text in found.items()]
-    given += [(mjcf.TEXT_PATH, text) for text in texts]
-    results = compile_kept(root, Memo(root, fresh=fresh), given)
-    return dict(zip([*found, *texts], results, strict=True))
-
-
-def test_nothing_is_compiled_twice(root: Path, compiled: list[str]) -> None:
-    text = '<mujoco><include file="part.xml"/></mujoco>'
-    broken = "<mujoco><nonsense/></mujoco>"
-    first = run(root, (text, broken, text))
-    assert sorted(compiled) == sorted(["main", "part", text, broken])
+def test_nothing_is_compiled_twice(course: Course) -> None:
+    first = course.compile(TEXT, BROKEN, TEXT)
+    assert course.compiled() == sorted(["main", "part", TEXT, BROKEN])
     assert first["main"].facts is not None and first["main"].facts.includes == (
         "models/assets/m.obj",
         "models/part.xml",
     )
-    assert first[broken].error
-    compiled.clear()
-    for path in root.rglob("*"):
+    assert first[BROKEN].error
+    for path in course.root.rglob("*"):
         os.utime(path)
-    assert run(root, (broken, text)) == {k: first[k] for k in ("main", "part", broken, text)}
-    assert compiled == []
-    moved = root.rename(root.with_name("moved"))
-    assert run(moved) == {name: first[name] for name in ("main", "part")}
-    assert compiled == []
+    course.root = course.root.rename(course.root.with_name("moved"))
+    assert course.compile(BROKEN, TEXT) == first
+    assert course.compiled() == []
 
 
-def test_what_is_made_of_a_file_is_compiled_again(root: Path, compiled: list[str]) -> None:
-    run(root)
+def test_what_is_made_of_a_file_is_compiled_again(course: Course) -> None:
+    course.compile()
     for file, again in (
         ("models/assets/m.obj", ["main"]),
         ("models/part.xml", ["main", "part"]),
         ("models/main.xml", ["main"]),
         ("models/other.txt", []),
     ):
-        compiled.clear()
-        path = root / file
-        path.write_text((path.read_text() if path.exists() else "") + "\n")
-        run(root)
-        assert compiled == again, file
-    compiled.clear()
-    run(root, fresh=True)
-    assert compiled == ["main", "part"]
+        course.compiled()
+        with (course.root / file).open("a") as opened:
+            opened.write("\n")
+        course.compile()
+        assert course.compiled() == again, file
+    course.compile(fresh=True)
+    assert course.compiled() == ["main", "part"]
 
 
-def test_an_error_is_remembered_until_the_missing_file_is_there(
-    root: Path, compiled: list[str]
-) -> None:
-    (root / "models/assets/m.obj").unlink()
-    first = run(root)
+def test_an_error_is_remembered_until_the_missing_file_is_there(course: Course) -> None:
+    mesh = course.root / "models/assets/m.obj"
+    mesh.unlink()
+    first = course.compile()
     assert "m.obj" in first["main"].error
-    compiled.clear()
-    assert run(root) == first
-    assert compiled == []
-    (root / "models/assets/m.obj").write_text(TETRAHEDRON)
-    whole = run(root)
-    assert whole["main"].error == ""
-    assert compiled == ["main"]
-    for path in (root / ".coursebuild/models").rglob("*"):
-        if path.is_file():
-            path.write_bytes(path.read_bytes()[:-1])
-    compiled.clear()
-    assert run(root) == whole
-    assert compiled == ["main", "part"], "what was kept is damaged"
+    course.compiled()
+    assert course.compile() == first
+    assert course.compiled() == []
+    mesh.write_text(TETRAHEDRON)
+    assert course.compile()["main"].error == ""
+    assert course.compiled() == ["main"]

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -41,6 +41,17 @@ def step(seconds: float) -> bytes:
     return mjcf(f'<option timestep="{seconds}"/>')
 
 
+class Case(NamedTuple):
+    """Files of a course, and a script that loads a model."""
+
+    files: dict[str, bytes]
+    script: str = "show(load('models/m.xml'))"
+    spare: str = ""
+    """The one that is not looked for."""
+    missing: str = ""
+    """What is looked for besides, and is not there."""
+
+
 SHOW = """
 import hashlib
 import mujoco
@@ -60,35 +71,29 @@ Spec = mujoco.MjSpec
 M = "models/m.xml"
 MESHDIR = '<compiler meshdir="meshes"/>'
 SHAPES = '<worldbody><geom type="mesh" mesh="t"/><geom type="hfield" hfield="h"/></worldbody>'
+TRY = f"try: load('{M}')\nexcept ValueError as error: print(error)"
 SIDES = "right left up down front back"
-CASES: dict[str, tuple[dict[str, bytes], str, set[str], set[str]]] = {
-    # files, script, files noted that are there, files noted that are not
-    "a model": ({M: step(0.5)}, f"show(load('{M}'))", {M}, set()),
-    "by keyword": ({M: step(0.5)}, f"show(load(filename='{M}', assets=None))", {M}, set()),
-    "from another folder": (
+CASES = {
+    "a model": Case({M: step(0.5)}),
+    "by keyword": Case({M: step(0.5)}, f"show(load(filename='{M}', assets=None))"),
+    "from another folder": Case(
         {M: mjcf(mesh("t.obj")), "models/t.obj": obj(1)},
         "import os\nos.chdir('models')\nshow(load('m.xml'))",
-        {M, "models/t.obj"},
-        set(),
     ),
-    "absolute": (
+    "absolute": Case(
         {M: mjcf(mesh("t.obj")), "models/t.obj": obj(1)},
         f"import os\nshow(load(os.path.abspath('{M}')))",
-        {M, "models/t.obj"},
-        set(),
     ),
-    "includes": (
+    "includes": Case(
         {
             M: mjcf('<include file="sub/a.xml"/><!-- <include file="no.xml"/> -->'),
             "models/sub/a.xml": mjcf('<include\n file = "b.xml" />'),
             "models/b.xml": step(0.25),
             "models/sub/b.xml": step(0.75),
         },
-        f"show(load('{M}'))",
-        {M, "models/sub/a.xml", "models/b.xml"},
-        set(),
+        spare="models/sub/b.xml",
     ),
-    "folders of assets": (
+    "folders of assets": Case(
         {
             M: mjcf(
                 '<compiler meshdir="meshes" texturedir="pictures/"/>'
@@ -101,11 +106,9 @@ CASES: dict[str, tuple[dict[str, bytes], str, set[str], set[str]]] = {
             "models/pictures/a.png": png(1),
             "models/h.png": png(2),
         },
-        f"show(load('{M}'))",
-        {M, "models/meshes/t.obj", "models/pictures/a.png", "models/h.png"},
-        set(),
+        spare="models/t.obj",
     ),
-    "a cube of textures": (
+    "a cube of textures": Case(
         {
             M: mjcf(
                 '<asset><texture name="c" type="cube"'
@@ -115,31 +118,22 @@ CASES: dict[str, tuple[dict[str, bytes], str, set[str], set[str]]] = {
                 + "/></asset>"
             ),
             **{f"models/{name}.png": png(i) for i, name in enumerate("abc")},
-        },
-        f"show(load('{M}'))",
-        {M, "models/a.png", "models/b.png", "models/c.png"},
-        set(),
+        }
     ),
-    "strippath": (
+    "strippath": Case(
         {
             M: mjcf('<compiler strippath="true" assetdir="d"/>' + mesh("x/y/t.obj")),
             "models/d/t.obj": obj(1),
-        },
-        f"show(load('{M}'))",
-        {M, "models/d/t.obj"},
-        set(),
+        }
     ),
-    "a compiler in an include": (
+    "a compiler in an include": Case(
         {
             M: mjcf(mesh("t.obj") + '<include file="c.xml"/>'),
             "models/c.xml": mjcf('<compiler meshdir="d"/>'),
             "models/d/t.obj": obj(1),
-        },
-        f"show(load('{M}'))",
-        {M, "models/c.xml", "models/d/t.obj"},
-        set(),
+        }
     ),
-    "a flexible body": (
+    "a flexible body": Case(
         {
             M: mjcf(
                 '<compiler assetdir="d"/><worldbody><flexcomp name="f" type="mesh" file="t.obj"'
@@ -147,11 +141,9 @@ CASES: dict[str, tuple[dict[str, bytes], str, set[str], set[str]]] = {
             ),
             "models/d/t.obj": obj(1),
         },
-        f"show(load('{M}'))",
-        {M, "models/d/t.obj"},
-        {"models/t.obj"},
+        missing="models/t.obj",
     ),
-    "a model in a model": (
+    "a model in a model": Case(
         {
             M: mjcf(
                 '<asset><model name="c" file="child.xml"/></asset>'
@@ -163,130 +155,88 @@ CASES: dict[str, tuple[dict[str, bytes], str, set[str], set[str]]] = {
             ),
             "models/d/q.obj": obj(1),
         },
-        f"show(load('{M}'))",
-        {M, "models/child.xml", "models/d/q.obj"},
-        {"child.xml"},
+        missing="child.xml",
     ),
-    "a text": (
-        {"meshes/t.obj": obj(1)},
-        f"show(text({mjcf(MESHDIR + mesh('t.obj')).decode()!r}))",
-        {"meshes/t.obj"},
-        set(),
+    "a text": Case(
+        {"meshes/t.obj": obj(1)}, f"show(text({mjcf(MESHDIR + mesh('t.obj')).decode()!r}))"
     ),
-    "a text with an include": (
+    "a text with an include": Case(
         {"models/a.xml": step(0.5)},
         "show(text('<mujoco><include file=\"models/a.xml\"/></mujoco>'))",
-        {"models/a.xml"},
-        set(),
     ),
-    "assets handed over": (
+    "assets handed over": Case(
         {M: mjcf(mesh("t.obj")), "models/t.obj": obj(1), "other/t.obj": obj(3)},
         f"show(load('{M}', {{'t.obj': open('other/t.obj', 'rb').read()}}))",
-        {M, "other/t.obj"},
-        set(),
+        spare="models/t.obj",
     ),
-    "an include handed over": (
+    "an include handed over": Case(
         {M: mjcf('<include file="a.xml"/>'), "models/a.xml": step(0.5)},
         f"show(load('{M}', assets={{'a.xml': b'<mujoco><option timestep=\"2\"/></mujoco>'}}))",
-        {M},
-        set(),
+        spare="models/a.xml",
     ),
-    "a binary": (
+    "a binary": Case(
         {},
         "import os\nname = os.environ['TMPDIR'] + '/m.mjb'\n"
         "mujoco.mj_saveModel(text('<mujoco/>'), name)\n"
         "show(mujoco.MjModel.from_binary_path(name))",
-        set(),
-        set(),
     ),
-    "a spec": (
+    "a spec": Case(
         {M: mjcf('<compiler meshdir="d"/>' + mesh("t.obj")), "models/d/t.obj": obj(1)},
         f"show(Spec.from_file('{M}').compile())",
-        {M, "models/d/t.obj"},
-        set(),
     ),
-    "a spec that is not compiled": (
+    "a spec that is not compiled": Case(
         {M: mjcf(mesh("t.obj") + '<include file="a.xml"/>'), "models/a.xml": step(0.5)},
         f"print(Spec.from_file('{M}').option.timestep)",
-        {M, "models/a.xml"},
-        set(),
     ),
-    "a spec from a text": (
-        {"t.obj": obj(1)},
-        f"show(Spec.from_string({mjcf(mesh('t.obj')).decode()!r}).compile())",
-        {"t.obj"},
-        set(),
+    "a spec from a text": Case(
+        {"t.obj": obj(1)}, f"show(Spec.from_string({mjcf(mesh('t.obj')).decode()!r}).compile())"
     ),
-    "a spec made by hand": (
+    "a spec made by hand": Case(
         {"d/t.obj": obj(1), "d/u.obj": obj(2)},
         "spec = Spec()\nspec.meshdir = 'd'\nm = spec.add_mesh(name='t', file='u.obj')\n"
         "m.file = 't.obj'\nspec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname='t')\n"
         "show(spec.compile())",
-        {"d/t.obj"},
-        set(),
+        spare="d/u.obj",
     ),
-    "a spec attached": (
+    "a spec attached": Case(
         {"a/m.xml": mjcf('<compiler meshdir="d"/>' + mesh("t.obj")), "a/d/t.obj": obj(1)},
         "child = Spec.from_file('a/m.xml')\nparent = Spec()\n"
         "parent.attach(child, frame=parent.worldbody.add_frame(), prefix='p')\n"
         "show(parent.compile())",
-        {"a/m.xml", "a/d/t.obj"},
-        {"t.obj"},
+        missing="t.obj",
     ),
-    "a spec recompiled": (
+    "a spec recompiled": Case(
         {"t.obj": obj(1), "u.obj": obj(2)},
         f"spec = Spec.from_string({mjcf(mesh('t.obj')).decode()!r})\nmodel = spec.compile()\n"
         "data = mujoco.MjData(model)\nspec.meshes[0].file = 'u.obj'\n"
         "show(spec.recompile(model, data)[0])",
-        {"t.obj", "u.obj"},
-        set(),
     ),
-    "what is missing": (
-        {M: mjcf(mesh("t.obj"))},
-        f"try: load('{M}')\nexcept ValueError as error: print(error)",
-        {M},
-        {"models/t.obj"},
-    ),
-    "a model that is missing": (
-        {},
-        f"try: load('{M}')\nexcept ValueError as error: print(error)",
-        set(),
-        {M},
-    ),
-    "no XML": (
-        {M: b"<mujoco><include file='a.xml'/>"},
-        f"try: load('{M}')\nexcept ValueError as error: print(error)",
-        {M},
-        {"models/a.xml"},
-    ),
-    "an include below an include": (
+    "what is missing": Case({M: mjcf(mesh("t.obj"))}, TRY, missing="models/t.obj"),
+    "a model that is missing": Case({}, TRY, missing="models/m.xml"),
+    "no XML": Case({M: b"<mujoco><include file='a.xml'/>"}, TRY, missing="models/a.xml"),
+    "an include below an include": Case(
         {
             M: mjcf('<include file="sub/a.xml"/>'),
             "models/sub/a.xml": mjcf('<include file="b.xml"/>'),
             "models/models/sub/b.xml": step(0.25),
             "models/sub/b.xml": step(0.75),
         },
-        f"show(load('{M}'))",
-        {M, "models/sub/a.xml", "models/models/sub/b.xml"},
-        {"models/b.xml"},
+        spare="models/sub/b.xml",
+        missing="models/b.xml",
     ),
-    "an include below an include, absolute": (
+    "an include below an include, absolute": Case(
         {
             M: mjcf('<include file="sub/a.xml"/>'),
             "models/sub/a.xml": mjcf('<include file="d/b.xml"/>'),
             "models/sub/d/b.xml": step(0.75),
         },
         f"import os\nshow(load(os.path.abspath('{M}')))",
-        {M, "models/sub/a.xml", "models/sub/d/b.xml"},
-        {"models/d/b.xml"},
+        missing="models/d/b.xml",
     ),
-    "an include that is missing": (
-        {M: mjcf('<include file="sub/a.xml"/>')},
-        f"try: load('{M}')\nexcept ValueError as error: print(error)",
-        {M},
-        {"models/sub/a.xml"},
+    "an include that is missing": Case(
+        {M: mjcf('<include file="sub/a.xml"/>')}, TRY, missing="models/sub/a.xml"
     ),
-    "robots": (
+    "robots": Case(
         {
             "r/r.urdf": (
                 b'<robot name="r"><mujoco><compiler meshdir="d" balanceinertia="true"/></mujoco>'
@@ -300,8 +250,6 @@ CASES: dict[str, tuple[dict[str, bytes], str, set[str], set[str]]] = {
             "r/d/x/q.obj": obj(1),
         },
         "show(load('r/r.urdf'))",
-        {"r/r.urdf", "r/d/x/q.obj"},
-        set(),
     ),
 }
 
@@ -324,48 +272,42 @@ def noted(done: ScriptRun) -> set[str]:
     return {name for name in done.trace.files if not name.endswith(".py")}
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_files_of_a_model(name: str, tmp_path: Path, server: ScriptServer) -> None:
-    files, script, there, missing = CASES[name]
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_the_files_of_a_model(case: Case, tmp_path: Path, server: ScriptServer) -> None:
+    there = case.files.keys() - {case.spare}
     root = tmp_path / "course"
-    write(root, files)
-    done = run(server, root, script)
+    write(root, case.files)
+    done = run(server, root, case.script)
     assert (done.status, done.stderr) == (0, "")
-    assert noted(done) == there | missing
+    assert noted(done) == there | ({case.missing} - {""})
     assert done.trace is not None and done.trace.opaque == ""
 
     alone = tmp_path / "alone"
-    write(alone, {path: files[path] for path in there})
-    assert run(server, alone, script).stdout == done.stdout, "what was noted does not suffice"
+    write(alone, {path: case.files[path] for path in there})
+    assert run(server, alone, case.script).stdout == done.stdout, "what was noted does not suffice"
 
-    for path in sorted(there):
-        less = tmp_path / "less"
-        shutil.copytree(root, less)
-        (less / path).unlink()
-        changed = run(server, less, script)
+    for path in there:
+        (alone / path).unlink()
+        changed = run(server, alone, case.script)
         assert (changed.status, changed.stdout) != (0, done.stdout), f"{path} is not needed"
-        shutil.rmtree(less)
+        write(alone, {path: case.files[path]})
 
 
-def test_files_that_mujoco_writes(tmp_path: Path, server: ScriptServer) -> None:
-    code = "model = text('<mujoco/>')\n{}\n"
-    for call in (
-        "mujoco.mj_saveLastXML('out.xml', model)",
-        "mujoco.mj_saveModel(model, 'out.mjb')",
-        "mujoco.mj_printModel(model, 'out.txt')",
-        "mujoco.mj_printData(model, mujoco.MjData(model), 'out.txt')",
-        "Spec().to_file('out.xml')",
-    ):
-        done = run(server, tmp_path, code.format(call))
-        assert done.trace is not None and done.trace.opaque == "it writes files of the project", (
-            call
-        )
-
-
-def test_plugins_of_the_project(tmp_path: Path, server: ScriptServer) -> None:
+def test_files_that_mujoco_writes_and_plugins_that_it_loads(
+    tmp_path: Path, server: ScriptServer
+) -> None:
     (tmp_path / "plugins").mkdir()
-    done = run(server, tmp_path, "mujoco.mj_loadAllPluginLibraries('plugins')")
-    assert done.trace is not None and done.trace.opaque == "it loads native code of the project"
+    writes, loads = "it writes files of the project", "it loads native code of the project"
+    for call, why in {
+        "mujoco.mj_saveLastXML('out.xml', model)": writes,
+        "mujoco.mj_saveModel(model, 'out.mjb')": writes,
+        "mujoco.mj_printModel(model, 'out.txt')": writes,
+        "mujoco.mj_printData(model, mujoco.MjData(model), 'out.txt')": writes,
+        "Spec().to_file('out.xml')": writes,
+        "mujoco.mj_loadAllPluginLibraries('plugins')": loads,
+    }.items():
+        done = run(server, tmp_path, f"model = text('<mujoco/>')\n{call}\n")
+        assert done.trace is not None and done.trace.opaque == why, call
 
 
 def test_wrappers_look_like_what_they_wrap(tmp_path: Path, server: ScriptServer) -> None:

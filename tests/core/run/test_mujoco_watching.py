@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.model.results import Divergence, Outcome, ScriptJob, ScriptRun, Sign
-from coursebuild.core.run.runner import ScriptServer, clean_environment
-from support.runners import both_ways
+from coursebuild.core.model.results import Divergence, Outcome, Sign
+from coursebuild.core.run.runner import clean_environment
+from support.runners import Run, both_ways
 
 pytestmark = pytest.mark.site
 
@@ -30,6 +30,123 @@ FAST = "data.qvel[0] = 1e20\n"
 STEP = "mujoco.mj_step(model, data)\n"
 LINE = len(HEAD.splitlines())
 WARNED = "WARNING: Nan, Inf or huge value in QVEL at DOF 0. The simulation is unstable."
+Found = Callable[[str], tuple[Divergence, ...]]
+
+
+@pytest.fixture
+def found(run: Run, root: Path) -> Found:
+    def of_script(text: str) -> tuple[Divergence, ...]:
+        done = run(text)
+        assert done.outcome is Outcome.OK, done.stderr
+        assert [path.name for path in root.iterdir()] == ["examples"], "something was left"
+        assert done.trace is not None
+        return done.trace.divergences
+
+    return of_script
+
+
+def signs(found: tuple[Divergence, ...]) -> list[Sign]:
+    return [one.sign for one in found]
+
+
+# --- what is noticed
+
+
+@both_ways
+def test_a_warning_is_noticed_with_its_line_time_and_model(found: Found) -> None:
+    def warned(line: int, time: str = "0.0000") -> tuple[Divergence, ...]:
+        return (Divergence(Sign.VELOCITIES, time, "spinner", "examples/x.py", LINE + line),)
+
+    assert found(HEAD + STEP * 4 + FAST + STEP) == warned(6, "0.0080")
+    assert found(HEAD + "import numpy.random\n" + FAST + STEP) == warned(3)
+
+
+AFTERWARDS = (
+    "mujoco.mj_resetData(model, data)\n",
+    "data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number = 0\n",
+    "data = mujoco.MjData(model)\n",
+    "del data\n",
+    "import os, sys; sys.stdout.flush(); os._exit(0)\n",
+)
+STEPS = (
+    "mujoco.mj_step(model, data, 10)",
+    "mujoco.mj_step(model, data, nstep=3)",
+    "mujoco.mj_step1(model, data); mujoco.mj_step2(model, data)",
+    "model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET; mujoco.mj_step(model, data)",
+    "from mujoco import mj_step as step; step(model, data)",
+    "import threading as t; t = t.Thread(target=mujoco.mj_step, args=(model, data)); "
+    "t.start(); t.join()",
+    "import os; child = os.fork(); child or (mujoco.mj_step(model, data), os._exit(0)); os.wait()",
+)
+IMPORTS = (
+    "import importlib\nmujoco = importlib.import_module('mu' + 'joco')\n",
+    "import importlib.util\nassert importlib.util.find_spec('mujoco')\nimport mujoco\n",
+    "__import__('mujoco')\nimport sys\nmujoco = sys.modules['mu' + 'joco']\n",
+)
+
+
+def test_a_warning_is_noticed_however_the_script_goes_about_it(found: Found) -> None:
+    scripts = [HEAD + FAST + STEP + after for after in AFTERWARDS]
+    scripts += [f"{HEAD}{FAST}{step}\n" for step in STEPS]
+    scripts += [HEAD.replace("import mujoco\n", text, 1) + FAST + STEP for text in IMPORTS]
+    for script in scripts:
+        assert signs(found(script)) == [Sign.VELOCITIES], script
+
+
+def test_a_warning_in_the_threads_of_a_rollout_has_the_line_that_began_it(found: Found) -> None:
+    rollout = """\
+import numpy, threading
+from mujoco import rollout
+states = numpy.zeros((8, 3))
+states[:, 2] = 1e20
+datas = [mujoco.MjData(model) for _ in range(3)]
+rollout.rollout(model, datas, states, nstep=20)
+"""
+    [one] = found(HEAD + rollout)
+    assert (one.sign, one.model, one.line) == (Sign.VELOCITIES, "spinner", LINE + 6)
+
+
+def test_each_warning_and_each_lost_state_has_its_name(found: Found) -> None:
+    lost = "data.qvel[0] = float('nan')\n"
+    for script, sign in (
+        ("data.qpos[0] = float('nan')\n" + STEP, Sign.POSITIONS),
+        ("data.qvel[0] = float('-inf')\n" + STEP, Sign.VELOCITIES),
+        ("data.qfrc_applied[0] = 1e30\n" + STEP, Sign.ACCELERATIONS),
+        (STEP + lost + "data = mujoco.MjData(model)\n" * 9, Sign.STATE),
+        (STEP + "import copy\nother = copy.copy(data)\nother.qpos[0] = 1e400\n", Sign.STATE),
+    ):
+        assert signs(found(HEAD + script)) == [sign], script
+    assert found(HEAD + STEP + lost) == (Divergence(Sign.STATE, "0.002", "spinner", "", 0),)
+    for sound in ("data.qvel[0] = 3.0\n" + STEP * 5, lost):  # a state that was never stepped
+        assert found(HEAD + sound) == ()
+
+
+def test_of_several_models_the_one_whose_clock_it_is(found: Found) -> None:
+    other = "model = mujoco.MjModel.from_xml_string(XML.replace('spinner', 'other'))\n"
+    twice = HEAD + "first = data\nmujoco.mj_step(model, first)\n" + other
+    [one] = found(twice + "data = mujoco.MjData(model)\n" + FAST + STEP)
+    assert (one.model, one.line) == ("other", LINE + 6)
+
+
+def test_a_loop_that_diverges_often_does_not_fill_the_notes(found: Found) -> None:
+    loop = "for i in range(1000):\n    mujoco.mj_resetData(model, data)\n"
+    loop += "    data.time = i\n    data.qvel[0] = 1e20\n    mujoco.mj_step(model, data)\n"
+    assert len(found(HEAD + loop)) == 16
+
+
+def test_a_handler_that_nobody_knows_of_leaves_the_counter(found: Found) -> None:
+    silent = """\
+import ctypes
+library = ctypes.PyDLL(mujoco._functions.__file__)
+ignore = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(lambda message: None)
+pointer = ctypes.c_void_p.in_dll(library, "mju_user_warning")
+pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
+"""
+    [one] = found(HEAD + silent + FAST + STEP)
+    assert (one.sign, one.model, one.line) == (Sign.VELOCITIES, "spinner", 0)
+
+
+# --- bodies deep in each other
 
 FALL = """\
 import mujoco
@@ -45,245 +162,49 @@ XML = '''
 </mujoco>
 '''
 model = mujoco.MjModel.from_xml_string(XML)
+data = mujoco.MjData(model)
+for _ in range(300):
+    data.qfrc_applied[0] = -{force}
+    mujoco.mj_step(model, data)
 """
-PRESS = """\
-def press(data, force):
-    data.qfrc_applied[0] = -force
-    for _ in range(300):
-        mujoco.mj_step(model, data)
-"""
-
-Run = Callable[[str], ScriptRun]
-
-
-@pytest.fixture
-def run(server: ScriptServer, tmp_path: Path) -> Run:
-    (tmp_path / "examples").mkdir()
-
-    def run_script(text: str) -> ScriptRun:
-        (tmp_path / "examples/a.py").write_text(text)
-        job = ScriptJob("examples/a.py", (), 120.0, (), False)
-        [run] = server.run(tmp_path, [job], parallel=1)
-        assert [path.name for path in tmp_path.iterdir()] == ["examples"], "something was left"
-        return run
-
-    return run_script
-
-
-def found(run: ScriptRun) -> tuple[Divergence, ...]:
-    assert run.outcome is Outcome.OK, run.stderr
-    assert run.trace is not None
-    return run.trace.divergences
-
-
-def warned(line: int, time: str = "0.0000", model: str = "spinner") -> tuple[Divergence, ...]:
-    return (Divergence(Sign.VELOCITIES, time, model, "examples/a.py", line),)
-
-
-# --- what is noticed
-
-
-def test_a_sound_simulation_is_not_remarked_on(run: Run) -> None:
-    assert found(run(HEAD + "data.qvel[0] = 3.0\n" + STEP * 5)) == ()
-
-
-@both_ways
-def test_a_warning_is_noticed_with_its_line_time_and_model(run: Run) -> None:
-    assert found(run(HEAD + STEP * 4 + FAST + STEP)) == warned(LINE + 6, "0.0080")
-
-
-def test_a_warning_is_noticed_once_when_more_packages_were_imported_later(run: Run) -> None:
-    for more in ("", "import numpy.random\n"):
-        assert found(run(HEAD + more + FAST + STEP))[1:] == ()
-
-
-@pytest.mark.parametrize(
-    ("value", "sign"),
-    [
-        ("data.qpos[0] = float('nan')", Sign.POSITIONS),
-        ("data.qvel[0] = float('-inf')", Sign.VELOCITIES),
-        ("data.qfrc_applied[0] = 1e30", Sign.ACCELERATIONS),
-    ],
+PLATE = FALL.replace('size="0.1" mass', 'type="box" size="0.1 0.1 1e-4" mass').replace(
+    'pos="0 0 0.1"', 'pos="0 0 1e-4"'
 )
-def test_each_warning_has_its_name(run: Run, value: str, sign: Sign) -> None:
-    [one] = found(run(f"{HEAD}{value}\n{STEP}"))
-    assert one.sign is sign
+APART = FALL.replace('name="floor"', 'name="floor" contype="0" conaffinity="0"')
 
 
-@pytest.mark.parametrize(
-    "after",
-    [
-        "mujoco.mj_resetData(model, data)\n",
-        "data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number = 0\n",
-        "data = mujoco.MjData(model)\n",
-        "del data\n",
-        "import os, sys; sys.stdout.flush(); os._exit(0)\n",
-    ],
-)
-def test_what_the_script_does_afterwards_hides_nothing(run: Run, after: str) -> None:
-    assert found(run(HEAD + FAST + STEP + after)) == warned(LINE + 2)
-
-
-@pytest.mark.parametrize(
-    "step",
-    [
-        "mujoco.mj_step(model, data, 10)",
-        "mujoco.mj_step(model, data, nstep=3)",
-        "mujoco.mj_step1(model, data); mujoco.mj_step2(model, data)",
-        "model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET; "
-        "mujoco.mj_step(model, data)",
-        "from mujoco import mj_step as step; step(model, data)",
-    ],
-)
-def test_however_it_steps(run: Run, step: str) -> None:
-    assert found(run(f"{HEAD}{FAST}{step}\n")) == warned(LINE + 2)
-
-
-def test_in_a_thread(run: Run) -> None:
-    thread = "import threading\nt = threading.Thread(target=mujoco.mj_step, args=(model, data))\n"
-    assert found(run(HEAD + FAST + thread + "t.start(); t.join()\n"))[0].sign is Sign.VELOCITIES
-
-
-def test_in_the_threads_of_a_rollout(run: Run) -> None:
-    rollout = """\
-import numpy, threading
-from mujoco import rollout
-states = numpy.zeros((8, 3))
-states[:, 2] = 1e20
-datas = [mujoco.MjData(model) for _ in range(3)]
-rollout.rollout(model, datas, states, nstep=20)
-"""
-    assert found(run(HEAD + rollout)) == warned(LINE + 6)
-
-
-def test_in_a_process_that_is_forked(run: Run) -> None:
-    fork = "import os\nif os.fork() == 0:\n    mujoco.mj_step(model, data)\n    os._exit(0)\n"
-    assert found(run(HEAD + FAST + fork + "os.wait()\n")) == warned(LINE + 4)
-
-
-def test_of_several_models_the_one_whose_clock_it_is(run: Run) -> None:
-    other = "model = mujoco.MjModel.from_xml_string(XML.replace('spinner', 'other'))\n"
-    twice = HEAD + "first = data\nmujoco.mj_step(model, first)\n" + other
-    assert found(run(twice + "data = mujoco.MjData(model)\n" + FAST + STEP)) == warned(
-        LINE + 6, model="other"
-    )
-
-
-def test_a_loop_that_diverges_often_does_not_fill_the_notes(run: Run) -> None:
-    loop = "for i in range(1000):\n    mujoco.mj_resetData(model, data)\n"
-    loop += "    data.time = i\n    data.qvel[0] = 1e20\n    mujoco.mj_step(model, data)\n"
-    assert len(found(run(HEAD + loop))) == 16
-
-
-def test_a_handler_that_nobody_knows_of_leaves_the_counter(run: Run) -> None:
-    silent = """\
-import ctypes
-library = ctypes.PyDLL(mujoco._functions.__file__)
-ignore = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(lambda message: None)
-pointer = ctypes.c_void_p.in_dll(library, "mju_user_warning")
-pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
-"""
-    [one] = found(run(HEAD + silent + FAST + STEP))
-    assert (one.sign, one.model, one.line) == (Sign.VELOCITIES, "spinner", 0)
-
-
-def test_a_state_that_is_no_number_at_the_end(run: Run) -> None:
-    text = HEAD + STEP + "data.qvel[0] = float('nan')\n"
-    assert found(run(text)) == (Divergence(Sign.STATE, "0.002", "spinner", "", 0),)
-
-
-def test_a_state_that_is_no_number_when_it_is_let_go(run: Run) -> None:
-    text = HEAD + STEP + "data.qvel[0] = float('nan')\n" + "data = mujoco.MjData(model)\n" * 9
-    assert [one.sign for one in found(run(text))] == [Sign.STATE]
-
-
-def test_copies_are_looked_at_as_well(run: Run) -> None:
-    text = HEAD + STEP + "import copy\nother = copy.copy(data)\nother.qpos[0] = float('inf')\n"
-    assert [one.sign for one in found(run(text))] == [Sign.STATE]
-
-
-@pytest.mark.parametrize(
-    "imported",
-    [
-        "import importlib\nmujoco = importlib.import_module('mu' + 'joco')\n",
-        "import importlib.util\nassert importlib.util.find_spec('mujoco')\nimport mujoco\n",
-        "__import__('mujoco')\nimport sys\nmujoco = sys.modules['mu' + 'joco']\n",
-    ],
-)
-def test_however_mujoco_is_imported(run: Run, imported: str) -> None:
-    text = HEAD.replace("import mujoco\n", imported, 1) + FAST + STEP
-    [one] = found(run(text))
-    assert one.sign is Sign.VELOCITIES
-
-
-def test_a_state_that_was_never_stepped_is_the_scripts_own(run: Run) -> None:
-    assert found(run(HEAD + "data.qvel[0] = float('nan')\n")) == ()
-
-
-# --- bodies deep in each other
-
-
-def deep(run: ScriptRun) -> list[tuple[Sign, tuple[str, ...]]]:
-    return [(one.sign, one.geoms) for one in found(run)]
-
-
-SUNK = [(Sign.CONTACT, ("`floor`", "geom 1"))]
-
-
-def test_a_body_that_is_pressed_into_the_floor_without_a_warning(run: Run) -> None:
-    result = run(FALL + PRESS + "press(mujoco.MjData(model), 5000)\n")
-    assert deep(result) == SUNK
-    assert result.stderr == ""
-
-
-def test_it_is_seen_though_the_script_resets_its_data(run: Run) -> None:
-    after = "data = mujoco.MjData(model)\npress(data, 5000)\nmujoco.mj_resetData(model, data)\n"
-    assert deep(run(FALL + PRESS + after)) == SUNK
-
-
-def test_what_rests_on_the_floor_is_not_deep_in_it(run: Run) -> None:
-    assert found(run(FALL + PRESS + "press(mujoco.MjData(model), 0)\n")) == ()
-
-
-def test_a_thin_plate_counts_by_its_thickness(run: Run) -> None:
-    plate = FALL.replace('size="0.1" mass', 'type="box" size="0.1 0.1 1e-4" mass')
-    light = plate.replace('pos="0 0 0.1"', 'pos="0 0 1e-4"')
-    assert deep(run(light + PRESS + "press(mujoco.MjData(model), 300)\n")) == SUNK
-    assert deep(run(FALL + PRESS + "press(mujoco.MjData(model), 300)\n")) == []
-
-
-def test_an_overlap_without_contact_is_the_models_own(run: Run) -> None:
-    apart = FALL.replace('name="floor"', 'name="floor" contype="0" conaffinity="0"')
-    assert found(run(apart + PRESS + "press(mujoco.MjData(model), 5000)\n")) == ()
+def test_a_body_that_is_pressed_into_another_by_half_its_thickness(found: Found) -> None:
+    for text, force, is_deep in (
+        (FALL, 5000, True),
+        (FALL + "mujoco.mj_resetData(model, data)\n", 5000, True),
+        (PLATE, 300, True),
+        (FALL, 300, False),
+        (FALL, 0, False),
+        (APART, 5000, False),  # an overlap without contact is the model's own
+    ):
+        deep = [(one.sign, one.geoms) for one in found(text.replace("{force}", str(force)))]
+        assert deep == ([(Sign.CONTACT, ("`floor`", "geom 1"))] if is_deep else []), force
 
 
 # --- what the script notices
 
-
-PLAIN = [
-    HEAD + FAST + STEP + "print(data.qpos, data.time)\n",
-    HEAD + "print(mujoco.get_mju_user_warning())\n",
-    HEAD
-    + "mujoco.set_mju_user_warning(lambda text: print('heard', text))\n"
-    + "print(mujoco.get_mju_user_warning().__name__)\n"
-    + FAST
-    + STEP
-    + "mujoco.set_mju_user_warning(None)\nprint(mujoco.get_mju_user_warning())\n"
-    + "mujoco.mj_resetData(model, data)\n"
-    + FAST
-    + STEP,
-    HEAD + "mujoco.set_mju_user_warning(3)\n",
-    HEAD + "mujoco.MjData()\n",
-    HEAD + "mujoco.mj_resetData(model)\n",
-    HEAD + "print(mujoco.mj_resetData.__doc__, mujoco.MjData.__init__.__doc__)\n",
-    HEAD + "import sys\nprint([m for m in sys.modules if 'course' in m], mujoco.mj_step)\n",
-    HEAD + "import copy, pickle\nprint(pickle.loads(pickle.dumps(copy.deepcopy(data))).time)\n",
-    HEAD
-    + "def bad(text):\n    raise KeyError(text)\n"
-    + "mujoco.set_mju_user_warning(bad)\n"
-    + FAST
-    + STEP,
-]
+PLAIN = (
+    FAST + STEP + "print(data.qpos, data.time)\n",
+    "print(mujoco.get_mju_user_warning())\n",
+    "mujoco.set_mju_user_warning(lambda text: print('heard', text))\n"
+    "print(mujoco.get_mju_user_warning().__name__)\n"
+    f"{FAST}{STEP}"
+    "mujoco.set_mju_user_warning(None)\nprint(mujoco.get_mju_user_warning())\n"
+    f"mujoco.mj_resetData(model, data)\n{FAST}{STEP}",
+    "mujoco.set_mju_user_warning(3)\n",
+    "mujoco.MjData()\n",
+    "mujoco.mj_resetData(model)\n",
+    "print(mujoco.mj_resetData.__doc__, mujoco.MjData.__init__.__doc__)\n",
+    "import sys\nprint([m for m in sys.modules if 'course' in m], mujoco.mj_step)\n",
+    "import copy, pickle\nprint(pickle.loads(pickle.dumps(copy.deepcopy(data))).time)\n",
+    f"def bad(text):\n    raise KeyError(text)\nmujoco.set_mju_user_warning(bad)\n{FAST}{STEP}",
+    FALL.replace("{force}", "5000"),
+)
 
 
 def plain(text: str) -> str:
@@ -291,35 +212,32 @@ def plain(text: str) -> str:
     return re.sub("0x[0-9a-f]+", "0x", re.sub("Extension modules: .*", "", text))
 
 
-def test_watched_script_does_what_it_does_alone(run: Run, tmp_path: Path) -> None:
+def test_watched_script_does_what_it_does_alone(run: Run, root: Path) -> None:
     for code in PLAIN:
-        watched = run(code)
+        watched = run(HEAD + code)
         alone = subprocess.run(
-            [sys.executable, "examples/a.py"],
-            cwd=tmp_path,
+            [sys.executable, "examples/x.py"],
+            cwd=root,
             env=clean_environment({}),
             capture_output=True,
             text=True,
-            check=False,
         )
         assert plain(watched.stdout) == plain(alone.stdout), code
         assert plain(watched.stderr) == plain(alone.stderr), code
         assert abs(watched.status) == abs(alone.returncode), code
-        (tmp_path / "MUJOCO_LOG.TXT").unlink(missing_ok=True)
+        (root / "MUJOCO_LOG.TXT").unlink(missing_ok=True)
 
 
-def test_the_log_of_a_process_that_nobody_watches_does_not_stay(run: Run) -> None:
+def test_the_log_of_a_process_that_nobody_watches_goes_unless_it_was_there(
+    run: Run, root: Path
+) -> None:
     text = HEAD + FAST + STEP
     start = f"import subprocess, sys\nsubprocess.run([sys.executable, '-c', {text!r}])\n"
     assert WARNED in run(start).stderr
-
-
-def test_a_log_that_was_there_is_left(server: ScriptServer, tmp_path: Path) -> None:
-    (tmp_path / "examples").mkdir()
-    (tmp_path / "examples/a.py").write_text(HEAD + FAST + STEP)
-    (tmp_path / "MUJOCO_LOG.TXT").write_text("mine\n")
-    server.run(tmp_path, [ScriptJob("examples/a.py", (), 120.0, (), False)], parallel=1)
-    assert (tmp_path / "MUJOCO_LOG.TXT").read_text() == "mine\n"
+    assert [path.name for path in root.iterdir()] == ["examples"]
+    (root / "MUJOCO_LOG.TXT").write_text("mine\n")
+    run(text)
+    assert (root / "MUJOCO_LOG.TXT").read_text() == "mine\n"
 
 
 def test_data_that_is_let_go_is_given_back(run: Run) -> None:
