@@ -31,8 +31,15 @@ from coursebuild.report.terminal import Style
 from coursebuild.report.text import diagnostic_text
 from support.fixture_cases import read_cases
 from support.random_lessons import KINDS, PIECES
-from support.sample_edits import edited
-from support.sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT, recording, within
+from support.sample_lessons import (
+    DIGITS,
+    DIGITS_ELLIPSIS,
+    ELLIPSIS,
+    EXACT,
+    edited,
+    recording,
+    within,
+)
 
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "tests/fixtures"

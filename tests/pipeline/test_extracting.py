@@ -112,7 +112,7 @@ def test_edit_that_a_block_cannot_hold_is_left_alone(make: Make) -> None:
     for data, says in (
         (b"caf\xe9\n", "it is not UTF-8"),
         (b"\n\n", "it is empty"),
-        (b"x = '''\n```\n'''\n", "one of its lines would close the fence"),
+        (b"x = '''\n```\n'''\n", "one of its lines would close the fence, or begin another"),
         (b"a\0b\n", "it holds a NUL"),
     ):
         folder.write("examples/a.py", data)

@@ -19,10 +19,10 @@ lessons; 1.2 has a script whose output is recorded, so that every course has som
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from msgspec.structs import replace
 
@@ -191,13 +191,15 @@ class Workshop:
         store = Memo(root, shared=self._results, fresh=fresh)
         return Options(root, jobs=1, quiet=True, cache=store, run_all=self._scripts.run)
 
-    def try_labs(self, root: Path, browser: LabEngine | None = None) -> tuple[Diagnostic, ...]:
-        """What is found in a course whose scripts are not run; `browser` may be another engine."""
+    def try_labs(
+        self, root: Path, changed: Callable[[LabEngine], Any] = lambda engine: engine
+    ) -> tuple[Diagnostic, ...]:
+        """What is found in a course whose scripts are not run; the browser engine is `changed`."""
         loaded = load(root)
         assert loaded.course is not None
         options = self.options(root)
         models, wrong = compile_models(loaded.course, options, Progress(quiet=True))
-        engines = self._engines.but(browser=browser)
+        engines = self._engines.but(browser=changed(self._engines.browser))
         # What labs did is not shared: it would not be tried by another engine.
         own = replace(options, cache=Memo(root))
         _, found = try_labs(loaded.course, own, engines, dict(models), wrong)

@@ -196,8 +196,6 @@ class Change(Struct, frozen=True):
     stand."""
     recorded: str
     ran: str
-    ran_line: int
-    """Line of the output, from 1; 0 where no line corresponds."""
     relative_error: float | None = None
     digits: int | None = None
     """Leading significant digits that agree."""

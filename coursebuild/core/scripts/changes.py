@@ -60,9 +60,7 @@ def number_kind(recorded: Number, ran: Number) -> DriftKind:
     return DriftKind.ROUNDING if near else DriftKind.NUMERIC
 
 
-def number_change(
-    span: Span, recorded: str, ran: str, ran_line: int, numbers: tuple[Number, Number]
-) -> Change:
+def number_change(span: Span, recorded: str, ran: str, numbers: tuple[Number, Number]) -> Change:
     """The change of a number at a place of the lesson."""
     error = relative_error(numbers[0].value, numbers[1].value)
     size = None if error is None else float(error)
@@ -71,7 +69,6 @@ def number_change(
         span,
         recorded,
         ran,
-        ran_line,
         None if size == float("inf") else size,
         None if error is None else agreeing_digits(error),
     )

@@ -13,7 +13,6 @@ A recorded table has its own way of matching: see `tables`.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
@@ -84,7 +83,7 @@ def compare(
     if same_lines(recorded, ran, comparison):
         return Verdict(recording, comparison, "verified")
     matcher = LineMatcher(comparison)
-    changes = _Changes(recording, body, recorded, ran, matcher, ran.line_starts())
+    changes = _Changes(recording, body, recorded, ran, matcher)
     found = tuple(changes.of(align(recorded, ran, matcher)))
     return Verdict(recording, comparison, "drift" if found else "verified", found)
 
@@ -97,7 +96,6 @@ class _Changes(Struct, frozen=True):
     recorded: Side
     ran: Side
     matcher: LineMatcher
-    line_starts: Sequence[int]
 
     def of(self, steps: Sequence[Step]) -> Iterator[Change]:
         """A change for each difference in a line, and for each run of missing or extra lines."""
@@ -121,24 +119,22 @@ class _Changes(Struct, frozen=True):
             ran_start, ran_end = self.ran.origin(step.ran, d.ran_start, d.ran_end)
             span = self._span(start, end)
             texts = self.recorded.raw[start:end], self.ran.raw[ran_start:ran_end]
-            ran_line = bisect_right(self.line_starts, ran_start)
             if d.numbers is not None:
-                yield number_change(span, *texts, ran_line, d.numbers)
+                yield number_change(span, *texts, d.numbers)
             else:
-                yield Change(DriftKind.TEXT, span, *texts, ran_line)
+                yield Change(DriftKind.TEXT, span, *texts)
 
     def _missing(self, steps: Sequence[Step]) -> Change:
         start, _ = self.recorded.origin(steps[0].recorded, 0, 0)
         text = "\n".join(self.recorded.lines[step.recorded] for step in steps)
         span = self._span(start, self._end_of(steps[-1].recorded))
-        return Change(DriftKind.MISSING, span, text, "", 0)
+        return Change(DriftKind.MISSING, span, text, "")
 
     def _extra(self, steps: Sequence[Step]) -> Change:
         text = "\n".join(self.ran.lines[step.ran] for step in steps)
         before, lines = steps[0].recorded, len(self.recorded.lines)
         place = self.recorded.origin(before, 0, 0)[0] if before < lines else self._end_of(lines - 1)
-        ran_line = self.ran.raw_line(steps[0].ran, self.line_starts)
-        return Change(DriftKind.EXTRA, self._span(place, place), "", text, ran_line)
+        return Change(DriftKind.EXTRA, self._span(place, place), "", text)
 
     def _end_of(self, line: int) -> int:
         """Where a recorded line ends; 0 where none is recorded."""

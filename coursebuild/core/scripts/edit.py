@@ -29,7 +29,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")
-_LABEL = 60
 
 
 def apply_edits(text: str, edits: Iterable[Edit]) -> str:
@@ -220,12 +219,12 @@ def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic
                 f"line {number} of the output has a NUL character, which Markdown cannot hold",
                 "print text only",
             )
-    longest = _longest_closing(lines, fence.text)
+    longest = _longest_marks(lines, fence.text)
     if longest:
         marks = "backticks" if fence.text[0] == "`" else "tildes"
         return refused(
             fence,
-            "the output has a line that would close this fence",
+            "the output has a line that would close this fence, or begin another",
             f"open and close it with {longest + 1} {marks}, then update again",
         )
     return whole_lines(recording.body_span, recording.prefix, lines)
@@ -247,8 +246,8 @@ def adopted(script: Script, data: bytes) -> Edit | Diagnostic:
     if text == "\n":
         return impossible("it is empty")
     lines = text.removesuffix("\n").split("\n")
-    if _longest_closing(lines, _opening_fence(script.body_span).text):
-        return impossible("one of its lines would close the fence")
+    if _longest_marks(lines, _opening_fence(script.body_span).text):
+        return impossible("one of its lines would close the fence, or begin another")
     if "\0" in text:
         return impossible("it holds a NUL")
     return whole_lines(script.body_span, script.prefix, lines)
@@ -274,10 +273,10 @@ def _opening_fence(body: Span) -> Span:
     return Span(body.source, *found.span())
 
 
-def _longest_closing(lines: Sequence[str], fence: str) -> int:
-    """The number of marks of the longest line that would close a fence; 0 where none would."""
-    closing = re.compile(rf" {{0,3}}({re.escape(fence[0])}{{{len(fence)},}})[ \t]*")
-    found = (closing.fullmatch(line) for line in lines)
+def _longest_marks(lines: Sequence[str], fence: str) -> int:
+    """The number of marks of the longest line that would close a fence, or begin another in it."""
+    marks = re.compile(rf" {{0,3}}({re.escape(fence[0])}{{{len(fence)},}})(?:[ \t]*| *\w[^`]*)")
+    found = (marks.fullmatch(line) for line in lines)
     return max((len(one[1]) for one in found if one), default=0)
 
 

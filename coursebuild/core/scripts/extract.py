@@ -116,10 +116,6 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
     )
 
 
-def _names(script: Script) -> tuple[str, ...]:
-    return tuple(figure.name for figure in script.figures)
-
-
 def _key(path: str) -> str:
     """The same for paths that some file system takes for one."""
     return unicodedata.normalize("NFC", path).casefold()

@@ -84,11 +84,10 @@ def compare_table(
     ran: Side,
 ) -> Verdict:
     """The verdict on a recorded table."""
-    line_starts = ran.line_starts()
     changes = tuple(
         change
         for found in TableMatcher(table_rows(table, filters), ran, comparison).match()
-        for change in _row_changes(found, ran, comparison, line_starts)
+        for change in _row_changes(found, comparison)
     )
     return Verdict(recording, comparison, "drift" if changes else "verified", changes)
 
@@ -97,20 +96,15 @@ def _row_text(row: Sequence[RowCell]) -> str:
     return "  ".join(cell.mapped.text for cell in row)
 
 
-def _row_changes(
-    found: RowMatch, ran: Side, comparison: model.Comparison, line_starts: Sequence[int]
-) -> list[Change]:
+def _row_changes(found: RowMatch, comparison: model.Comparison) -> list[Change]:
     if found.line < 0:
         first, last = found.row[0].cell.span, found.row[-1].cell.span
-        return [Change(DriftKind.MISSING, first.to(last), _row_text(found.row), "", 0)]
-    ran_line = ran.raw_line(found.line, line_starts)
+        return [Change(DriftKind.MISSING, first.to(last), _row_text(found.row), "")]
     changes = []
     for cell, recorded, printed in found.pairs:
         if not same_number(recorded, printed, comparison):
             span = cell.span(recorded)
-            changes.append(
-                number_change(span, span.text, printed.text, ran_line, (recorded, printed))
-            )
+            changes.append(number_change(span, span.text, printed.text, (recorded, printed)))
     return changes
 
 

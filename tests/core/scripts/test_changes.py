@@ -7,8 +7,9 @@ import pytest
 from coursebuild.core.model.results import DriftKind
 from support.sample_lessons import (
     ELLIPSIS,
+    seen,
+    verdict,
 )
-from support.sample_verdicts import seen, verdict
 
 ENERGY = """\
 conservation over 20 s:
@@ -22,7 +23,7 @@ conservation over 20 s:
 def test_places_in_nested_fences(prefix: str, eol: str) -> None:
     found = verdict(ENERGY, ENERGY.replace("6.9e-04", "7.0e-04"), prefix=prefix, eol=eol)
     (change,) = found.changes
-    assert seen(change) == ("rounding", "6.9e-04", "7.0e-04", 3)
+    assert seen(change) == ("rounding", "6.9e-04", "7.0e-04")
     assert (change.span.line, change.span.column) == (9, 44 + len(prefix))
 
 
@@ -55,53 +56,32 @@ def test_enormous_errors_stay_finite() -> None:
     assert change.relative_error is None and change.digits == 0
 
 
-def test_every_number_of_a_line_is_compared() -> None:
-    found = verdict("[0.1 0.2 0.3]", "[0.1 0.25 0.4]")
-    assert [seen(c) for c in found.changes] == [
-        ("rounding", "0.2", "0.25", 1),
-        ("rounding", "0.3", "0.4", 1),
-    ]
-
-
 def test_white_space_is_named_only_where_nothing_else_differs() -> None:
     found = verdict("a   9.9 b", "a  10.9 b")
-    assert [seen(c) for c in found.changes] == [("numeric", "9.9", "10.9", 1)]
+    assert [seen(c) for c in found.changes] == [("numeric", "9.9", "10.9")]
     found = verdict("a   b", "a  b")
-    assert [seen(c) for c in found.changes] == [("text", "   ", "  ", 1)]
+    assert [seen(c) for c in found.changes] == [("text", "   ", "  ")]
 
 
 def test_text_changes_are_small() -> None:
     found = verdict("the red box at 1.5 m", "the dark blue box at 1.5 m")
-    assert [seen(c) for c in found.changes] == [("text", "red", "dark blue", 1)]
+    assert [seen(c) for c in found.changes] == [("text", "red", "dark blue")]
     found = verdict("E: 6.641 %", "E total: 6.702 %")
     assert [seen(c) for c in found.changes] == [
-        ("text", "", " total", 1),
-        ("numeric", "6.641", "6.702", 1),
+        ("text", "", " total"),
+        ("numeric", "6.641", "6.702"),
     ]
 
 
 def test_missing_and_extra_lines() -> None:
     found = verdict("a one\nb two\nc three\nd four", "a one\nd four")
-    assert [seen(c) for c in found.changes] == [("missing lines", "b two\nc three", "", 0)]
+    assert [seen(c) for c in found.changes] == [("missing lines", "b two\nc three", "")]
     assert found.changes[0].span.text == "b two\nc three"
     found = verdict("a one\nd four", "a one\nb two\nc three\nd four")
-    assert [seen(c) for c in found.changes] == [("extra lines", "", "b two\nc three", 2)]
+    assert [seen(c) for c in found.changes] == [("extra lines", "", "b two\nc three")]
     assert (
         found.changes[0].span.line == 8 and found.changes[0].span.start == found.changes[0].span.end
     )
-
-
-def test_an_empty_recording() -> None:
-    (change,) = verdict("", "a\nb").changes
-    assert seen(change) == ("extra lines", "", "a\nb", 1)
-    assert change.span.line == 7
-
-
-def test_a_drifted_table_of_equal_rows_with_one_more() -> None:
-    rows = [f"{i}  {i * i / 10:.2f}" for i in range(8)]
-    longer = [*rows[:3], "2.5  0.62", *rows[3:]]
-    found = verdict("\n".join(rows), "\n".join(longer))
-    assert [seen(c) for c in found.changes] == [("extra lines", "", "2.5  0.62", 4)]
 
 
 def test_a_line_that_moved_is_missing_here_and_extra_there() -> None:
@@ -111,8 +91,8 @@ def test_a_line_that_moved_is_missing_here_and_extra_there() -> None:
 
 def test_changes_beside_an_ellipsis() -> None:
     found = verdict("start\n...\nE 1.50\nend", "start\nfoo\nbar\nE 1.70\nend", ELLIPSIS)
-    assert [seen(c) for c in found.changes] == [("numeric", "1.50", "1.70", 4)]
+    assert [seen(c) for c in found.changes] == [("numeric", "1.50", "1.70")]
     found = verdict("t=... s, E 1.5 J", "t=0.1 s, E 2.5 J", ELLIPSIS)
-    assert [seen(c) for c in found.changes] == [("numeric", "1.5", "2.5", 1)]
+    assert [seen(c) for c in found.changes] == [("numeric", "1.5", "2.5")]
     found = verdict("t=... s, E", "u=0.1 s, F", ELLIPSIS)
-    assert [seen(c) for c in found.changes] == [("text", "t=... s, E", "u=0.1 s, F", 1)]
+    assert [seen(c) for c in found.changes] == [("text", "t=... s, E", "u=0.1 s, F")]

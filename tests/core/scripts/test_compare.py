@@ -5,45 +5,38 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.model import Comparison, Filter
-from coursebuild.core.scripts.compare import compare
 from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
     ELLIPSIS,
     EXACT,
-    recording,
+    matches,
+    seen,
+    verdict,
     within,
 )
-from support.sample_verdicts import matches, seen, verdict
 
 # ---------------------------------------------------------------------------------------- modes
 
 
-def test_exact_is_the_same_text() -> None:
-    assert matches("a 1.0\nb", "a 1.0\nb\n")
-    assert not matches("a 1.0", "a 1.00")
-    assert not matches("a  b", "a b")
-    assert not matches("0.000", "-0.000")
-
-
-def test_white_space_at_ends_does_not_count() -> None:
-    assert matches("a  \nb", "a\nb \t\n\n  \n\n")
-    assert matches("a\n\n\n", "a\n")
-    assert not matches("a\n\nb", "a\nb")
-    assert not matches("a", "\na")
-
-
-def test_line_ends_do_not_count() -> None:
-    for eol in ("\n", "\r\n", "\r"):
-        for printed in ("a\nb\n", "a\r\nb\r\n", "a\rb"):
-            found = compare(recording("a\nb", eol=eol), EXACT, (), printed)
-            assert found.status == "verified"
-
-
-def test_other_line_separators_are_characters() -> None:
-    assert matches("a\u2028b", "a\u2028b")
-    assert not matches("a\u2028b", "a\nb")
-    assert matches("a\x0cb\x85c", "a\x0cb\x85c")
+@pytest.mark.parametrize(
+    ("recorded", "printed", "expected"),
+    [
+        ("a 1.0\nb", "a 1.0\nb\n", True),
+        ("a 1.0", "a 1.00", False),
+        ("a  b", "a b", False),
+        ("0.000", "-0.000", False),
+        ("a  \nb", "a\nb \t\n\n  \n\n", True),
+        ("a\n\nb", "a\nb", False),
+        ("a", "\na", False),
+        ("a\nb", "a\r\nb\r", True),
+        ("a\u2028b", "a\nb", False),
+        ("a\x0cb\x85c", "a\x0cb\x85c", True),
+        ("a ... c", "a b c", False),
+    ],
+)
+def test_exact(recorded: str, printed: str, expected: bool) -> None:
+    assert matches(recorded, printed) is expected
 
 
 @pytest.mark.parametrize(
@@ -136,19 +129,10 @@ def test_columns_may_shift_where_a_number_gets_wider(recorded: str, printed: str
     assert matches(printed, recorded, within(atol="0.3"))
 
 
-@pytest.mark.parametrize(
-    ("recorded", "printed"),
-    [
-        ("a 0.1", "a0.1"),
-        ("0.1 %", "0.1%"),
-        ("0.1 0.2", "0.10.2"),
-        ("a  b 0.1", "a b 0.1"),
-        ("0.1 m", "0.1m"),
-        ("  a 0.1", "a 0.1"),
-    ],
-)
-def test_white_space_away_from_numbers_counts(recorded: str, printed: str) -> None:
-    assert not matches(recorded, printed, within(atol="0.3"))
+def test_white_space_away_from_numbers_counts() -> None:
+    for recorded in ("a 0.1", "0.1 %", "0.1 0.2", "0.1 m"):
+        assert not matches(recorded, recorded.replace(" ", ""), within(atol="0.3"))
+    assert not matches("a  b 0.1", "a b 0.1", within(atol="0.3"))
 
 
 # ------------------------------------------------------------------------------------- ellipsis
@@ -181,17 +165,12 @@ def test_white_space_away_from_numbers_counts(recorded: str, printed: str) -> No
         ("...a", "xa", True),
         ("....", ".", True),
         ("x...y...", "xy", True),
+        ("[0. ... 9.]", "[0. ... 9.]", True),
     ],
 )
 def test_ellipsis(recorded: str, printed: str, expected: bool) -> None:
     assert matches(recorded, printed, ELLIPSIS) is expected
     assert matches(recorded, printed, DIGITS_ELLIPSIS) is expected
-
-
-def test_dots_are_dots_without_the_key() -> None:
-    assert not matches("a ... c", "a b c")
-    assert not matches("...", "a", DIGITS)
-    assert matches("[0. ... 9.]", "[0. ... 9.]")
 
 
 @pytest.mark.parametrize(
@@ -219,29 +198,25 @@ def test_ellipsis_with_digits(recorded: str, printed: str, expected: bool) -> No
 # --------------------------------------------------------------------------------------- filters
 
 
-def test_filters_apply_to_both_sides() -> None:
-    address = Filter(r"0x[0-9a-f]+", "0x…")
-    assert verdict("<body at 0x7f>", "<body at 0xab>", EXACT, (address,)).status == "verified"
-    assert verdict("<body at 0x…>", "<body at 0xab>", EXACT, (address,)).status == "verified"
-
-
-def test_filters_come_one_after_the_other() -> None:
-    filters = (Filter(r"took \d+ s", "took T"), Filter(r" T\b", " TIME"))
-    assert verdict("took TIME", "took 12 s", EXACT, filters).status == "verified"
-
-
-def test_a_filter_can_drop_lines() -> None:
-    warning = Filter(r"^Warning:.*\n", "")
-    assert verdict("a\nb", "a\nWarning: x\nWarning: y\nb\n", EXACT, (warning,)).status == "verified"
+@pytest.mark.parametrize(
+    ("recorded", "printed", "rules"),
+    [
+        ("<body at 0x7f>", "<body at 0xab>", [(r"0x[0-9a-f]+", "0x…")]),
+        ("<body at 0x…>", "<body at 0xab>", [(r"0x[0-9a-f]+", "0x…")]),
+        ("took TIME", "took 12 s", [(r"took \d+ s", "took T"), (r" T\b", " TIME")]),
+        ("a\nb", "a\nWarning: x\nWarning: y\nb\n", [(r"^Warning:.*\n", "")]),
+    ],
+)
+def test_filters(recorded: str, printed: str, rules: list[tuple[str, str]]) -> None:
+    filters = tuple(Filter(*rule) for rule in rules)
+    assert verdict(recorded, printed, EXACT, filters).status == "verified"
 
 
 def test_places_behind_filters_are_true() -> None:
     filters = (Filter(r"0x[0-9a-f]+", "somewhere"), Filter(r"^#.*\n", ""))
     lesson = "# one\nat 0x1 E 1.5 b\n# two\nat 0x22 F 2.5"
     found = verdict(lesson, "at 0x333 E 1.5 b\n# more\nat 0x4 F 2.6", EXACT, filters)
-    assert [seen(c) for c in found.changes] == [("numeric", "2.5", "2.6", 3)] or [
-        seen(c) for c in found.changes
-    ] == [("rounding", "2.5", "2.6", 3)]
+    assert [seen(c) for c in found.changes] == [("rounding", "2.5", "2.6")]
     (change,) = found.changes
     assert change.span.source.line_text(change.span.line) == "at 0x22 F 2.5"
     assert change.span.column == len("at 0x22 F ") + 1
@@ -250,4 +225,4 @@ def test_places_behind_filters_are_true() -> None:
 def test_a_change_inside_what_a_filter_wrote_is_all_that_it_replaced() -> None:
     shorter = Filter(r"(\d\.\d)\d+", r"\1")
     found = verdict("E 6.6411 J", "E 6.7022 J", EXACT, (shorter,))
-    assert [seen(c) for c in found.changes] == [("rounding", "6.6411", "6.7022", 1)]
+    assert [seen(c) for c in found.changes] == [("rounding", "6.6411", "6.7022")]

@@ -9,15 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
-from coursebuild.core.model.results import DriftKind
 from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
     ELLIPSIS,
     EXACT,
+    matches,
+    seen,
+    verdict,
     within,
 )
-from support.sample_verdicts import matches, seen, verdict
 
 WORDS = st.sampled_from(
     ["a", "b c", "x=1.5", "1.5", "2", "-0.0", "nan", "...", "", "  ", "e-3", "|"]
@@ -30,11 +31,6 @@ FILTERS = st.lists(
 MODES = st.sampled_from([EXACT, DIGITS, within("0.1", "0.1"), ELLIPSIS, DIGITS_ELLIPSIS])
 
 
-@given(OUTPUTS, MODES)
-def test_every_output_matches_itself(output: str, comparison: Comparison) -> None:
-    assert verdict(output, output, comparison).status == "verified"
-
-
 @given(OUTPUTS, OUTPUTS, MODES, FILTERS)
 def test_changes_have_true_places(
     recorded: str, printed: str, comparison: Comparison, filters: tuple[Filter, ...]
@@ -42,12 +38,9 @@ def test_changes_have_true_places(
     found = verdict(recorded, printed, comparison, filters, prefix="> ", eol="\r\n")
     assert found.status in ("verified", "drift")
     assert bool(found.changes) == (found.status == "drift")
-    lines = printed.split("\n")
     for change in found.changes:
         seen(change)
         assert found.recording.body_span.contains(change.span)
-        if change.kind is not DriftKind.MISSING and not filters:
-            assert change.ran.split("\n")[0] in lines[change.ran_line - 1]
 
 
 @given(OUTPUTS, OUTPUTS)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import random
 
 from coursebuild.core.model.results import DriftKind
-from support.sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT
-from support.sample_verdicts import verdict
+from support.sample_lessons import DIGITS, DIGITS_ELLIPSIS, ELLIPSIS, EXACT, verdict
 
 
 def numbers(count: int, seed: int) -> list[str]:

@@ -11,13 +11,13 @@ from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import updated_body
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
-from support.sample_edits import edited
 from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
     ELLIPSIS,
     EXACT,
     VOLATILE,
+    edited,
     recording,
     within,
 )
@@ -70,13 +70,13 @@ def test_after_an_update_all_is_well(
             assert compare(new, EXACT, (), printed).status == "verified"
 
 
-MARKED = st.lists(
+ELLIPTIC = st.lists(
     st.one_of(LINES, st.sampled_from(["...", "a ... b", "a 1.5 ...", "x=... y", "... 1.5"])),
     max_size=7,
 ).map("\n".join)
 
 
-@given(MARKED, OUTPUTS, st.sampled_from([ELLIPSIS, DIGITS_ELLIPSIS]), PREFIXES, EOLS)
+@given(ELLIPTIC, OUTPUTS, st.sampled_from([ELLIPSIS, DIGITS_ELLIPSIS]), PREFIXES, EOLS)
 def test_an_update_with_ellipses_is_right_or_refused(
     recorded: str, printed: str, comparison: Comparison, prefix: str, eol: str
 ) -> None:

@@ -24,7 +24,7 @@ go()
     return extract(
         course(
             document(one, "content/lessons/4.2-mass.md"),
-            document(two, "content/lessons/1.1-first.md", "> "),
+            document(two, "content/lessons/1.1-first.md"),
         )
     ).value
 
@@ -34,40 +34,6 @@ def said(stderr: str = "", outcome: Outcome = Outcome.FAILED, status: int = 1) -
     diagnostic = failure(found[0], ran(outcome=outcome, status=status, stderr=stderr), found)
     assert diagnostic is not None
     return f"{diagnostic.span.path}\n{told(diagnostic)}"
-
-
-OWN = """\
-Traceback (most recent call last):
-  File "/any/abs/examples/a.py", line 5, in <module>
-    go()
-  File "/any/abs/examples/a.py", line 4, in go
-    helper.fall()
-  File "/usr/lib/python3.11/json/decoder.py", line 355, in decode
-    raise JSONDecodeError("Expecting value", s, err.value) from None
-json.decoder.JSONDecodeError: Expecting value: line 1 column 1 (char 0)
-and a second line
-"""
-
-
-def test_a_traceback_points_into_the_lesson() -> None:
-    assert (
-        said(OWN)
-        == """\
-content/lessons/4.2-mass.md
-script-failed at 7:5 `helper.fall()`
-  `examples/a.py` exited with status 1
-  ^ json.decoder.JSONDecodeError: Expecting value: line 1 column 1 (char 0)
-  note: its standard error:
-    Traceback (most recent call last):
-      File "content/lessons/4.2-mass.md", line 8, in <module>
-        go()
-      File "content/lessons/4.2-mass.md", line 7, in go
-        helper.fall()
-      File "/usr/lib/python3.11/json/decoder.py", line 355, in decode
-        raise JSONDecodeError("Expecting value", s, err.value) from None
-    json.decoder.JSONDecodeError: Expecting value: line 1 column 1 (char 0)
-    and a second line"""
-    )
 
 
 def test_an_exception_group_ends_with_its_last_exception() -> None:
@@ -85,25 +51,11 @@ def test_an_exception_group_ends_with_its_last_exception() -> None:
     ]
 
 
-def test_an_exit_without_a_traceback() -> None:
-    assert (
-        said("warming up\nno model given\n", status=3)
-        == """\
-content/lessons/4.2-mass.md
-script-failed at 3:1 ````python file=examples/a.py timeout=2.5`
-  `examples/a.py` exited with status 3
-  ^ no model given
-  note: its standard error:
-    warming up
-    no model given"""
-    )
-    assert (
-        said("")
-        == """\
-content/lessons/4.2-mass.md
-script-failed at 3:1 ````python file=examples/a.py timeout=2.5`
-  `examples/a.py` exited with status 1"""
-    )
+def test_an_exit_without_a_word_is_told_by_its_status_alone() -> None:
+    assert said("").split("\n")[1:] == [
+        "script-failed at 3:1 ````python file=examples/a.py timeout=2.5`",
+        "  `examples/a.py` exited with status 1",
+    ]
 
 
 def test_a_syntax_error_and_warnings() -> None:
@@ -148,11 +100,3 @@ def test_a_script_ended_by_a_signal_names_it() -> None:
     for status, name in ((11, "SIGSEGV"), (9, "SIGKILL"), (63, "signal 63")):
         message = f"`examples/a.py` was ended by {name}"
         assert message in said("", Outcome.KILLED, status).split("\n")[2], status
-
-
-def test_a_crash_dump_has_its_innermost_line_first() -> None:
-    stderr = (
-        "Fatal Python error: Segmentation fault\n\nCurrent thread 0x1 (most recent call first):\n"
-        '  File "/x/examples/a.py", line 4 in go\n  File "/x/examples/a.py", line 5 in <module>\n'
-    )
-    assert said(stderr, Outcome.KILLED, 11).split("\n")[1] == "script-killed at 7:5 `helper.fall()`"

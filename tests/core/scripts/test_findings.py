@@ -5,7 +5,7 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
-from support.sample_lessons import DIGITS, course, document, ran, told
+from support.sample_lessons import course, document, ran, told
 
 LESSON = """\
 ```python file=examples/a.py
@@ -53,14 +53,6 @@ def test_where_only_some_scripts_ran_the_others_are_known() -> None:
     assert findings(ran("E 1.5")) == []
 
 
-def test_lessons_lean_on_each_other() -> None:
-    other = document(
-        "`1.5`{out=examples/a.py} `1.6`{out=examples/a.py}\n", "content/lessons/5.1-x.md"
-    )
-    runs = (ran("E 1.5"), ran("7\n", path="examples/b.py"))
-    assert findings(*runs, lessons=(document(LESSON), other)) == ["binding-mismatch at 1:27 `1.6`"]
-
-
 def test_every_recording_gets_a_verdict() -> None:
     text = """\
 ```python file=examples/a.py
@@ -95,9 +87,3 @@ Output:
     assert [v.status for v in verify(here, runs[:1])] == ["verified", "volatile", "unchecked"]
     failed = (ran("one\n", outcome=Outcome.FAILED, status=1), ran("", path="examples/b.py"))
     assert [v.status for v in verify(here, failed)] == ["unchecked"] * 3
-
-
-def test_the_course_s_comparison_is_the_default() -> None:
-    text = "```python file=examples/a.py\n1\n```\n\nOutput:\n\n```text\n1.5\n```\n"
-    (found,) = verify(course(document(text), comparison=DIGITS), (ran("1.52"),))
-    assert (found.status, found.comparison) == ("verified", DIGITS)

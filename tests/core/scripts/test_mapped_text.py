@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Filter
-from coursebuild.core.scripts.mapped_text import MappedText, Side, filtered
+from coursebuild.core.scripts.mapped_text import MappedText, filtered
 
 TEXTS = st.text(alphabet="ab1 \n-x", max_size=30)
 PATTERNS = st.sampled_from(
@@ -53,13 +53,3 @@ def test_origins_lie_in_the_text_and_grow(
     for piece in copies:
         length = piece.end - piece.start
         assert mapped.text[piece.at : piece.at + length] == text[piece.start : piece.end]
-
-
-@given(TEXTS, st.lists(PATTERNS, max_size=3))
-def test_raw_lines_are_all_of_the_text(text: str, rules: list[tuple[str, str]]) -> None:
-    side = Side.of(text, [Filter(*rule) for rule in rules])
-    if not side.lines:
-        return
-    raw = [line for i in range(len(side.lines)) for line in side.raw_lines(i)]
-    kept = "".join(raw).replace(" ", "")
-    assert kept == text.replace("\n", "").replace(" ", "")

@@ -151,39 +151,12 @@ def test_which_line_is_the_same(before: str, now: str, successor: str | None) ->
         assert found.help == f"write `{successor}`"
 
 
-def test_of_two_places_one_is_gone() -> None:
-    found = anew("2.5", "a 2.5\nb 2.5\n", "a 3.5\nc 2.6\n")
-    assert found.label == (
-        "it is not certain what is printed in place of 2.5 now; the nearest printed value is 2.6"
-    )
-    found = anew("2.0", "a 2.00\nb 2.04\n", "a 3.00\nb 2.10\n")
-    assert found.label.startswith("it is not certain what is printed in place of 2.00 now; ")
-
-
-def test_recorded_tables() -> None:
-    before = "| a | b |\n| --- | --- |\n| Euler | **+6.641 %** |\n| RK4 | 2.0 |\n"
-    now = before.replace("+6.641", "+9.5").replace("2.0", "6.7")
-    runs = "Euler +6.641 %\nRK4 2.0\n", "Euler +9.5 %\nRK4 6.7\n"
-    held, prose = HeldLines(), "| the error | `6.6`{out} |"
-    assert look(held, lesson(prose, before), ran(runs[0])) == ()
-    assert look(held, lesson(prose, before), ran(runs[1])) == ()
-    (found,) = look(held, lesson(prose, now), ran(runs[1]))
-    assert (found.label, found.help) == ("+9.5 is printed where +6.641 was", "write `9.5`")
-
-
 def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
     held, prose = HeldLines(), "`7.5`{out}"
     recorded = "start\n...\nend 1.5\n"
     text = lesson(prose, recorded, "text ellipsis")
     assert look(held, text, ran("start\nx 7.52\nend 1.5\n")) == ()
     (found,) = look(held, text, ran("start\nx 9.52\ny 7.6\nend 1.5\n"))
-    assert (found.label, found.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
-
-
-def test_an_output_that_is_not_recorded_has_places_too() -> None:
-    held, text = HeldLines(), "`7.5`{out=examples/a.py}\n"
-    assert look(held, text, ran("x 7.52\ny 1\n")) == ()
-    (found,) = look(held, text, ran("x 9.52\ny 7.6\n"))
     assert (found.label, found.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
 
 

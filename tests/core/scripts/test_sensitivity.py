@@ -14,13 +14,10 @@ from coursebuild.core.model.sensitivity import Sensitivity, Standing
 from coursebuild.core.scripts.sensitivity import noise, sensitivity, worth_moving
 from support.sample_lessons import (
     DIGITS,
-    ELLIPSIS,
     EXACT,
-    VOLATILE,
     course,
     document,
     recording,
-    table,
     within,
 )
 from support.sample_lessons import told as told_text
@@ -77,12 +74,10 @@ def warnings(found: Sensitivity) -> list[str]:
 @pytest.mark.parametrize(
     ("recorded", "moved", "expected"),
     [
-        ("1.23456", ["1.23457", "1.23456"], ("1.23456", 6, 5, "1.2346")),
         ("1.23456", ["1.23461", "1.23451"], ("1.23456", 6, 5, "1.2346")),
         ("1.23456", ["1.23462"], ("1.23456", 6, 4, "1.235")),
         ("1.23456", ["1.3"], ("1.23456", 6, 1, "1")),
         ("1.23456", ["4.2"], ("1.23456", 6, 0, "")),
-        ("-0.00123", ["-0.00124"], ("-0.00123", 3, 2, "-0.0012")),
         ("+6.641", ["+6.645"], ("+6.641", 4, 3, "+6.64")),
         ("\u22126.641", ["\u22126.645"], ("\u22126.641", 4, 3, "\u22126.64")),
         ("1.2345e-03", ["1.2349e-03"], ("1.2345e-03", 5, 4, "1.234e-03")),
@@ -92,7 +87,6 @@ def warnings(found: Sensitivity) -> list[str]:
         ("9.9996", ["9.9999"], ("9.9996", 5, 4, "10.000")),
         ("0.000", ["0.001"], ("0.000", 4, 0, "")),
         ("26", ["27"], ("26", 2, 1, "")),
-        ("3", ["4"], ("3", 1, 0, "")),
         ("1.5", ["nan"], ("1.5", 2, 0, "")),
     ],
 )
@@ -102,22 +96,6 @@ def test_digits_that_hold(
     text = "value {} m"
     found = measured(text.format(recorded), *(text.format(value) for value in moved))
     assert digits(found) == [expected]
-
-
-def test_in_a_table() -> None:
-    recorded = table("| h | error |\n| --- | --- |\n| 0.1 | 1.2345 |\n| 0.2 | 5.0 |")
-    base = "h error\n0.1 1.2345\n0.2 5.0\n"
-    found = measured(recorded, "h error\n0.1 1.2399\n0.2 5.0\n", base=base)
-    assert digits(found) == [("1.2345", 5, 2, "1.2")]
-    assert found.doubts[0].span.line == 9
-    assert found.numbers == 4
-
-
-def test_beside_what_an_ellipsis_leaves_out() -> None:
-    recorded = "a 1.25\n...\nb 2.5 took ..."
-    base, other = "a 1.25\nx 9\nb 2.5 took 3\n", "a 1.25\nx 8\ny 7\nb 2.6 took 4\n"
-    found = measured(recorded, other, comparison=ELLIPSIS, base=base)
-    assert digits(found) == [("2.5", 2, 1, "2")]
 
 
 def test_what_a_filter_takes_out_does_not_count() -> None:
@@ -190,11 +168,6 @@ def test_text_that_changes(recorded: str, moved: str, expected: list[tuple[str, 
     assert flips(measured(recorded, moved)) == expected
 
 
-def test_a_line_less_does_not_blur_the_others() -> None:
-    found = measured("bounce 1 at 1.25\nbounce 2 at 2.5\nend 3.0", "bounce 1 at 1.25\nend 3.0")
-    assert flips(found) == [("bounce 2 at 2.5", "")]
-
-
 # --- scripts
 
 
@@ -237,10 +210,6 @@ def test_why_nothing_can_be_said(base: ScriptRun, moved: ScriptRun, standing: St
     assert found == Sensitivity("examples/a.py", "1.1", standing)
     if standing not in (Standing.FAILED, Standing.NOT_MOVED):
         assert not worth_moving(whole, [one], base)
-
-
-def test_what_is_not_compared_is_not_asked() -> None:
-    assert measured("x 1", "x 2", comparison=VOLATILE).standing is Standing.UNRECORDED
 
 
 # --- warnings

@@ -40,12 +40,6 @@ def test_rows_stand_in_lines() -> None:
     assert verdict("| | | |").status == "verified"
 
 
-def test_rows_stand_in_order() -> None:
-    lines = ROWS.split("\n")
-    assert verdict("\n".join(lines[::-1])).status == "drift"
-    assert verdict("\n".join([lines[1], lines[1]])).status == "drift"
-
-
 @pytest.mark.parametrize(
     "row",
     [
@@ -74,7 +68,6 @@ def test_the_number_that_drifted_is_named() -> None:
     found = verdict(ROWS.replace("6.641", "6.702"))
     (change,) = found.changes
     assert (change.kind.value, change.recorded, change.ran) == ("numeric", "+6.702", "+6.641")
-    assert change.ran_line == 3
     assert change.span.text == "+6.702"
     assert change.span.source.line_text(change.span.line).startswith("| `Euler` | **+6.702")
 
@@ -88,18 +81,9 @@ def test_of_several_numbers_the_nearest_is_meant() -> None:
 
 def test_a_row_without_a_line_is_missing() -> None:
     (change,) = verdict(ROWS.replace("`Euler`", "`Midpoint`")).changes
-    assert (change.kind.value, change.ran_line) == ("missing lines", 0)
+    assert change.kind.value == "missing lines"
     assert change.recorded == "Midpoint +6.641 % 6.9e-04".replace(" +", "  +").replace("% ", "%  ")
     assert change.span.text == "`Midpoint` | **+6.641 %** | 6.9e-04"
-
-
-def test_drift_in_one_row_does_not_move_the_others() -> None:
-    printed = PRINTED.replace("+6.641", "+7.000").replace("3.9e-11", "4.0e-11")
-    found = verdict(ROWS, printed)
-    assert [(c.recorded, c.ran, c.ran_line) for c in found.changes] == [
-        ("3.9e-11", "4.0e-11", 2),
-        ("+6.641", "+7.000", 3),
-    ]
 
 
 def test_filters_apply_to_cells_and_lines() -> None:

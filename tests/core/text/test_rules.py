@@ -2,7 +2,7 @@
 
 A case names a smallest course that breaks the rule (see `support.rule_cases`) and all diagnostics
 that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
-command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 3 s]` say which
+command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 1 s]` say which
 engine tries the labs, for what no course can bring about, or not in time.
 `pytest tests/core/text --rewrite-fixtures` writes the expected parts and
 `docs/reference/rules.md` anew.
@@ -44,35 +44,20 @@ RUN = re.compile(r"file=examples/|models/|```mjcf|```lab")
 """In a course of which something is run or compiled."""
 
 
-class OtherEngine(LabEngine):
-    """The browser's engine, of another version."""
+class ChangedEngine:
+    """The browser's engine, of another version or with less time for a trial, as a title asks."""
 
-    def __init__(self, version: str) -> None:
-        super().__init__()
-        self._other = version
+    def __init__(self, engine: LabEngine, title: str) -> None:
+        self._engine = engine
+        self._version = re.search(r"\[engine of ([\d.]+)\]", title)
+        self._time = re.search(r"\[after ([\d.]+) s\]", title)
 
-    def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
-        return {**super().trial(request, mjb, seconds), "version": self._other}
-
-
-class ImpatientEngine(LabEngine):
-    """The browser's engine, with less time for a trial."""
-
-    def __init__(self, seconds: float) -> None:
-        super().__init__()
-        self._seconds = seconds
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._engine, name)
 
     def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
-        return super().trial(request, mjb, self._seconds)
-
-
-def engine_of(case: Case) -> LabEngine | None:
-    """The engine that the title asks for."""
-    if found := re.search(r"\[engine of ([\d.]+)\]", case.title):
-        return OtherEngine(found[1])
-    if found := re.search(r"\[after ([\d.]+) s\]", case.title):
-        return ImpatientEngine(float(found[1]))
-    return None
+        reply = self._engine.trial(request, mjb, float(self._time[1]) if self._time else seconds)
+        return {**reply, "version": self._version[1]} if self._version else reply
 
 
 def command(case: Case) -> str:
@@ -105,12 +90,7 @@ def found_in(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ..
         check(options)
         layout.write_later(root)
     if "```lab" in case.input and command(case) == "check":
-        browser = engine_of(case)
-        try:
-            return workshop.try_labs(root, browser)
-        finally:
-            if browser is not None:
-                browser.close()
+        return workshop.try_labs(root, lambda engine: ChangedEngine(engine, case.title))
     match command(case):
         case "check":
             return check(options).diagnostics
