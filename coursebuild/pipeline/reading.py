@@ -52,8 +52,8 @@ SUMMARIES, PAGES = "summaries", "pages"
 _MATHML, _CODE = "mathml", "code"
 """Likewise. One has the formulas of a text: one for each formula would take as long to write as to
 make."""
-_ROOM = 700_000
-"""Characters of documents that wait to be drawn, some 25 bytes each. Further ones are parsed
+_ROOM = 6_000_000
+"""Characters of documents that wait to be drawn, some eight bytes each. Further ones are parsed
 again, so that memory does not grow with the course."""
 
 
