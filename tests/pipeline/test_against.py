@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import signal
 import subprocess
 import time
@@ -17,6 +18,8 @@ from coursebuild.core.run.versions import engine_version
 from support.scratch_course import Done, Folder, block, ended, wait_until_alone
 
 pytestmark = pytest.mark.site
+
+Make = Callable[..., Folder]
 
 HERE = engine_version()
 OTHER = "9.1.0"
@@ -69,9 +72,28 @@ def wheel(folder: Path, version: str, code: str) -> None:
             archive.writestr(file, text)
 
 
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Environments that were made for another course."""
+    return tmp_path_factory.mktemp("environments")
+
+
+def borrow(course: Folder, environments: Path, version: str = "") -> Folder:
+    """Have these environments, or only those of a version."""
+    place = course.root / ".coursebuild/environments"
+    if not version:
+        place.symlink_to(environments)
+        return course
+    place.mkdir()
+    for path in environments.glob(f"mujoco-{version}-*"):
+        (place / path.name).symlink_to(path)
+    return course
+
+
 def environments(course: Folder) -> list[str]:
-    folder = course.root / ".coursebuild" / "environments"
-    return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
+    """The versions of MuJoCo that there are environments of, and what lies beside these."""
+    names = (path.name for path in course.root.glob(".coursebuild/environments/*"))
+    return sorted(name.removeprefix("mujoco-").rpartition("-")[0] for name in names)
 
 
 def against(course: Folder, *more: str, version: str = OTHER) -> Done:
@@ -87,11 +109,18 @@ NUMBER = block(
 FAILING = block("failing.py", "import mujoco\nmujoco.mju_isBad(1.0)\nprint(1)", "1")
 
 
+SUM = f"MuJoCo {OTHER} against {HERE}, Python {platform.python_version()}:"
+
+
 def test_changed_outputs_are_told_number_by_number(
-    make: Callable[..., Folder], wheels: Path
+    make: Make, wheels: Path, installed: Path
 ) -> None:
-    course = make(f"## A\n\n{PLAIN}{NUMBER}{FAILING}")
+    course = borrow(make(f"## A\n\n{NUMBER}{FAILING}", f"## B\n\n{PLAIN}"), installed)
     assert course.main("check", "-q").out == ""
+    told = json.loads(against(course, "1.2", "--format", "json", "-q").out)
+    assert [(s["path"], s["status"]) for s in told["scripts"]] == [("examples/plain.py", "same")]
+    assert (told["engine"], told["against"], told["models"]) == (HERE, OTHER, [])
+    assert environments(course) == [OTHER], "no control was needed"
     quiet, done = against(course, "-q"), against(course)
     error = abs(9_001_000 - REAL_NUMBER) / REAL_NUMBER
     assert (quiet.status, quiet.err, done.status) == (0, "", 0)
@@ -100,44 +129,19 @@ def test_changed_outputs_are_told_number_by_number(
         done.out
         == f"""\
 changed    examples/number.py  by MuJoCo {OTHER}
-  content/lessons/1.1-one.md:22:8: recorded {REAL_NUMBER}; MuJoCo {OTHER} printed 9001000 \
+  content/lessons/1.1-one.md:12:8: recorded {REAL_NUMBER}; MuJoCo {OTHER} printed 9001000 \
 (relative error {error:.1e}, no digit agrees)
 
 fails      examples/failing.py  by MuJoCo {OTHER}
-  content/lessons/1.1-one.md:28: `examples/failing.py` exited with status 1: AttributeError: \
+  content/lessons/1.1-one.md:18: `examples/failing.py` exited with status 1: AttributeError: \
 module 'mujoco' has no attribute 'mju_isBad'
 
 same       examples/plain.py
 
-MuJoCo {OTHER} against {HERE}, Python {python()}: 3 scripts: 1 the same, \
-1 changed by MuJoCo {OTHER}, 1 failing with MuJoCo {OTHER}
+{SUM} 3 scripts: 1 the same, 1 changed by MuJoCo {OTHER}, 1 failing with MuJoCo {OTHER}
 """
     )
-    made = environments(course)
-    assert [name.rpartition("-")[0] for name in made] == [f"mujoco-{HERE}", f"mujoco-{OTHER}"]
-    # A second run installs and runs nothing but what it has to see twice.
-    again = against(course)
-    assert again.out == done.out
-    assert "installing" not in again.err
-    assert again.err.count(": ok after") == 1
-    assert environments(course) == made
-    # Nothing of it is taken for a result of this environment.
-    assert course.main("check").out.count("cached") == 4
-
-
-def python() -> str:
-    import sys
-
-    return sys.version.split()[0]
-
-
-def test_json_report_is_of_the_chosen_lessons(make: Callable[..., Folder], wheels: Path) -> None:
-    course = make(f"## A\n\n{NUMBER}", f"## B\n\n{PLAIN}")
-    done = against(course, "1.2", "--format", "json", "-q")
-    told = json.loads(done.out)
-    assert [(s["path"], s["status"]) for s in told["scripts"]] == [("examples/plain.py", "same")]
-    assert (told["engine"], told["against"], told["models"]) == (HERE, OTHER, [])
-    assert [name.split("-")[1] for name in environments(course)] == [OTHER]  # no control was needed
+    assert environments(course) == sorted((HERE, OTHER))
     told = json.loads(against(course, "--format", "json", "-q").out)
     first = told["scripts"][0]
     assert (first["status"], first["by_mujoco"], first["failure"]) == ("changed", True, None)
@@ -145,31 +149,35 @@ def test_json_report_is_of_the_chosen_lessons(make: Callable[..., Folder], wheel
     assert (change["recorded"], change["printed"]) == (str(REAL_NUMBER), "9001000")
     assert (change["path"], change["line"], change["column"]) == (course.lesson(), 12, 8)
     assert told["summary"]["changed"] == told["summary"]["same"] == 1
+    # A further run installs and runs nothing but what it has to see twice.
+    again = against(course)
+    assert again.out == done.out
+    assert "installing" not in again.err
+    assert again.err.count(": ok after") == 1
+    # Nothing of it is taken for a result of this environment.
+    assert course.main("check").out.count("cached") == 4
 
 
 def test_another_cause_than_mujoco_is_not_blamed_on_it(
-    make: Callable[..., Folder], wheels: Path
+    make: Make, wheels: Path, installed: Path
 ) -> None:
     """What depends on where MuJoCo is installed."""
     code = 'import mujoco\nprint(3.1416 - ("environments" in mujoco.__file__))'
-    course = make("## A\n\n" + block("pi.py", code, "3.1416"))
-    done = against(course, "-q")
-    assert done.out.startswith(
+    lesson = "## A\n\n" + block("pi.py", code, "3.1416")
+    course = borrow(make(lesson), installed)
+    assert against(course, "-q").out.startswith(
         f"unclear    examples/pi.py  (it does not do in a fresh environment with MuJoCo {HERE} "
         "what it does here either)\n"
         "  content/lessons/1.1-one.md:11:1: recorded 3.1416; "
     )
     (wheels / f"mujoco-{HERE}-py3-none-any.whl").unlink()
-    for folder in (course.root / ".coursebuild" / "environments").glob(f"mujoco-{HERE}-*"):
-        folder.rename(course.root / "gone")
-    done = against(course, "-q")
-    assert done.out.startswith(
+    assert against(borrow(make(lesson, name="alone"), installed, OTHER), "-q").out.startswith(
         f"unclear    examples/pi.py  (no fresh environment with MuJoCo {HERE} could be made: "
         f"pip finds no MuJoCo {HERE} for Python "
     )
 
 
-def test_scripts_that_cannot_be_compared_say_why(make: Callable[..., Folder], wheels: Path) -> None:
+def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, installed: Path) -> None:
     random = "import mujoco, os\nprint(mujoco.__version__, os.urandom(8).hex())"
     fixed = (
         f"import mujoco, os\nprint('{HERE}' if mujoco.__version__ == '{HERE}' else os.urandom(8))"
@@ -186,25 +194,23 @@ def test_scripts_that_cannot_be_compared_say_why(make: Callable[..., Folder], wh
     )
     course.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     course.write("models/broken.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
-    done = against(course, "-q")
+    done = against(borrow(course, installed), "-q")
     assert "fails      models/ball.xml:1  no longer compiles: no such element" in done.out
     assert "models/broken" not in done.out
     assert done.out.endswith("; 0 of 1 MJCF text compiles there\n")
-    lines = {line.split()[1]: line for line in done.out.splitlines() if "examples/" in line}
-    assert lines == {
-        "examples/drifted.py": "drifted    examples/drifted.py  "
-        "(what is recorded is not what it prints here)",
-        "examples/volatile.py": "uncompared examples/volatile.py  (its output is volatile)",
-        "examples/broken.py": "uncompared examples/broken.py  (it does not run to its end here)",
-        "examples/never.py": "uncompared examples/never.py  (its lesson says `norun`)",
-        "examples/needs.py": "uncompared examples/needs.py  (it needs nowhere)",
-        "examples/lottery.py": "unclear    examples/lottery.py  "
-        "(two runs of it there did not do the same)",
-        "examples/printed.py": f"changed    examples/printed.py  by MuJoCo {OTHER}",
-    }
+    lines = [line for line in done.out.splitlines() if "  (" in line or "  by" in line]
+    assert sorted(lines) == [
+        f"changed    examples/printed.py  by MuJoCo {OTHER}",
+        "drifted    examples/drifted.py  (what is recorded is not what it prints here)",
+        "unclear    examples/lottery.py  (two runs of it there did not do the same)",
+        "uncompared examples/broken.py  (it does not run to its end here)",
+        "uncompared examples/needs.py  (it needs nowhere)",
+        "uncompared examples/never.py  (its lesson says `norun`)",
+        "uncompared examples/volatile.py  (its output is volatile)",
+    ]
 
 
-def test_wrong_combinations_of_arguments_give_2(make: Callable[..., Folder]) -> None:
+def test_wrong_combinations_of_arguments_give_2(make: Make) -> None:
     course = make(f"## A\n\n{PLAIN}")
     for more, told in (
         (("--format", "sarif"), "--against cannot be combined with --format sarif"),
@@ -222,12 +228,12 @@ def test_wrong_combinations_of_arguments_give_2(make: Callable[..., Folder]) -> 
     assert done.err.startswith("coursebuild: the course cannot be read: content/course.toml:1: ")
 
 
-def test_latest_is_the_newest_that_pip_finds(make: Callable[..., Folder], wheels: Path) -> None:
-    course = make(f"## A\n\n{NUMBER}")
+def test_latest_is_the_newest_that_pip_finds(make: Make, wheels: Path, installed: Path) -> None:
+    course = borrow(make(f"## A\n\n{NUMBER}"), installed)
     assert f"changed by MuJoCo {OTHER}" in against(course, "-q", version="latest").out
     (wheels / f"mujoco-{OTHER}-py3-none-any.whl").unlink()
     done = against(course, "-q", version="latest")
-    said = f"MuJoCo {HERE} against {HERE}, Python {python()}: 0 scripts: nothing to compare\n"
+    said = SUM.replace(OTHER, HERE) + " 0 scripts: nothing to compare\n"
     assert (done.status, done.out) == (0, said)
     (wheels / f"mujoco-{HERE}-py3-none-any.whl").unlink()
     done = against(course, "-q", version="latest")
@@ -235,9 +241,7 @@ def test_latest_is_the_newest_that_pip_finds(make: Callable[..., Folder], wheels
     assert done.err.startswith("coursebuild: pip finds no MuJoCo at all for Python ")
 
 
-def test_version_that_cannot_be_installed_leaves_nothing(
-    make: Callable[..., Folder], wheels: Path
-) -> None:
+def test_version_that_cannot_be_installed_leaves_nothing(make: Make, wheels: Path) -> None:
     course = make(f"## A\n\n{PLAIN}")
     done = against(course, "-q", version="9.0.9")
     assert done.status == 1
@@ -259,32 +263,25 @@ time.sleep(60)
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_interrupted_installation_leaves_nothing(
-    make: Callable[..., Folder], wheels: Path, tmp_path: Path, number: signal.Signals
+def test_interrupted_installations_leave_nothing_and_two_commands_at_once_install_once(
+    make: Make, wheels: Path, tmp_path: Path
 ) -> None:
     mark = tmp_path / "importing"
     wheel(wheels, "9.4.0", SLOW.format(mark=str(mark)))
-    course = make(f"## A\n\n{PLAIN}")
-    with ended(course.start("check", "--against", "9.4.0", stdout=subprocess.DEVNULL)) as process:
-        until = time.monotonic() + 600
-        while not mark.exists():
-            assert process.poll() is None and time.monotonic() < until
-            time.sleep(0.02)
-        process.send_signal(number)
-        process.wait(120)
-    left = environments(course)
-    if number is not signal.SIGKILL:
-        assert left == []
-        wait_until_alone(course)
-        return
-    assert [name.startswith(".new-") for name in left] == [True]
-    assert against(course, "-q").status == 0
-    assert [name.split("-")[1] for name in environments(course)] == [OTHER]
-
-
-def test_two_commands_at_once_install_once(make: Callable[..., Folder], wheels: Path) -> None:
     course = make(f"## A\n\n{NUMBER}")
+    for number, left in ((signal.SIGINT, []), (signal.SIGKILL, [".new"])):
+        mark.unlink(missing_ok=True)
+        slow = course.start("check", "--against", "9.4.0", stdout=subprocess.DEVNULL)
+        with ended(slow) as process:
+            until = time.monotonic() + 600
+            while not mark.exists():
+                assert process.poll() is None and time.monotonic() < until
+                time.sleep(0.02)
+            process.send_signal(number)
+            process.wait(120)
+        assert environments(course) == left
+        if number is signal.SIGINT:
+            wait_until_alone(course)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with (
         ended(course.start("check", "--against", OTHER, **pipes)) as one,
@@ -294,12 +291,14 @@ def test_two_commands_at_once_install_once(make: Callable[..., Folder], wheels: 
     assert said[0][0] == said[1][0] != b""
     errors = b"".join(error for _, error in said)
     assert errors.count(b"installing MuJoCo " + OTHER.encode()) == 1
+    assert environments(course) == sorted((HERE, OTHER)), "what the killed one left is gone"
 
 
-def test_only_the_environments_used_last_stay(make: Callable[..., Folder], wheels: Path) -> None:
-    course = make(f"## A\n\n{PLAIN}")
-    versions = [f"9.5.{number}" for number in range(5)]
-    for version in versions:
-        wheel(wheels, version, "")
-        assert against(course, "-q", version=version).status == 0
-    assert [name.split("-")[1] for name in environments(course)] == versions[1:]
+def test_only_the_environments_used_last_stay(make: Make, wheels: Path, installed: Path) -> None:
+    course = borrow(make(f"## A\n\n{PLAIN}"), installed, OTHER)
+    for number in range(5):
+        old = course.root / f".coursebuild/environments/mujoco-8.{number}-x"
+        old.mkdir(parents=True)
+        os.utime(old, (number, number))
+    assert against(course, "-q").status == 0
+    assert environments(course) == ["8.2", "8.3", "8.4", OTHER]

@@ -1,17 +1,22 @@
-"""An incremental build draws only what has changed."""
+"""An incremental build draws what has changed and no more, and gives what a clean one gives."""
 
 from __future__ import annotations
 
 import os
 import pickle
 import shutil
+import tempfile
+from pathlib import Path
 
 import msgspec
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from coursebuild.core.engine.memo import sealed, unsealed
-from support.edited_course import LESSON, NORUN, QUIZ, Course, drawn
-from support.edited_course import course as course
+from support.edited_course import EDITS, LESSON, NORUN, QUIZ, WORDS, Course, Edit, drawn
+from support.live_course import differences
+from support.scratch_course import Folder
 
 pytestmark = pytest.mark.site
 
@@ -25,6 +30,21 @@ class Trap:
 
     def __reduce__(self) -> object:
         return os._exit, (70,)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """The course before any edit, with its site."""
+    folder = Folder(tmp_path_factory.mktemp("built") / "course")
+    Course(folder)
+    folder.borrow(stores)
+    assert folder.main("build", "--quiet").status == 0
+    return folder
+
+
+@pytest.fixture
+def course(built: Folder, tmp_path: Path) -> Course:
+    return Course(built.duplicate(tmp_path / "course"))
 
 
 def lesson(id: str) -> str:
@@ -135,13 +155,13 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
             assert b"Renamed" in page and b"Tested" not in page
 
 
-JUNK = {
-    "empty": b"",
-    "null": b"null",
-    "another value": b"[[1]]",
-    "a call": msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
-    "a pickle": pickle.dumps(Trap()),
-}
+JUNK = (
+    b"",
+    b"null",
+    b"[[1]]",
+    msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
+    pickle.dumps(Trap()),
+)
 
 
 def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Course) -> None:
@@ -149,7 +169,7 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
     assert course.folder.spoil() > 30
     assert build(course) == before
     folder = course.folder.root / ".coursebuild"
-    for what, junk in JUNK.items():
+    for junk in JUNK:
         kinds = set()
         for path in sorted(folder.rglob("*")):
             name = path.relative_to(folder).as_posix()
@@ -158,7 +178,7 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
                 path.write_bytes(sealed(name, junk))
                 kinds.add(kind)
         assert {"summaries", "pages", "maps", "keys"} <= kinds
-        assert build(course) == before, what
+        assert build(course) == before, junk
     for kind in ("maps", "mathml", "pages", "shared", "summaries"):
         for path in sorted((folder / kind).iterdir()):
             name = f"{kind}/{path.name}"
@@ -184,3 +204,55 @@ def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None
     course.edit("1.2", "## Last", "## First")
     course.edit("1.3", "#last", "#first")
     build(course)
+
+
+# --- any edits
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(EDITS),
+            st.sampled_from(["1.1", "1.2", "1.3", "2.1", "2.2"]),
+            st.sampled_from(WORDS),
+            st.booleans(),
+        ),
+        min_size=2,
+        max_size=7,
+    )
+)
+@settings(max_examples=5)
+def test_after_any_edits_the_site_is_that_of_a_clean_checkout(
+    built: Folder, stores: Path, edits: list[tuple[Edit, str, str, bool]]
+) -> None:
+    with tempfile.TemporaryDirectory() as scratch:
+        course = Course(built.duplicate(Path(scratch).resolve() / "edited"))
+        folder = course.folder
+        for edit, id, word, between in edits:
+            course.apply(edit, id, word)
+            if between:
+                folder.main("build", "--quiet")
+        status = folder.main("build", "--quiet").status
+        clean = Folder(folder.root.with_name("clean"))
+        clean.copy(folder.root)
+        clean.borrow(stores)
+        assert clean.main("build", "--quiet").status == status
+        if status == 0:
+            assert differences(folder.tree("public"), clean.tree("public")) == []
+
+
+def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path) -> None:
+    sites = []
+    for jobs in ("1", "3"):
+        course = Course(Folder(tmp_path / f"jobs {jobs}"))
+        for n in range(6, 22):
+            id = f"1.{n}"
+            course.ids.append(id)
+            course.titles[id] = f"Title {n}"
+            course.write(id, LESSON.format(n=n, next="1.1", script=NORUN.format(n=n)))
+        course.save()
+        course.folder.borrow(stores)
+        done = course.folder.run("build", "--quiet", "--jobs", jobs)
+        assert (done.status, done.out, done.err) == (0, "", "")
+        sites.append(course.folder.tree("public"))
+    assert differences(*sites) == []

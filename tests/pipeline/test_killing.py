@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from support.mortal_commands import Mortals, mortal_commands
-from support.scratch_course import GOOD, Folder, block, ended, wait_until_alone
+from support.scratch_course import GOOD, Folder, block
 
 pytestmark = pytest.mark.site
 
@@ -53,25 +50,51 @@ def points(calls: list[str]) -> list[int]:
     return sorted({*last.values(), calls.index("write") + 1})
 
 
-def again(template: Folder, folder: Folder) -> None:
-    """Begin as the template is."""
-    for root in (folder.root, folder.tmp):
-        shutil.rmtree(root, ignore_errors=True)
-    shutil.copytree(template.root, folder.root, symlinks=True)
-    folder.tmp.mkdir()
+class Trials:
+    """A command that dies again and again, each time in a course as the template is."""
+
+    def __init__(self, mortals: Mortals, template: Folder, place: Path, *command: str) -> None:
+        self.mortals, self.template, self.command = mortals, template, command
+        self.folder = Folder(place / "mortal")
+        self.begin()
+        status, self.calls = mortals.run(self.folder, *command)
+        assert status == 0
+        self.new = self.folder.tree()
+
+    def begin(self) -> None:
+        for root in (self.folder.root, self.folder.tmp):
+            shutil.rmtree(root, ignore_errors=True)
+        shutil.copytree(self.template.root, self.folder.root, symlinks=True)
+        self.folder.tmp.mkdir()
+
+    def deaths(self, first: str = "") -> Iterator[tuple[str, dict[str, bytes]]]:
+        """Where it died, and what that left; from the first call of a kind on."""
+        since = self.calls.index(first) if first else 0
+        for fatal in points(self.calls):
+            if fatal > since:
+                self.begin()
+                self.mortals.die(self.folder, *self.command, fatal=fatal)
+                where = f"killed before call {fatal}, {self.calls[fatal - 1]}"
+                yield where, self.folder.tree()
+
+    def run(self, *command: str) -> int:
+        """The status of a command after that, by default the same one."""
+        return self.mortals.run(self.folder, *(command or self.command))[0]
+
+    def leftovers(self) -> list[str]:
+        """What no command leaves where it got through; half an entry of the memo goes later."""
+        root = self.folder.root
+        parts = ("tmp", ".new-", ".coursebuild-new", ".coursebuild-old", "__pycache__")
+        return [
+            name
+            for name in (path.relative_to(root).as_posix() for path in root.rglob("*"))
+            if any(part in name for part in parts)
+            and (name.startswith(".coursebuild/published/") or not name.startswith(".coursebuild/"))
+        ]
 
 
-def leftovers(folder: Folder) -> list[str]:
-    """What no command leaves where it got through; half an entry of the memo goes later."""
-    everything = [path.relative_to(folder.root).as_posix() for path in folder.root.rglob("*")]
-    kept = ".coursebuild/published/"
-    parts = ("tmp", ".new-", ".coursebuild-new", ".coursebuild-old", "__pycache__")
-    return [
-        name
-        for name in everything
-        if any(part in name for part in parts)
-        and (name.startswith(kept) or not name.startswith(".coursebuild/"))
-    ]
+def part(tree: dict[str, bytes], top: str) -> dict[str, bytes]:
+    return {name: data for name, data in tree.items() if name.startswith(top)}
 
 
 @pytest.mark.parametrize("mortals", [True, False], ids=["exchange", "two renames"], indirect=True)
@@ -88,22 +111,16 @@ def test_build_killed_at_any_call_leaves_old_or_new_site(
     assert mortals.run(template, "build", "-q")[0] == 0
     old = template.tree()
     template.write(template.lesson(), NEW)
-    folder = Folder(tmp_path / "mortal")
-    again(template, folder)
-    status, calls = mortals.run(folder, "build", "-q")
-    assert status == 0
-    new = folder.tree()
+    trials = Trials(mortals, template, tmp_path, "build", "-q")
+    new, folder = trials.new, trials.folder
     changed = {path for path in {*old} ^ {*new} if not path.startswith("public/assets/search/")}
     assert changed == {
         f"{place}examples/{name}.py" for place in ("", "public/") for name in ("gone", "new")
     }
     swap = "exchange" if mortals.exchanges else "rename"
-    assert {swap, "replace", "link", "write", "unlink"} <= {*calls}
-    for number, fatal in enumerate(points(calls)):
-        again(template, folder)
-        mortals.die(folder, "build", "-q", fatal=fatal)
-        left = folder.tree()
-        where = f"killed before call {fatal}, {calls[fatal - 1]}"
+    assert {swap, "replace", "link", "write", "unlink"} <= {*trials.calls}
+    # Until the sites are swapped it makes no difference how.
+    for number, (where, left) in enumerate(trials.deaths("" if mortals.exchanges else "rename")):
         assert part(left, "content/") == part(new, "content/"), where
         site = part(left, "public/")
         if not site and not mortals.exchanges:
@@ -115,11 +132,10 @@ def test_build_killed_at_any_call_leaves_old_or_new_site(
                 assert data in (b"", old.get(name), new.get(name)) or "tmp" in name, where
         if number % 4 == 3:
             folder.replace(folder.lesson(), "# edited", "# edited again")
-            assert mortals.run(folder, "build", "-q")[0] == 0, where
+            assert trials.run() == 0, where
             folder.replace(folder.lesson(), "# edited again", "# edited")
-        assert mortals.run(folder, "build", "-q")[0] == 0, where
-        assert folder.tree() == new, where
-        assert leftovers(folder) == [], where
+        assert trials.run() == 0, where
+        assert (folder.tree(), trials.leftovers()) == (new, []), where
 
 
 @pytest.mark.parametrize("fault", ["files", pytest.param("memory", marks=pytest.mark.slow)])
@@ -134,16 +150,16 @@ def test_build_without_files_or_memory_says_so_and_leaves_old_or_new_site(
     assert mortals.run(template, "build", "-q")[0] == 0
     old = template.tree()
     template.write(template.lesson(), NEW + "$a_{24}$\n")
-    folder = Folder(tmp_path / "mortal")
-    again(template, folder)
-    status, calls = mortals.run(folder, "build", "-q", fault=fault)
-    assert status == 0
-    new = folder.tree()
+    trials = Trials(mortals, template, tmp_path, "build", "-q")
+    new, folder = trials.new, trials.folder
+    trials.begin()
+    _, calls = mortals.run(folder, "build", "-q", fault=fault)
     places = dict(zip(reversed(calls), range(len(calls), 0, -1), strict=True))
     assert len(places) > 30
     told = ("too many open files", "cannot allocate memory", "not enough memory", "new thread")
-    for where, fatal in places.items():
-        again(template, folder)
+    before: dict[str, int] = {}
+    for where, fatal in sorted(places.items(), key=lambda place: place[1]):
+        trials.begin()
         status, _ = mortals.run(folder, "build", "-q", fault=fault, fatal=fatal)
         assert status in (0, 1), where
         assert status == 0 or any(words in mortals.said.lower() for words in told), where
@@ -154,12 +170,11 @@ def test_build_without_files_or_memory_says_so_and_leaves_old_or_new_site(
         left = folder.tree()
         assert part(left, "content/") == part(new, "content/"), where
         assert part(left, "public/") in (part(old, "public/"), part(new, "public/")), where
-        assert mortals.run(folder, "build", "-q")[0] == 0, where
-        assert (folder.tree(), leftovers(folder)) == (new, []), where
-
-
-def part(tree: dict[str, bytes], top: str) -> dict[str, bytes]:
-    return {name: data for name, data in tree.items() if name.startswith(top)}
+        state = {str(p): p.lstat().st_size for p in folder.root.rglob("*") if p.is_file()}
+        if state != before:  # what goes on from the same has been tried
+            before = state
+            assert trials.run() == 0, where
+            assert (folder.tree(), trials.leftovers()) == (new, []), where
 
 
 def test_update_killed_at_any_call_leaves_old_or_new_lessons(
@@ -167,24 +182,17 @@ def test_update_killed_at_any_call_leaves_old_or_new_lessons(
 ) -> None:
     stale = "## One\n\n" + block("a.py", "print(1)", "OLD") + block("b.py", "print(2)", "OLD")
     template = make(stale, GOOD.replace("hello 3.14159\n", "OLD\n"))
-    folder = Folder(tmp_path / "mortal")
-    again(template, folder)
-    status, calls = mortals.run(folder, "update", "-q")
-    assert status == 0
-    old, new = part(template.tree(), "content/"), part(folder.tree(), "content/")
-    assert {"replace", "write", "fsync"} <= {*calls}
-    for number, fatal in enumerate(points(calls)):
-        again(template, folder)
-        mortals.die(folder, "update", "-q", fatal=fatal)
-        where = f"killed before call {fatal}, {calls[fatal - 1]}"
-        left = part(folder.tree(), "content/")
-        for name in old:
-            assert left[name] in (old[name], new[name]), where
+    assert mortals.run(template, "check", "-q")[0] == 1  # so that each script runs only once more
+    trials = Trials(mortals, template, tmp_path, "update", "-q")
+    old, new = part(template.tree(), "content/"), part(trials.new, "content/")
+    assert {"replace", "write", "fsync"} <= {*trials.calls}
+    for number, (where, left) in enumerate(trials.deaths()):
+        assert all(left[name] in (old[name], new[name]) for name in old), where
         if number % 3 == 0:  # a build clears up as well
-            mortals.run(folder, "build", "-q")
-            assert leftovers(folder) == [], where
-        assert mortals.run(folder, "update", "-q")[0] == 0, where
-        assert (part(folder.tree(), "content/"), leftovers(folder)) == (new, []), where
+            trials.run("build", "-q")
+            assert trials.leftovers() == [], where
+        assert trials.run() == 0, where
+        assert (part(trials.folder.tree(), "content/"), trials.leftovers()) == (new, []), where
 
 
 def test_rename_killed_at_any_call_changes_all_files_or_none(
@@ -192,70 +200,30 @@ def test_rename_killed_at_any_call_changes_all_files_or_none(
 ) -> None:
     """The next command puts back what had been changed."""
     template = make(OLD, "## Two\n\nSee [one](lesson:1.1).\n")
-    rename, folder = ("rename", "1.1", "1.7"), Folder(tmp_path / "mortal")
-    again(template, folder)
-    status, calls = mortals.run(folder, *rename)
-    assert status == 0
-    old, new = part(template.tree(), "content/"), part(folder.tree(), "content/")
+    assert mortals.run(template, "check", "-q")[0] == 0
+    trials = Trials(mortals, template, tmp_path, "rename", "1.1", "1.7")
+    old, new = part(template.tree(), "content/"), part(trials.new, "content/")
     assert len({*old.items()} ^ {*new.items()}) == 6  # the map, a lesson and its name, a link
-    for fatal in points(calls):
-        again(template, folder)
-        mortals.die(folder, *rename, fatal=fatal)
-        where = f"killed before call {fatal}, {calls[fatal - 1]}"
-        assert mortals.run(folder, "check", "-q")[0] == 0, where
-        left = part(folder.tree(), "content/")
+    for where, _ in trials.deaths():
+        assert trials.run("check", "-q") == 0, where
+        left = part(trials.folder.tree(), "content/")
         assert left in (old, new), where
-        assert left == new or mortals.run(folder, *rename)[0] == 0, where
-        assert (part(folder.tree(), "content/"), leftovers(folder)) == (new, []), where
+        assert left == new or trials.run() == 0, where
+        assert (part(trials.folder.tree(), "content/"), trials.leftovers()) == (new, []), where
 
 
 def test_adopting_killed_at_any_call_leaves_old_or_new_lesson(
     make: Make, mortals: Mortals, tmp_path: Path
 ) -> None:
-    template, folder = make(OLD), Folder(tmp_path / "mortal")
+    template = make(OLD)
     assert mortals.run(template, "extract", "-q")[0] == 0
-    edited = b"print(1)\r\n# by hand\r\n"
+    edited, lesson = b"print(1)\r\n# by hand\r\n", template.lesson()
     template.write("examples/kept.py", edited)
-    again(template, folder)
-    status, calls = mortals.run(folder, "extract", "--adopt", "-q")
-    assert status == 0
-    new = folder.tree()
-    lesson = folder.lesson()
+    trials = Trials(mortals, template, tmp_path, "extract", "--adopt", "-q")
+    new = trials.new
     assert b"# by hand" in new[lesson]
-    for fatal in points(calls):
-        again(template, folder)
-        mortals.die(folder, "extract", "--adopt", "-q", fatal=fatal)
-        where = f"killed before call {fatal}, {calls[fatal - 1]}"
-        left = folder.tree()
+    for where, left in trials.deaths():
         assert left[lesson] in (OLD.encode(), new[lesson]), where
         assert left[lesson] == new[lesson] or left["examples/kept.py"] == edited, where
-        assert mortals.run(folder, "extract", "--adopt", "-q")[0] == 0, where
-        assert (folder.tree(), leftovers(folder)) == (new, []), where
-
-
-@pytest.mark.parametrize("command", ["build", "update"])
-def test_command_killed_at_any_stage_leaves_lesson_and_site_whole(
-    make: Make, tmp_path: Path, command: str
-) -> None:
-    """The command as a process, with all that it started."""
-    template = make(OLD.replace("\n1\n", "\nOLD\n") if command == "update" else OLD)
-    folder = Folder(tmp_path / "mortal")
-    again(template, folder)
-    done = folder.run(command)
-    assert done.status == 0
-    stages = [line.partition(" after ")[0] for line in done.err.splitlines()]
-    assert "running scripts (2)" in stages
-    good = folder.tree()
-    for stage in stages:
-        again(template, folder)
-        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-        with ended(folder.start(command, **pipes)) as process:
-            assert process.stderr is not None
-            assert any(line.decode().startswith(stage) for line in process.stderr), stage
-            os.killpg(process.pid, signal.SIGKILL)
-        wait_until_alone(folder)
-        left, lesson = folder.tree(), folder.lesson()
-        assert left[lesson] in (template.read(lesson), good[lesson]), stage
-        assert part(left, "public/") in ({}, part(good, "public/")), stage
-        assert folder.main(command, "-q").status == 0, stage
-        assert (folder.tree(), leftovers(folder)) == (good, []), stage
+        assert trials.run() == 0, where
+        assert (trials.folder.tree(), trials.leftovers()) == (new, []), where

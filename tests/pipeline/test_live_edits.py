@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from support.edited_course import EDITS, WORDS, Course, breakage, plan, remove, retitle, turn
+from support.edited_course import EDITS, WORDS, Course, Edit, breakage, plan, remove
 from support.live_course import Builds, Live, differences
 from support.scratch_course import Folder
 
-Edit = Callable[[Course, str, str], None]
 IDS = ("1.1", "1.2", "1.3", "2.1")
 
 
@@ -26,23 +24,14 @@ class Preview:
         self.course.folder.borrow(stores)
         self.builds = Builds(where, stores)
         self.live = Live(self.course.folder)
+        self.close = self.live.close
 
     def save(self, edit: Edit, id: str, word: str) -> None:
-        folder, before = self.course.folder, self.files()
-        if (folder.root / self.course.path(id)).exists() or edit in (plan, remove, turn, retitle):
-            edit(self.course, id, word)
-            self.course.save()
-        after = self.files()
+        before = self.course.folder.tree()
+        self.course.apply(edit, id, word)
+        after = self.course.folder.tree()
         changed = {path for path in before | after if before.get(path) != after.get(path)}
         self.live.save(*sorted(changed))
-
-    def close(self) -> None:
-        self.live.close()
-
-    def files(self) -> dict[str, bytes]:
-        folder = self.course.folder
-        tops = ("content", "models")
-        return {f"{top}/{path}": data for top in tops for path, data in folder.tree(top).items()}
 
     def is_right(self) -> bool:
         """Whether there is a site; it is that of a clean build."""

@@ -1,136 +1,243 @@
-"""Recorded reports on the pages of a built site: what fits is shown, and nothing else is drawn."""
+"""Recorded reports on pages and inside of lessons: what fits is shown, what is due drawn again."""
 
 from __future__ import annotations
 
+import json
+import re
 import time
-from collections.abc import Callable
+import zipfile
+from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.run.versions import engine_version
-from coursebuild.numerics.reports.records import BENCH, STABILITY
-from coursebuild.pipeline.load import load
+from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
+from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.scenes import scene_digest
-from support.model_reports import case
+from support.edited_course import drawn
+from support.model_reports import box, case, diet, finding
 from support.preview_process import serving
-from support.recorded_course import BOX, NUMERICS, PAGE, Course
 from support.scratch_course import GOOD, Folder
 
 pytestmark = pytest.mark.site
 
+BOX = '<mujoco><include file="arm/part.xml"/></mujoco>\n'
+PART = '<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>\n'
+SCENARIOS = '[[scenario]]\nname = "swing"\n\n[[scenario]]\nname = "awkward"\n'
+LESSON = """## Speed
+
+What it costs, as [the model's page](model:box#measured-awkward) has it.
+
+```bench box
+```
+
+```bench box scenario=awkward show=stable,orders
+```
+
+- in a list
+
+  ```bench box show=table
+  ```
+"""
+PAGE, NUMERICS, SHOWING = "models/box.html", "numerics/index.html", "lessons/1.2-two.html"
+
+
+class Course:
+    """A course with a model that was measured."""
+
+    def __init__(self, folder: Folder) -> None:
+        self.folder = folder
+
+    def bench(self, name: str = "box", **other: Any) -> SceneReport:
+        course = load_course(self.folder.root)
+        model = next(one for one in course.models if one.name == name)
+        declared = next((one for one in course.declarations if one.model == name), None)
+        digest = scene_digest(self.folder.root, model, declared)
+        here = replace(box().machine, engine=engine_version())
+        return replace(box(), **{"model": name, "digest": digest, "machine": here, **other})
+
+    def record(self) -> None:
+        """Put reports into the course."""
+        self.write_bench(self.bench())
+        self.write_diet("nobody reads it")
+        self.write_cases("it swings")
+
+    def write_bench(self, report: SceneReport) -> None:
+        self.folder.write(BENCH.path(report.model), BENCH.encode(report))
+
+    def write_diet(self, message: str) -> None:
+        own = self.bench()
+        report = replace(diet(finding(message=message)), digest=own.digest, machine=own.machine)
+        self.folder.write(DIET.path("box"), DIET.encode(report))
+
+    def write_cases(self, note: str, engine: str = "") -> None:
+        machine = replace(box().machine, engine=engine or engine_version())
+        cases = (case("spring", 5, machine=machine, note=note),)
+        self.folder.write(STABILITY.path(), STABILITY.encode(cases))
+
+    def build(self) -> str:
+        """What is wrong, which has to be nothing that keeps the site from being published."""
+        done = self.folder.main("build", "-q")
+        assert done.status == 0, done.out
+        return done.out
+
+    def page(self, path: str = PAGE) -> str:
+        return self.folder.text(f"public/{path}")
+
+    def figures(self) -> list[str]:
+        """The reports that the lesson shows, without what is drawn."""
+        parts = self.page(SHOWING).split('<figure class="bench scenario">')[1:]
+        shown = (part.split("</figure>")[0] for part in parts)
+        return [re.sub(r"<svg.*?</svg>", "<svg>", part, flags=re.S) for part in shown]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """The course with its site, before any change."""
+    folder = Folder(tmp_path_factory.mktemp("measured") / "course")
+    folder.fill([GOOD, LESSON], stores)
+    folder.write("models/box.xml", BOX)
+    folder.write("models/arm/part.xml", PART)
+    folder.write("models/cup.xml", PART)
+    folder.write("models/box.toml", SCENARIOS)
+    course = Course(folder)
+    course.record()
+    assert course.build() == ""
+    return folder
+
 
 @pytest.fixture
-def course(make: Callable[..., Folder]) -> Course:
-    made = Course(make(GOOD))
-    made.record()
-    return made
+def course(built: Folder, tmp_path: Path) -> Course:
+    return Course(built.duplicate(tmp_path / "course"))
 
 
-def test_what_was_recorded_is_shown(course: Course) -> None:
-    assert course.build() == ""
-    page = course.page()
+def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built: Folder) -> None:
+    course = Course(built)
+    page, lesson = course.page(), course.page(SHOWING)
     assert 'class="work-precision"' in page and "Nobody reads it." in page
     assert "It swings." in course.page(NUMERICS)
     assert (course.folder.root / "public/files/reports/box.bench.json").is_file()
     assert "not measured" in course.page("models/cup.html").lower()
+    whole, tables, alone = course.figures()
+    assert '<a href="../models/box.html#measured-swing">box</a>: A pendulum swings' in whole
+    assert whole.count("<svg>") == 2 and '<details class="more-figures">' in whole
+    assert "RK4 at 20 ms costs 0.39 times as much" in whole
+    assert "coursebuild bench box --record" in whole and "NumPy 2.3.0" in whole
+    assert "#measured-awkward" in tables and "<svg>" not in tables and "<details" not in tables
+    assert "<svg>" not in alone and "<details" not in alone
+    assert 'aria-label="Settings: A pendulum swings"' in alone
+    pairs = re.findall(r'aria-labelledby="(_bench[^"]*)"', lesson)
+    names = {name for pair in pairs for name in pair.split()}
+    assert len(names) == 4 and all(lesson.count(f'id="{name}"') == 1 for name in names)
+    anchors = re.findall(r'id="(measured[^"]*)"', page)
+    assert anchors == ["measured", "measured-swing", "measured-awkward"]
+    assert "1.2" in page.split('id="used"')[1], "the lesson uses the model"
 
 
-def test_a_report_draws_its_page_and_no_other(course: Course) -> None:
-    assert course.drawn() > {PAGE, NUMERICS}
-    assert course.drawn() == set()
+def test_report_is_in_markdown_notebook_ebook_and_search(course: Course) -> None:
+    copy = course.page(SHOWING.replace("html", "md"))
+    assert "**[box](../models/box.md#measured-swing): A pendulum swings**" in copy
+    assert "error of" in copy and "| Euler at 2 ms |" in copy and "<svg" not in copy
+    cells = json.loads(course.page(SHOWING.replace("html", "ipynb")))["cells"]
+    assert any("| Euler at 2 ms |" in "".join(cell["source"]) for cell in cells)
+    searched = (course.folder.root / "public").rglob("*.js")
+    texts = [path.read_text("utf-8") for path in searched]
+    assert any("A pendulum swings" in text and "What it costs" in text for text in texts)
+    assert course.folder.main("export", "epub").status == 0
+    with zipfile.ZipFile(course.folder.root / "course.epub") as book:
+        texts = [book.read(n).decode() for n in book.namelist() if n.endswith(".xhtml")]
+    assert sum(text.count('class="work-precision"') for text in texts) == 1
+    assert not any("plot-wide" in text for text in texts)
+
+
+def test_another_report_draws_the_pages_that_show_it_and_no_others(course: Course) -> None:
+    assert drawn(course.folder) == set()
     course.write_diet("it is far away")
-    assert course.drawn() == {PAGE}
+    assert drawn(course.folder) == {PAGE}
     course.write_cases("it hangs")
-    assert course.drawn() == {NUMERICS}
-    slower = replace(course.bench(), card=None)
-    course.folder.write(BENCH.path("box"), BENCH.encode(slower))
-    assert course.drawn() == {PAGE}
+    assert drawn(course.folder) == {NUMERICS}
+    report = course.bench(card=None)
+    course.write_bench(report)
+    assert drawn(course.folder) == {PAGE}
+    swing, awkward = report.scenarios
+    course.write_bench(replace(report, scenarios=(swing, replace(awkward, title="Other"))))
+    assert drawn(course.folder) == {PAGE, SHOWING}
     (course.folder.root / STABILITY.path()).unlink()
-    assert course.drawn() == {"index.html", PAGE, "models/cup.html", "models/arm/part.html"}
+    assert drawn(course.folder) == {"index.html", PAGE, "models/cup.html", "models/arm/part.html"}
 
 
-def stale(course: Course) -> str:
-    told = course.build()
-    assert 'class="work-precision"' not in course.page()
-    assert "Not measured." in course.page()
-    return told
+def test_a_report_that_does_not_fit_is_told_and_not_shown(course: Course) -> None:
+    def stale() -> str:
+        told = course.build()
+        assert 'class="work-precision"' not in course.page()
+        assert "Not measured." in course.page()
+        assert 'id="measured-awkward"' in course.page(), "so that links to it hold"
+        for figure in course.figures():
+            assert "Not measured. This measures it:" in figure and "<svg>" not in figure
+            assert '<a href="../models/box.html#measured">box</a></figcaption>' in figure
+        return told
 
-
-@pytest.mark.parametrize("path", ["models/box.xml", "models/arm/part.xml"])
-def test_a_model_or_a_part_of_it_that_changed_leaves_its_reports_out(
-    course: Course, path: str
-) -> None:
-    course.build()
-    course.folder.write(
-        path, course.folder.text(path).replace("</mujoco>", "<!-- new --></mujoco>")
-    )
-    told = stale(course)
+    folder = course.folder
+    for path, old, new in (
+        ("models/box.xml", "</mujoco>", "<!-- new --></mujoco>"),
+        ("models/arm/part.xml", "</mujoco>", "<!-- new --></mujoco>"),
+        ("models/box.toml", '"swing"', '"swing"\nduration = 1'),
+    ):
+        folder.replace(path, old, new)
+        told = stale()
+        assert told.count("warning[report-stale]") == 2 and "bench-" not in told, path
+        assert "`box`, its files or its scenarios have changed since" in told
+        assert "help: make it again with `coursebuild bench box --record`" in told
+        assert "help: make it again with `coursebuild diet box --record`" in told
+        assert "It swings." in course.page(NUMERICS)
+        folder.replace(path, new, old)
+    course.write_bench(course.bench(machine=replace(box().machine, engine="3.0.0")))
+    course.write_cases("it swings", "3.0.0")
+    told = stale()
     assert told.count("warning[report-stale]") == 2
-    assert "`box`, its files or its scenarios have changed since" in told
-    assert "help: make it again with `coursebuild bench box --record`" in told
-    assert "help: make it again with `coursebuild diet box --record`" in told
-    assert "It swings." in course.page(NUMERICS)
-    course.record()
-    assert course.build() == ""
-    assert 'class="work-precision"' in course.page()
-
-
-def test_scenarios_that_changed_leave_reports_out(course: Course) -> None:
-    course.folder.write("models/box.toml", '[[scenario]]\nname = "fall"\nduration = 1\n')
-    assert "scenarios have changed since" in stale(course)
-
-
-def test_another_version_of_mujoco_leaves_reports_out(course: Course) -> None:
-    machine = replace(course.bench().machine, engine="3.0.0")
-    course.folder.write(BENCH.path("box"), BENCH.encode(course.bench(machine=machine)))
-    told = stale(course)
-    installed = engine_version()
-    assert f"it is of MuJoCo 3.0.0, and {installed} is installed" in told
-    cases = (case("spring", 5, machine=machine),)
-    course.folder.write(STABILITY.path(), STABILITY.encode(cases))
-    assert stale(course).count("warning[report-stale]") == 2
-    assert not (course.folder.root / "public" / NUMERICS).exists()
-
-
-def test_damaged_reports_keep_nothing_from_being_published(course: Course) -> None:
+    assert f"it is of MuJoCo 3.0.0, and {engine_version()} is installed" in told
+    assert not (folder.root / "public" / NUMERICS).exists()
     for path in (BENCH.path("box"), STABILITY.path()):
-        course.folder.write(path, course.folder.read(path)[:-40])
-    course.folder.write("content/reports/notes.json", "mine")
-    told = stale(course)
+        folder.write(path, folder.read(path)[:-40])
+    folder.write("content/reports/notes.json", "mine")
+    told = stale()
     assert told.count("is damaged: ") == 2
     assert "notes.json" not in told
+    (folder.root / BENCH.path("box")).unlink()
+    assert course.build().count("warning[bench-unrecorded]") == 3
 
 
-def test_the_preview_follows_a_report(course: Course) -> None:
-    def shown(path: str, text: str) -> bool:
-        until = time.monotonic() + 300
-        while text not in preview.get(path)[2].decode():
-            if time.monotonic() > until:
-                return False
-            time.sleep(0.05)
-        return True
-
+def test_the_preview_follows_reports(course: Course) -> None:
     with serving(course.folder) as preview:
-        assert shown(PAGE, "Nobody reads it.")
-        assert shown(NUMERICS, "It swings.")
+
+        def shows(path: str, text: str) -> None:
+            until = time.monotonic() + 300
+            while text not in preview.get(path)[2].decode():
+                assert time.monotonic() < until, (path, text)
+                time.sleep(0.05)
+
+        shows(SHOWING, "A pendulum swings")
         course.write_diet("it is far away")
         course.write_cases("it hangs")
-        assert shown(PAGE, "It is far away.")
-        assert shown(NUMERICS, "It hangs.")
-        course.folder.write("models/box.xml", BOX.replace("<mujoco>", "<mujoco >"))
-        assert shown(PAGE, "Not measured.")
+        report = course.bench()
+        first = replace(report.scenarios[0], title="It falls")
+        course.write_bench(replace(report, scenarios=(first, report.scenarios[1])))
+        shows(PAGE, "It is far away.")
+        shows(NUMERICS, "It hangs.")
+        shows(SHOWING, "It falls")
+        course.folder.replace("content/lessons/1.2-two.md", "=awkward", "=swing")
+        shows(SHOWING, "#measured-swing")
+        course.folder.replace("models/box.xml", "<mujoco>", "<mujoco >")
+        shows(PAGE, "Not measured.")
 
 
 def test_a_model_with_an_unusual_name(course: Course) -> None:
     name = "odd & old/it's a <cup> ü"
     course.folder.write(f"models/{name}.xml", "<mujoco/>\n")
-    found = load(course.folder.root).course
-    assert found is not None
-    model = next(one for one in found.models if one.name == name)
-    digest = scene_digest(course.folder.root, model, None)
-    report = replace(course.bench(), model=name, digest=digest)
-    course.folder.write(BENCH.path(name), BENCH.encode(report))
+    course.write_bench(course.bench(name))
     assert course.build() == ""
     page = course.page(f"models/{name}.html")
     assert "coursebuild bench &#39;odd &amp; old/it&#39;&#34;&#39;" in page

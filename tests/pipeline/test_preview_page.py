@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, expect
 
 from support.lab_page import comes
 from support.preview_page import LESSON, Open, lesson_page, see, texts
@@ -131,24 +131,20 @@ def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
     folder = make(GOOD + f"```lab\n{json.dumps(lab)}\n```\n\nAfter it.\n")
     ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
     folder.write("models/ball.xml", ball)
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, LESSON) as opened:
-            page = opened.page
-            live = page.locator(".lab-live")
-            see(live)
-            live.evaluate("element => (element.mine = true)")
-            folder.replace(folder.lesson(), "## Hello", "New before it.\n\n## Hello")
-            texts(page, "New before it.")
-            folder.replace(folder.lesson(), "After it.", "Later.")
-            texts(page, "Later.")
-            assert live.evaluate("element => element.mine")
-            folder.replace(folder.lesson(), '"A lab"', '"Another lab"')
-            expect(page.locator(".lab-title")).to_contain_text("Another lab")
-            expect(live).not_to_have_js_property("mine", True)
-            see(page.locator(".lab.lab-on .lab-live"))
-            expect(live).to_have_count(1)
-            assert page.evaluate("window.same")
+    with lesson_page(folder, browser) as page:
+        live = page.locator(".lab-live")
+        see(live)
+        live.evaluate("element => (element.mine = true)")
+        folder.replace(folder.lesson(), "## Hello", "New before it.\n\n## Hello")
+        texts(page, "New before it.")
+        folder.replace(folder.lesson(), "After it.", "Later.")
+        texts(page, "Later.")
+        expect(live).to_have_js_property("mine", True)
+        folder.replace(folder.lesson(), '"A lab"', '"Another lab"')
+        expect(page.locator(".lab-title")).to_contain_text("Another lab")
+        expect(live).not_to_have_js_property("mine", True)
+        see(page.locator(".lab.lab-on .lab-live"))
+        expect(live).to_have_count(1)
 
 
 def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None:
@@ -226,37 +222,23 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
     """From another site, and from another port of this one."""
     folder = make(GOOD + "![A](../pic.svg)\n")
     folder.write("content/pic.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
-    (tmp_path / "evil").mkdir()
-    with Host(tmp_path / "evil") as host:
-        evil = (host.url, host.url.replace("localhost", "127.0.0.1"))
-        friend = host.url.rstrip("/")
-        for arguments, framing in (([], ()), ([f"--embed={friend}"], evil[:1])):
-            with serving(folder, *arguments) as preview:
-                preview.heard("checked: ")
-                address = f"http://127.0.0.1:{preview.port}/"
-                attack = ATTACK.replace("ADDRESS", address)
-                (tmp_path / "evil/index.html").write_text(attack)
-                for url in evil:
-                    with contextlib.closing(browser.new_page()) as page:
-                        page.goto(url)
-                        can_only_link(page, address, framed=url in framing)
-
-
-def can_only_link(page: Page, address: str, *, framed: bool) -> None:
-    """And show the preview in a frame, if it may."""
-    (frame,) = page.main_frame.child_frames
-    if framed:
-        expect(frame.locator("h1").first).to_have_text("Scratch")
-    else:
-        comes(page, lambda: frame.url.startswith("chrome-error:"))
-    said = page.evaluate(STEAL, address)
-    assert set(said.values()) == {"refused"}, said
-    assert page.evaluate("window.draft") == "nothing"
-    page.get_by_role("button", name="Go").click()
-    expect(page.locator("body")).to_have_text(re.compile("of other origins"))
-    page.go_back()
-    page.get_by_role("link", name="Link").click()
-    expect(page.locator("h1").first).to_have_text("Scratch")
+    with Host(tmp_path) as host, serving(folder) as preview:
+        preview.heard("checked: ")
+        address = f"http://127.0.0.1:{preview.port}/"
+        (tmp_path / "index.html").write_text(ATTACK.replace("ADDRESS", address))
+        for url in (host.url, host.url.replace("localhost", "127.0.0.1")):
+            with contextlib.closing(browser.new_page()) as page:
+                page.goto(url)
+                (frame,) = page.main_frame.child_frames
+                comes(page, lambda frame=frame: frame.url.startswith("chrome-error:"))  # type: ignore[misc]
+                said = page.evaluate(STEAL, address)
+                assert set(said.values()) == {"refused"}, said
+                assert page.evaluate("window.draft") == "nothing"
+                page.get_by_role("button", name="Go").click()
+                expect(page.locator("body")).to_have_text(re.compile("of other origins"))
+                page.go_back()
+                page.get_by_role("link", name="Link").click()
+                expect(page.locator("h1").first).to_have_text("Scratch")
 
 
 def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> None:

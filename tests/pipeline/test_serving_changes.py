@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from support.preview_process import PATIENT, Preview, serving, wait_for
+from support.preview_process import PATIENT, serving, wait_for
 from support.scratch_course import GOOD, SILENT, Folder, block, ended, wait_until_alone
 
 Make = Callable[..., Folder]
@@ -27,8 +27,7 @@ def test_page_is_told_of_every_save(make: Make) -> None:
             return text in preview.get(page)[2]
 
         folder.replace(folder.lesson(), "## Hello\n", "## Hello again\n")
-        state = events.state
-        events.until(lambda told: told.state != state)
+        events.changed()
         assert shows(b"Hello again")
         folder.replace(folder.lesson(), "3.14159\n```", "3.14158\n```")
         events.settled("output-drift")
@@ -42,27 +41,16 @@ def test_page_is_told_of_every_save(make: Make) -> None:
         folder.write(folder.lesson(), GOOD)
         events.settled()
         assert shows(b"Hello") and not shows(b"Hello again")
-        # As editors save: a new file takes the place of the old one.
-        fresh = folder.root / "content/lessons/.1.1-one.md.swp"
-        fresh.write_text(folder.text(folder.lesson()) + "By another file.\n")
-        fresh.replace(folder.root / folder.lesson())
-        state = events.state
-        events.until(lambda told: told.state != state)
-        assert shows(b"By another file.")
         # A folder that was not there when the preview began.
-        folder.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
-        with preview.events("models/ball.html") as model:
-            model.until(lambda told: told.state != "")
-            folder.write("models/ball.xml", "<mujoco><nosuch/></mujoco>")
-            events.settled("model-error")
-            (folder.root / "models/ball.xml").unlink()
-            events.settled()
-            model.until(lambda told: told.state == "")
+        folder.write("models/ball.xml", "<mujoco><nosuch/></mujoco>")
+        events.settled("model-error")
+        (folder.root / "models/ball.xml").unlink()
+        events.settled()
         # The map is gone, and back.
         map_ = folder.read("content/course.toml")
         (folder.root / "content/course.toml").unlink()
         events.until(lambda told: "map-missing" in told.rules())
-        assert shows(b"By another file.")
+        assert shows(b"Hello")
         folder.write("content/course.toml", map_)
         events.settled()
 
@@ -133,9 +121,9 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
         events.settled()
         for save in SAVES:
             name = save.__name__
-            state, before = events.state, len(preview.said)
+            before = len(preview.said)
             save(folder.root / folder.lesson(), GOOD.replace("## Hello", f"## {name}"))
-            events.until(lambda told, state=state: told.state != state)  # type: ignore[misc]
+            events.changed()
             assert name.encode() in preview.get("/lessons/1.1-one.html")[2], name
             events.settled()
             told = [line for line in preview.said[before:] if not line.startswith("checked")]
@@ -145,8 +133,7 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
             (folder.root / path).unlink()
         for number in range(1, 7):
             folder.write(folder.lesson(number), "## Two\n")
-        state = events.state
-        events.until(lambda told: told.state != state)
+        events.changed()
         for page in ("1.1-one", "1.6-six"):
             assert b"Two" in preview.get(f"/lessons/{page}.html")[2]
         events.settled()
@@ -156,89 +143,55 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
 
 def test_pages_elsewhere_two_browsers_and_what_is_not_of_the_course(make: Make) -> None:
     folder = make(GOOD, "## Two\n")
-    entries = "".join(
-        f'[[page]]\nid = "{id}"\ntitle = "Page"\nfile = "{path}"\n'
-        for id, path in (("guide", "docs/guide.md"), ("readme", "README.md"))
-    )
-    folder.write("content/course.toml", folder.text("content/course.toml") + entries)
-    folder.write("docs/guide.md", "One.\n")
+    entry = '[[page]]\nid = "readme"\ntitle = "Page"\nfile = "README.md"\n'
+    folder.write("content/course.toml", folder.text("content/course.toml") + entry)
     folder.write("README.md", "One.\n")
     with serving(folder) as preview:
-        preview.heard("checked: ")
-        pages_outside_content_are_watched(folder, preview)
-        browsers_are_told_alike(folder, preview)
-        files_of_others_are_no_change(folder, preview)
-
-
-def pages_outside_content_are_watched(folder: Folder, preview: Preview) -> None:
-    for page, path in (("guide.html", "docs/guide.md"), ("readme.html", "README.md")):
-        with preview.events(page) as events:
+        with preview.events("readme.html") as events:  # a file outside of `content/`
             events.settled()
-            folder.write(path, "Two.\n")
-            state = events.state
-            events.until(lambda told, state=state: told.state != state)  # type: ignore[misc]
-            assert b"Two." in preview.get(f"/{page}")[2]
+            folder.write("README.md", "Two.\n")
+            events.changed()
+            assert b"Two." in preview.get("/readme.html")[2]
+        with preview.events() as one, preview.events() as two:
+            one.settled()
+            two.settled()
+            assert (old := one.state) == two.state
+            folder.replace(folder.lesson(), "## Hello", "## Both")
+            assert one.changed().state == two.changed().state
+        folder.replace(folder.lesson(), "## Both", "## Later")
+        with preview.events("lessons/1.2-two.html") as other:
+            other.settled()
+            assert other.pages == 1  # nothing of its own changed
+        with preview.events() as back:
+            assert back.until(lambda told: bool(told.state)).state not in (old, one.state)
+            back.settled()
+        before = len(preview.said)
+        for path in ("notes.txt", "examples/mine.txt", "content/lessons/4913"):
+            folder.write(path, "of no account")
+        for name in (".1.1-one.md.swp", "1.1-one.md~", "#1.1-one.md#"):
+            folder.write(f"content/lessons/{name}", "an editor's")
+        folder.write("content/public/pic.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>")
+        preview.heard("changed: content/public", before)
+        assert len([one for one in preview.said[before:] if one.startswith("changed: ")]) == 1
 
 
-def browsers_are_told_alike(folder: Folder, preview: Preview) -> None:
-    with preview.events() as one, preview.events() as two:
-        one.settled()
-        two.settled()
-        assert one.state == two.state
-        old = one.state
-        folder.replace(folder.lesson(), "## Hello", "## Both")
-        assert one.until(lambda told: told.state != old).state == (
-            two.until(lambda told: told.state != old).state
-        )
-    folder.replace(folder.lesson(), "## Both", "## Later")
-    with preview.events("lessons/1.2-two.html") as other:
-        other.settled()
-        assert other.pages == 1  # nothing of its own changed
-    with preview.events() as back:
-        assert back.until(lambda told: bool(told.state)).state not in (old, one.state)
-        back.settled()
-
-
-def files_of_others_are_no_change(folder: Folder, preview: Preview) -> None:
-    before = len(preview.said)
-    folder.write("notes.txt", "elsewhere")
-    folder.write("examples/mine.txt", "derived")
-    folder.write("content/lessons/.1.1-one.md.swp", "an editor's")
-    folder.write("content/lessons/1.1-one.md~", "an editor's")
-    folder.write("content/lessons/#1.1-one.md#", "an editor's")
-    folder.write("content/lessons/4913", "an editor's")
-    folder.write("content/public/pic.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>")
-    preview.heard("changed: content/public", before)
-    assert len([line for line in preview.said[before:] if line.startswith("changed: ")]) == 1
-
-
-def test_save_during_the_first_runs_is_not_missed(make: Make) -> None:
-    slow = "import time, pathlib\npathlib.Path('begun').touch()\n"
-    slow += "while not pathlib.Path('go').exists(): time.sleep(0.01)\nprint(1)"
-    folder = make("## First\n\n" + block("x.py", slow, "1"))
-    with serving(folder) as preview, preview.events() as events:
-        wait_for(folder.root / "begun")
-        assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
-            {"path": "examples/x.py", "state": "running"}
-        ]
-        folder.replace(folder.lesson(), "## First", "## Second")
-        events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
-        folder.write("go", "")
-        events.settled("script-writes")
-        assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
-
-
-def test_script_that_was_changed_is_not_waited_for(make: Make) -> None:
+def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_for(
+    make: Make,
+) -> None:
     begun = "import pathlib, time\nopen('begun', 'a').write('x')\n"
     waits = "while not pathlib.Path('go').exists(): time.sleep(0.01)\n"
     folder = make("## First\n\n" + block("x.py", f"{begun}{waits}print(1)", "1"))
     with serving(folder) as preview, preview.events() as events:
         wait_for(folder.root / "begun")
+        assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
+            {"path": "examples/x.py", "state": "running"}
+        ]
         # It goes on while something else is saved.
         folder.replace(folder.lesson(), "## First", "## Second")
         events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
         folder.write("go", "")
         events.settled("script-writes")
+        assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
         assert folder.read("begun") == b"x"
         (folder.root / "go").unlink()
         folder.replace(folder.lesson(), "print(1)", "print(int(1))")
@@ -251,15 +204,15 @@ def test_script_that_was_changed_is_not_waited_for(make: Make) -> None:
 
 
 def test_what_a_script_prints_is_shown_while_others_run(make: Make) -> None:
-    reads = "print(open('models/ball.xml').read().count('geom'))"
+    reads = "print(open('models/data.txt').read())"
     waits = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)\n"
     folder = make("## A\n\n" + block("a.py", reads, "1") + block("b.py", waits + reads, "1"))
-    folder.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    folder.write("models/data.txt", "1")
     folder.write("go", "")
     with serving(folder, "--jobs", "2") as preview, preview.events() as events:
         events.settled()
         (folder.root / "go").unlink()
-        folder.replace("models/ball.xml", "<geom size='1'/>", "<geom size='1'/><geom size='2'/>")
+        folder.write("models/data.txt", "2")
         events.until(lambda told: told.news["outputs"][0]["state"] == "drift")
         assert events.news["outputs"][1]["state"] == "verified"  # as far as is known
         folder.write("go", "")
@@ -319,16 +272,13 @@ def test_preview_that_is_interrupted_ends_cleanly(make: Make) -> None:
         assert any(line.startswith(serving_) for line in process.stderr)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_scripts_end_with_the_preview(make: Make, number: int) -> None:
+def test_scripts_end_with_a_preview_that_is_killed(make: Make) -> None:
     slow = "import time, pathlib\npathlib.Path('begun').touch()\nwhile True: time.sleep(60)"
     folder = make("## One\n\n" + block("x.py", slow))
     with serving(folder) as preview:
         wait_for(folder.root / "begun")
-        preview.process.send_signal(number)
-        status = preview.process.wait(600)
-        assert status == (-number if number == signal.SIGKILL else 143)
-    wait_until_alone(folder)
+        preview.process.kill()
+        assert preview.process.wait(600) == -signal.SIGKILL
 
 
 def test_preview_that_is_ended_while_the_course_is_read_ends_cleanly(make: Make) -> None:

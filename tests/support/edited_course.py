@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from pathlib import Path
-
-import pytest
 
 from coursebuild.pipeline.build import prepare
-from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from support.scratch_course import Folder, block
 
@@ -72,6 +68,12 @@ class Course:
         text = self.folder.text(self.path(id))
         self.write(id, text.replace(old, new, 1))
 
+    def apply(self, edit: Edit, id: str, word: str) -> None:
+        """An edit of a lesson, which may not be there."""
+        if (self.folder.root / self.path(id)).exists() or edit in (plan, remove, turn, retitle):
+            edit(self, id, word)
+            self.save()
+
     def save(self) -> None:
         """Write the map."""
         parts = [HEAD, self.extra]
@@ -87,25 +89,12 @@ class Course:
         self.folder.write("content/course.toml", "\n".join(parts))
 
 
-def options(folder: Folder) -> Options:
-    return Options(folder.root.resolve(), 1, True)
-
-
 def drawn(folder: Folder) -> set[str]:
-    """The pages that a build draws anew, in words of their own."""
-    with prepare(options(folder), Progress(quiet=True)) as (report, site):
+    """The pages that a build draws anew."""
+    with prepare(folder.options(), Progress(quiet=True)) as (report, site):
         assert site is not None, report.diagnostics
         assert len(set(site.drawn)) == len(site.drawn)
         return set(site.drawn)
-
-
-@pytest.fixture
-def course(tmp_path: Path, stores: Path) -> Course:
-    folder = Folder(tmp_path / "course")
-    made = Course(folder)
-    folder.borrow(stores)
-    drawn(folder)
-    return made
 
 
 QUIZ = """```quiz
@@ -212,7 +201,8 @@ def run(course: Course, id: str, text: str) -> None:
         course.edit(id, "> [!note]", block(name, "print(17)", "17", "digits") + "> [!note]")
 
 
-EDITS: list[Callable[[Course, str, str], None]] = [
+Edit = Callable[[Course, str, str], None]
+EDITS: list[Edit] = [
     *(prose, heading, script, run, term, label, ask, model, page, picture),
     *(retitle, plan, remove, turn, breakage),
 ]

@@ -16,6 +16,7 @@ there are no names where it died. The name of a call that may fail tells where i
 from __future__ import annotations
 
 import errno
+import importlib
 import json
 import os
 import sys
@@ -27,10 +28,23 @@ from typing import Any
 import coursebuild
 from coursebuild.cli import main
 from coursebuild.core.engine import publish as publishing
+from coursebuild.core.registry import features
 
 BY_PATH = ("open", "rename", "replace", "link", "unlink", "rmdir", "mkdir")
 BY_FD = ("write", "fsync", "ftruncate", "fchmod")
 DIED = 137
+READY = (
+    "argparse",
+    "coursebuild.pipeline.site",
+    "coursebuild.pipeline.update",
+    "coursebuild.pipeline.extract",
+    "coursebuild.core.syntax.document",
+    "coursebuild.core.pages.draw",
+    "coursebuild.core.pages.lesson",
+    "coursebuild.core.pages.pages",
+    "coursebuild.features.authoring.commands.rename",
+)
+"""Modules that children need not import, each for itself."""
 TOOL = str(Path(coursebuild.__file__).parent)
 OPENING = frozenset({"open", "os.scandir", "os.listdir", "socket.__new__", "os.pipe"})
 STARTING = frozenset({"os.fork", "os.posix_spawn", "subprocess.Popen"})
@@ -131,6 +145,9 @@ class Fault(Doom):
 
 
 def serve() -> None:
+    for name in READY:
+        importlib.import_module(name)
+    features()
     for line in sys.stdin:
         request = json.loads(line)
         read, write = os.pipe()

@@ -141,6 +141,11 @@ class Events:
                     raise AssertionError(name)
         return self
 
+    def changed(self) -> Events:
+        """The page is another than it was."""
+        before = self.state
+        return self.until(lambda told: told.state != before)
+
     def rules(self) -> list[str]:
         return [problem["rule"] for problem in self.news["problems"]]
 

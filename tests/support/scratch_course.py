@@ -78,6 +78,12 @@ class Folder:
             elif (course / name).is_file():
                 shutil.copy(course / name, self.root / name)
 
+    def duplicate(self, root: Path) -> Folder:
+        """The same course elsewhere, with all that is kept of it."""
+        made = Folder(Path(shutil.copytree(self.root, root, symlinks=True)))
+        made.tmp.mkdir()
+        return made
+
     @property
     def tmp(self) -> Path:
         """Where the tool and all it starts put temporary files; by it they are found."""
