@@ -59,14 +59,13 @@ def _forget_stdout() -> None:
 
 def print_report(report: Report, form: str, options: Options) -> int:
     """Write a report in one of its formats; gives the status that says whether all is well."""
-    from coursebuild.report import FORMATS, render_report
+    from coursebuild.report import render_report
 
     status = CLEAN if report.ok else WRONG
     options.store.close()
     if form == "text":
         return write(report_text(report, options), status)
-    chosen = next(known for known in FORMATS if known == form)
-    return write(render_report(report, chosen, style_of(sys.stdout)), status)
+    return write(render_report(report, form, style_of(sys.stdout)), status)
 
 
 def report_text(report: Report, options: Options) -> str:

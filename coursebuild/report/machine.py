@@ -1,6 +1,6 @@
 """Reports for machines: JSON, JUnit XML, SARIF 2.1.0, and the lines that CI services read.
 
-Entry points: `to_json`, `to_junit`, `to_sarif`, `to_annotations`.
+Entry points: `FORMATS`; `to_json`, `to_junit`, `to_sarif`, `to_annotations`.
 """
 
 from __future__ import annotations
@@ -188,3 +188,6 @@ def _property(text: str) -> str:
 
 def _data(text: str) -> str:
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+FORMATS = {"json": to_json, "junit": to_junit, "sarif": to_sarif, "github": to_annotations}

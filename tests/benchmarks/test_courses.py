@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import filecmp
 import re
 import sys
 from pathlib import Path
@@ -13,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.courses import FLAVORS, names_of, write_course  # noqa: E402
-from benchmarks.measure.building import COLD, make_site, remove  # noqa: E402
-from benchmarks.measure.report import BEGIN, END, Figure, Report, markdown, put_into  # noqa: E402
+from benchmarks.measure.building import make_site, remove  # noqa: E402
+from benchmarks.measure.report import BEGIN, END, put_into  # noqa: E402
 from benchmarks.measure.tools import Places, all_tools  # noqa: E402
 from support.scratch_course import Folder  # noqa: E402
 
@@ -56,15 +55,6 @@ def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
         for name in ("one", "two"):
             write_course(tmp_path / name / flavor, 3, flavor)
     assert files(tmp_path / "one") == files(tmp_path / "two")
-
-
-def test_a_lesson_does_not_depend_on_how_many_there_are(course: Path, tmp_path: Path) -> None:
-    """But for the links to neighbours, which the last ones do not have."""
-    folder = tmp_path / "longer"
-    write_course(folder, 24)
-    for name in names_of(8):
-        path = f"content/lessons/{name}.md"
-        assert filecmp.cmp(course / path, folder / path, shallow=False)
 
 
 def test_lessons_are_as_large_as_the_benchmark_says(course: Path) -> None:
@@ -124,18 +114,6 @@ def test_tables_are_put_between_the_markers(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="does not have the markers"):
         put_into(page, "new")
     assert page.read_text() == "no markers"
-
-
-def test_ratios_are_to_coursebuild() -> None:
-    facts = dict.fromkeys(("date", "processor", "cores", "memory", "system", "python"), "x")
-    figures = [
-        Figure(COLD, 80, "coursebuild", [0.9, 5.0, 0.8]),
-        Figure(COLD, 80, "another", [1.8, 1.7, 9.9]),
-    ]
-    text = markdown(Report(facts, [], ["a third"], figures))
-    assert "| coursebuild | 0.900 |" in text
-    assert "| another | 1.80 (2.0 ×) |" in text
-    assert "not measured: a third." in text
 
 
 def test_a_cold_build_finds_nothing_but_the_results_of_scripts(tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ import shutil
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pytest
 
@@ -98,18 +97,6 @@ def test_the_small_course_is_clean(course: Path, capsys: pytest.CaptureFixture[s
     assert [script["path"] for script in report["scripts"]] == ["examples/pendulum.py"]
 
 
-def test_an_empty_recorded_output_is_filled_in(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    lesson = course / "content/lessons/1.1-pendulum.md"
-    whole = lesson.read_text(encoding="utf-8")
-    emptied = re.sub(r"(?<=Output:\n\n```text\n)[^`]+(?=```)", "", whole)
-    assert emptied != whole
-    lesson.write_text(emptied, encoding="utf-8")
-    assert main(["-C", str(course), "update"]) == 0
-    assert lesson.read_text(encoding="utf-8") == whole
-
-
 @pytest.mark.parametrize("fence", MAPS, ids=str)
 def test_map(fence: Fence, course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (course / "content/course.toml").write_text(fence.text, encoding="utf-8")
@@ -166,49 +153,6 @@ def test_what_is_said_about_drifts(course: Path, capsys: pytest.CaptureFixture[s
     assert "binding-mismatch" in capsys.readouterr().out
     mended = lesson.text.replace("period 1.4291", "period 1.4219")
     assert (course / SECOND).read_text(encoding="utf-8") == mended
-
-
-def test_an_edited_example_comes_back_into_its_lesson(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["-C", str(course), "extract"]) == 0
-    script = course / "examples/pendulum.py"
-    script.write_text(script.read_text().replace("import math\n", "import math  # edited\n"))
-    assert [d["rule"] for d in check(course, capsys)["diagnostics"]][:1] == ["example-edited"]
-    assert main(["-C", str(course), "extract", "--adopt"]) == 0
-    assert "import math  # edited\n" in (course / "content/lessons/1.1-pendulum.md").read_text()
-    assert check(course, capsys)["diagnostics"] == []
-
-
-def test_exit_status_is_that_of_the_guide(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (course / "mine").mkdir()
-    (course / "mine/thesis.txt").write_text("years of work")
-    wanted = {
-        "check 1.1": 0,
-        "check pendulum": 0,
-        "check content/lessons/1.1-pendulum.md": 0,
-        "check 1.3": 2,
-        "build --out content": 2,
-        "build --out mine": 2,
-    }
-    found = {line: main(["-C", str(course), *line.split()]) for line in wanted}
-    assert found == wanted, capsys.readouterr().out
-
-
-def test_reports_for_machines(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with_second_lesson(course, "## One mistake\n\n[a](lesson:7.7)\n")
-    told = {}
-    for form in ("json", "junit", "sarif", "github"):
-        assert main(["-C", str(course), "check", "--quiet", "--format", form]) == 1
-        told[form] = capsys.readouterr().out
-    (found,) = json.loads(told["json"])["diagnostics"]
-    place = ("path", "line", "column", "end_line", "end_column")
-    assert {"rule", "severity", *place, "message", "label", "help", "notes"} <= found.keys()
-    assert (found["line"], found["column"]) == (3, 5)
-    cases = [case.get("name") for case in ElementTree.fromstring(told["junit"]).iter("testcase")]
-    assert cases == ["examples/pendulum.py", SECOND]
-    assert json.loads(told["sarif"])["version"] == "2.1.0"
-    assert told["github"].startswith(f"::error file={SECOND},line=3,")
 
 
 # ------------------------------------------------------------------------ nothing is left out

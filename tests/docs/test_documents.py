@@ -57,16 +57,6 @@ def test_the_course_of_the_readme_builds_by_its_commands(course: Folder) -> None
 
 
 @pytest.mark.site
-def test_update_fills_the_empty_fence(course: Folder) -> None:
-    whole = course.text(LESSON)
-    printed = re.search(r"(?<=```text digits\n).*\n(?=```)", whole)
-    assert printed is not None
-    course.write(LESSON, whole.replace(printed[0], ""))
-    assert course.main("update").status == 0
-    assert course.text(LESSON) == whole
-
-
-@pytest.mark.site
 def test_the_mistake_of_the_readme(course: Folder) -> None:
     """`drift=` says which digits somebody put in the place of the printed ones."""
     (message,) = (fence for fence in FENCES if fence.value("drift"))
@@ -145,24 +135,15 @@ def test_the_picture_is_there_and_small() -> None:
     assert 20_000 < len(data) < PICTURE_LIMIT
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_the_picture_can_be_taken_again(built_courses: BuiltCourses, tmp_path: Path) -> None:
-    done = screenshots(built_courses.real().root / "public", tmp_path)
+    site = built_courses.real().root / "public"
+    script = [sys.executable, DOCS / "screenshots.py", "--site", site, "--images", tmp_path]
+    done = subprocess.run(script, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     taken = {path.name for path in tmp_path.glob("*.png")}
     assert taken == {path.name for path in (DOCS / "images").glob("*.png")}
-
-
-@pytest.mark.site
-def test_a_picture_of_a_site_that_is_not_there(tmp_path: Path) -> None:
-    done = screenshots(tmp_path, tmp_path)
-    assert done.returncode == 1
-    assert "run `make site` first" in done.stderr
-
-
-def screenshots(site: Path, images: Path) -> subprocess.CompletedProcess[str]:
-    script = [sys.executable, str(DOCS / "screenshots.py"), "--site", str(site)]
-    return subprocess.run([*script, "--images", str(images)], capture_output=True, text=True)
 
 
 # ------------------------------------------------------------------------------- architecture

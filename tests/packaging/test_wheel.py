@@ -50,39 +50,27 @@ def below(folder: Path, pattern: str = "*") -> set[str]:
     return {p.relative_to(folder).as_posix() for p in paths if "__pycache__" not in p.parts}
 
 
-def test_wheel_holds_the_packages_and_nothing_beside_them(
-    root: Path, names: list[str], full_name: str
+def test_wheel_holds_packages_templates_and_scripts_and_nothing_beside_them(
+    root: Path, archive: zipfile.ZipFile, names: list[str], full_name: str
 ) -> None:
     code = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in below(root / part)}
-    code |= {f"coursebuild/templates/{p}" for p in below(root / "templates")}
-    assert {name for name in names if name.endswith((".py", "/py.typed"))} == {
-        name for name in code if name.endswith((".py", "/py.typed"))
-    }
+    templates = {f"coursebuild/templates/{path}" for path in below(root / "templates")}
+    assert {name for name in names if name.startswith("coursebuild/templates/")} == templates
+    ends = (".py", "/py.typed")
+    there = {name for name in names if name.endswith(ends)}
+    assert there == {name for name in code | templates if name.endswith(ends)}
+    scripts = {p.name for p in (root / "site/js").glob("*.js") if not p.name.endswith(".test.js")}
+    assert {n.rsplit("/", 1)[1] for n in names if n.startswith("coursebuild/assets/js/")} == scripts
+    assert {
+        f"coursebuild/core/run/{p.name}" for p in (root / "coursebuild/core/run").glob("*.js")
+    } <= {*names}
+    style = archive.read("coursebuild/assets/css/site.css").decode()
+    assert "{" in style and "@import" not in style
     tops = {name.split("/")[0] for name in names}
     assert tops == {"coursebuild", "mjcourse", f"{full_name}.dist-info"}
     assert len(names) == len(set(names))
     strays = re.compile(r"node_modules|\.pyc$|stamp\.json|package(-lock)?\.json|\.mjs$|/\.")
     assert [name for name in names if strays.search(name)] == []
-
-
-def test_wheel_holds_every_template(root: Path, names: list[str]) -> None:
-    prefix = "coursebuild/templates/"
-    there = {name.removeprefix(prefix) for name in names if name.startswith(prefix)}
-    assert there == below(root / "templates")
-    assert there
-
-
-def test_wheel_holds_every_script_and_the_style(
-    root: Path, archive: zipfile.ZipFile, names: list[str]
-) -> None:
-    scripts = {path.name for path in (root / "site" / "js").glob("*.js")}
-    tests = {name for name in scripts if name.endswith(".test.js")}
-    there = {n.rsplit("/", 1)[1] for n in names if n.startswith("coursebuild/assets/js/")}
-    assert there == scripts - tests
-    assert there
-    style = archive.read("coursebuild/assets/css/site.css").decode()
-    assert "{" in style
-    assert "@import" not in style
 
 
 def test_fonts_are_what_their_list_says(archive: zipfile.ZipFile, names: list[str]) -> None:
@@ -215,8 +203,3 @@ def test_archives_bundled_anew_in_another_folder_are_the_same(
     elsewhere = copy_project(tmp_path / "a" / "b c", bundled=False)
     assert build(elsewhere, "wheel").read_bytes() == wheel.read_bytes()
     assert build(elsewhere, "sdist").read_bytes() == sdist.read_bytes()
-
-
-def test_wheel_holds_the_scripts_of_the_engines(root: Path, archive: zipfile.ZipFile) -> None:
-    for path in (root / "coursebuild" / "core" / "run").glob("*.js"):
-        assert archive.read(f"coursebuild/core/run/{path.name}") == path.read_bytes()

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Callable
 
 import pytest
 
 from support.preview_process import Events, serving
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, Make, block
 
-Make = Callable[..., Folder]
 pytestmark = pytest.mark.site
 
 
@@ -64,28 +62,6 @@ def test_output_is_accepted(make: Make) -> None:
         assert folder.read(folder.lesson()) == before.replace(b"hello 3\r", b"hello 3.14159\r")
         events.settled()
         assert events.news["outputs"][0]["state"] == "verified"
-
-
-def test_figure_and_its_data_are_accepted(make: Make) -> None:
-    code = """with open("a.csv", "w") as file:
-    file.write("x\\n1\\n")
-with open("a.svg", "w") as file:
-    file.write('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"/>')
-"""
-    drawn = block("a.py", code, info="figure=a.svg,a.csv")
-    folder = make(f"## A\n\n{drawn}Figure: ![A](a.svg)\n")
-    with serving(folder) as preview, preview.events() as events:
-        events.until(lambda told: len(told.news["figures"]) == 2)
-        drawing, data = events.news["figures"]
-        assert (drawing["name"], drawing["differs"]) == ("a.svg", "nothing is recorded yet")
-        assert drawing["drawn"].startswith("data:image/svg+xml;base64,")
-        assert data["name"] == "a.csv"
-        for offered in (drawing, data):
-            assert preview.accept_offer(offered["offer"]) == (200, {"message": ""})
-        events.settled()
-        assert events.news["figures"] == []
-    assert folder.text("content/lessons/a.csv") == "x\n1\n"
-    assert folder.run("check").status == 0
 
 
 def test_what_changed_since_is_not_written(make: Make) -> None:

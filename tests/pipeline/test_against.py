@@ -9,17 +9,14 @@ import signal
 import subprocess
 import time
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from coursebuild.core.run.versions import engine_version
-from support.scratch_course import Done, Folder, block, ended, wait_until_alone
+from support.scratch_course import Done, Folder, Make, block, ended, wait_until_alone
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 HERE = engine_version()
 OTHER = "9.1.0"

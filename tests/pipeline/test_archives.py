@@ -5,14 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from support.scratch_course import Folder, block
+from support.scratch_course import Make, block
 
-Make = Callable[..., Folder]
 pytestmark = pytest.mark.site
 
 CODE = """from mjcourse import OWN

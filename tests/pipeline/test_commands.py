@@ -7,18 +7,25 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from coursebuild import __version__
 from coursebuild.cli.commands import known_commands
-from support.scratch_course import FIRST, GOOD, ROOT, SECOND, Done, Folder, block, without_seconds
+from support.scratch_course import (
+    FIRST,
+    GOOD,
+    ROOT,
+    SECOND,
+    Done,
+    Folder,
+    Make,
+    block,
+    without_seconds,
+)
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 COMMANDS = ("build", "check", "update", "extract")
 MAP = "content/course.toml"
 ONE_RAN = "ok       examples/one.py  # s\n\n1 lesson, 1 script run: everything holds\n"

@@ -5,16 +5,13 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from support.scratch_course import FIRST, SECOND, Folder
+from support.scratch_course import FIRST, SECOND, Folder, Make
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 
 @pytest.fixture

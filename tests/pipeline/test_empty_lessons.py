@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
-from support.scratch_course import GOOD, Folder
+from support.scratch_course import GOOD, Make
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 
 def test_what_counts_as_something_to_read(make: Make) -> None:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from support.scratch_course import GOOD, Folder
+from support.scratch_course import GOOD, Folder, Make
 
 pytestmark = pytest.mark.engine
-
-Make = Callable[..., Folder]
 
 BALL = """<mujoco><include file="part.xml"/><worldbody>
 <body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"""
@@ -52,18 +49,23 @@ def tried(folder: Folder, *arguments: str) -> list[str]:
     return [lab["name"] for lab in json.loads(done.out)["labs"] if not lab["cached"]]
 
 
-def test_explain_labs_of_a_lesson_before_and_after_trials(course: Folder) -> None:
+def test_explain_says_which_labs_would_be_tried_and_why(course: Folder) -> None:
+    unknown = "  because there is no result of it on this machine\n"
     assert explained(course, "1.1") == (
         "content/lessons/1.1-one.md: 1 script and 2 labs, of which 3 would run\n\n"
-        "examples/hello.py would run\n"
-        "  because there is no result of it on this machine\n\n"
-        "1.1-lab-1 would be tried\n"
-        "  because there is no result of it on this machine\n\n"
-        "1.1-lab-2 would be tried\n"
-        "  because there is no result of it on this machine\n"
+        f"examples/hello.py would run\n{unknown}\n"
+        f"1.1-lab-1 would be tried\n{unknown}\n"
+        f"1.1-lab-2 would be tried\n{unknown}"
+    )
+    assert explained(course, "1.1-lab-2") == (
+        f"1.1-lab-2 would be tried\n{unknown}  of 1.1, not run yet on this machine\n"
+    )
+    assert course.main("explain", "1.1-lap-2").err == (
+        "coursebuild: nothing of this course is called `1.1-lap-2`; did you mean `1.1-lab-2`?\n"
     )
     assert tried(course) == ["1.1-lab-1", "1.1-lab-2"]
     assert "1 script and 2 labs, of which none would run\n" in explained(course, "1.1")
+    assert explained(course, "1.1-lab-2").startswith("1.1-lab-2 is remembered\n")
     assert tried(course) == []
     # A part of both models: the second lab's stands in the lesson.
     course.write("models/part.xml", PART.replace("0.01", "0.02"))
@@ -79,45 +81,24 @@ def test_explain_labs_of_a_lesson_before_and_after_trials(course: Folder) -> Non
     assert tried(course) == ["1.1-lab-1", "1.1-lab-2"]
     course.write("models/part.xml", PART)
     assert tried(course) == [], "this was so before"
-
-
-def test_explain_lab_by_its_name(course: Folder) -> None:
-    assert explained(course, "1.1-lab-2") == (
-        "1.1-lab-2 would be tried\n"
-        "  because there is no result of it on this machine\n"
-        "  of 1.1, not run yet on this machine\n"
-    )
-    assert course.main("check").status == 0
-    assert explained(course, "1.1-lab-2").startswith("1.1-lab-2 is remembered\n")
-    done = course.main("explain", "1.1-lap-2")
-    assert done.err == (
-        "coursebuild: nothing of this course is called `1.1-lap-2`; did you mean `1.1-lab-2`?\n"
-    )
-
-
-def test_explain_says_which_edit_of_a_lab_counts(course: Folder) -> None:
-    tried(course)
     course.replace(course.lesson(), '"title": "Fall"', '"title": "Falling"')
     assert "of which none would run" in explained(course, "1.1")
-    assert tried(course) == []
     course.replace(course.lesson(), "data.qpos[2]", "data.qpos[1]")
-    assert "1.1-lab-1 would be tried again\n  because its text changed\n" in explained(
-        course, "1.1"
-    )
+    again = "1.1-lab-1 would be tried again\n  because its text changed\n"
+    assert again in explained(course, "1.1")
     assert tried(course) == ["1.1-lab-1"]
+    assert tried(course, "--no-cache") == ["1.1-lab-1", "1.1-lab-2"]
+    assert tried(course) == []
 
 
-def test_labs_are_shared_and_divided(course: Folder, make: Make, tmp_path: Path) -> None:
+def test_labs_are_shared_and_divided(
+    course: Folder, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shared = str(tmp_path / "shared")
     parts = [tried(course, "--cache", shared, "--shard", f"{part}/2") for part in (1, 2)]
     assert sorted(parts[0] + parts[1]) == ["1.1-lab-1", "1.1-lab-2"]
     other = make(GOOD + LAB + INLINE, name="other")
     other.write("models/ball.xml", BALL)
     other.write("models/part.xml", PART)
-    assert tried(other, "--cache", shared) == []
-
-
-def test_no_cache_tries_all_labs_again(course: Folder) -> None:
-    tried(course)
-    assert tried(course, "--no-cache") == ["1.1-lab-1", "1.1-lab-2"]
-    assert tried(course) == []
+    monkeypatch.setenv("COURSEBUILD_CACHE", shared)
+    assert tried(other) == []

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 TWO = "## Two\n\n" + block("a.py", "print('a')", "a") + block("sub/b.py", "print('b')", "b")
 SHAPES = {

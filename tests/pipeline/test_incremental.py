@@ -58,78 +58,47 @@ def build(course: Course) -> dict[str, bytes]:
     return course.folder.tree("public")
 
 
-def test_what_only_the_page_shows_draws_only_the_page(course: Course) -> None:
+def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
     assert drawn(course.folder) == set()
     for path in (course.folder.root / "content").rglob("*"):
         if path.is_file():
             path.write_bytes(path.read_bytes())
     assert drawn(course.folder) == set(), "they were touched, and no more"
-    for old, new in (
-        ("Prose", "Other prose"),
-        ("[^n]: A note.", "[^n]: A note.\n\n## Second"),
-        ("print(2)", "print(22)"),
-        ("A note.", "Another note."),
-        ("Remark", "Other"),
+    one, two, three = (lesson(f"1.{n}") for n in (1, 2, 3))
+    lists = {"index.html", "levels/1.html", "progress/index.html", "review/index.html"}
+    term = "A [thing]{term} is one.\n\nProse"
+    equation = "$$\nE = 1\n$$ {#eq:zero}\n\nProse"
+    for id, old, new, pages in (
+        ("1.2", "Prose", "Other prose", {two}),
+        ("1.2", "Other prose", "Prose", set()),  # what was there before is known
+        ("1.2", "[^n]: A note.", "[^n]: Another note.\n\n## Second", {two}),
+        ("1.2", "print(2)", "print(22)", {two}),
+        ("1.2", "Remark", "Other", {two}),
+        ("1.2", "$x_2$", "$y$", {two, SYMBOLS}),
+        ("1.2", "$y$", '$x_2${symbol="place"}', {two, SYMBOLS}),
+        ("1.2", "First", "Last", {two, SYMBOLS}),
+        ("1.3", "Prose", "See [this](lesson:1.1). Prose", {three, one}),
+        ("1.3", "See [this]", "Look at [this](lesson:1.1) or [that]", {three}),
+        # The index of symbols leads to the glossary, which was not there.
+        ("1.1", "Prose", term, {one, GLOSSARY, SYMBOLS}),
+        ("1.2", "Prose", "See [it](term:thing). Prose", {two, GLOSSARY}),
+        ("1.1", "Prose", "Other prose", {one}),
+        ("1.1", "is one", "is none", {one, GLOSSARY}),
+        ("1.1", "= 1\n$$", "= 1\n$$ {#eq:one}", {one}),
+        ("1.2", "Prose", "By [](lesson:1.1#eq:one). Prose", {two, one}),
+        ("1.1", "Other prose", equation, {one, two}),  # of another number now
+        ("1.1", "E = 1\n$$ {#eq:one}", "E = 11\n$$ {#eq:one}", {one}),
+        ("1.2", "> [!note]", QUIZ + "> [!note]", {two, *lists}),
+        ("1.2", "Why?", "Why not?", {two}),  # its key is the same
+        ("1.2", '"why"', '"why-not"', {two, *lists}),
     ):
-        course.edit("1.2", old, new)
-        assert drawn(course.folder) == {lesson("1.2")}, new
-        course.edit("1.2", new, old)
-        assert drawn(course.folder) == set(), "what was there before is known"
+        course.edit(id, old, new)
+        assert drawn(course.folder) == pages, new
     page = course.folder.text("content/pages/about.md")
     course.folder.write("content/pages/about.md", page.replace("*it*", "that"))
     assert drawn(course.folder) == {"about.html"}
     course.folder.write("models/box.xml", '<mujoco model="b"/>\n')
     assert drawn(course.folder) == {"models/box.html"}
-
-
-def test_a_symbol_or_a_heading_draws_the_index_of_symbols(course: Course) -> None:
-    for old, new in (("$x_2$", "$y$"), ("$y$", '$x_2${symbol="place"}'), ("First", "Second")):
-        course.edit("1.2", old, new)
-        assert drawn(course.folder) == {lesson("1.2"), SYMBOLS}, new
-
-
-def test_a_link_draws_the_lesson_that_it_leads_to(course: Course) -> None:
-    course.edit("1.3", "Prose", "See [this](lesson:1.1). Prose")
-    assert drawn(course.folder) == {lesson("1.3"), lesson("1.1")}
-    course.edit("1.3", "See [this]", "Look at [this](lesson:1.1) or [that]")
-    assert drawn(course.folder) == {lesson("1.3")}, "who refers to it is as it was"
-    course.write("1.3", LESSON.format(n=3, next="2.1", script=NORUN.format(n=3)))
-    assert drawn(course.folder) == set(), "what was there before is known"
-
-
-def test_a_term_draws_the_glossary_and_who_uses_it(course: Course) -> None:
-    course.edit("1.1", "Prose", "A [thing]{term} is one.\n\nProse")
-    # The index of symbols leads to the glossary, which was not there.
-    assert drawn(course.folder) == {lesson("1.1"), GLOSSARY, SYMBOLS}
-    course.edit("1.2", "Prose", "See [it](term:thing). Prose")
-    assert drawn(course.folder) == {lesson("1.2"), GLOSSARY}
-    course.edit("1.1", "Prose", "Other prose")
-    assert drawn(course.folder) == {lesson("1.1")}
-    course.edit("1.1", "is one", "is none")
-    assert drawn(course.folder) == {lesson("1.1"), GLOSSARY}
-    course.edit("1.1", "[thing]{term}", "thing")
-    course.edit("1.3", "Prose", "A [thing]{term} is one.\n\nProse")
-    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2"), lesson("1.3"), GLOSSARY}
-
-
-def test_the_number_of_a_formula_draws_who_refers_to_it(course: Course) -> None:
-    course.edit("1.1", "= 1\n$$", "= 1\n$$ {#eq:one}")
-    course.edit("1.2", "Prose", "By [](lesson:1.1#eq:one). Prose")
-    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2")}
-    course.edit("1.1", "Prose", "$$\nE = 1\n$$ {#eq:zero}\n\nProse")
-    assert drawn(course.folder) == {lesson("1.1"), lesson("1.2")}
-    course.edit("1.1", "E = 1\n$$ {#eq:one}", "E = 11\n$$ {#eq:one}")
-    assert drawn(course.folder) == {lesson("1.1")}
-
-
-def test_a_question_draws_the_lists_of_lessons(course: Course) -> None:
-    course.edit("1.2", "Prose", QUIZ + "Prose")
-    lists = {"index.html", "levels/1.html", "progress/index.html", "review/index.html"}
-    assert drawn(course.folder) == {lesson("1.2"), *lists}
-    course.edit("1.2", "Why?", "Why not?")
-    assert drawn(course.folder) == {lesson("1.2")}, "its key is the same"
-    course.edit("1.2", '"why"', '"why-not"')
-    assert drawn(course.folder) == {lesson("1.2"), *lists}
 
 
 def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from support.mortal_commands import Mortals, mortal_commands
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, Folder, Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 STRUCTURAL = ("open", "mkdir", "link", "rename", "replace", "unlink", "rmdir", "exchange")
 """Calls that change what a folder holds."""

@@ -7,8 +7,7 @@ import pytest
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.growth import processor_time_growth
-from support.lab_lessons import Make
-from support.scratch_course import GOOD, block
+from support.scratch_course import GOOD, Make, block
 
 MAP = "content/course.toml"
 
@@ -66,7 +65,7 @@ def test_reading_takes_as_long_as_the_text_whatever_is_broken_in_it(piece: str) 
     assert processor_time_growth(read, 250) < 24
 
 
-@pytest.mark.parametrize("quotes", ["> ", "> - ", "- > ", "> 1. "])
+@pytest.mark.parametrize("quotes", ["> ", "> 1. "])
 def test_containers_that_hold_too_many_lines_together_are_told_and_read_no_further(
     quotes: str,
 ) -> None:

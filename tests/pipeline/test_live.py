@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.runner import ScriptServer
 from coursebuild.preview import rebuild
 from support.built_sites import BuiltCourses
 from support.live_course import TRIALS, Builds, Live, differences, share
 from support.live_course import builds as builds
 from support.live_course import live as live
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, Folder, Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 
 @pytest.mark.engine
@@ -51,20 +46,6 @@ def test_course_of_every_construct_after_edits_is_what_a_clean_build_gives(
     built = builds(folder)
     assert built is not None
     assert differences(running.site(), built) == []
-
-
-def test_a_page_is_new_before_anything_else_is_done(
-    make: Make, live: Callable[[Folder], Live]
-) -> None:
-    folder = make(GOOD, GOOD.replace("hello.py", "other.py"))
-    running = live(folder)
-    page = "lessons/1.1-one.html"
-    assert b"Hello" in (running.find(page) or b"")
-    other = running.find("lessons/1.2-two.html")
-    folder.replace(folder.lesson(), "## Hello", "## Good morning")
-    assert running.save(folder.lesson())
-    assert b"Good morning" in (running.find(page) or b"")
-    assert running.find("lessons/1.2-two.html") == other
 
 
 def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]) -> None:
@@ -115,19 +96,6 @@ def test_the_last_good_page_stays_and_the_others_go_on(
         running.save(folder.lesson())
 
 
-def test_page_that_was_never_good_appears_when_mended(
-    make: Make, live: Callable[[Folder], Live]
-) -> None:
-    folder = make(GOOD + "[gone](lesson:9.9)\n")
-    running = live(folder)
-    page = "lessons/1.1-one.html"
-    assert running.find(page) is None
-    assert running.session.files.has_page(page)
-    folder.write(folder.lesson(), GOOD)
-    running.save(folder.lesson())
-    assert b"Hello" in (running.find(page) or b"")
-
-
 def test_a_broken_map_changes_nothing_that_is_shown(
     make: Make, live: Callable[[Folder], Live]
 ) -> None:
@@ -143,56 +111,6 @@ def test_a_broken_map_changes_nothing_that_is_shown(
     running.save("content/course.toml")
     assert running.wrong() == []
     assert running.site() == before
-
-
-def test_a_mistake_that_another_file_makes_and_mends(
-    make: Make, live: Callable[[Folder], Live], builds: Builds
-) -> None:
-    folder = make("## One\n\n## Two {#two}\n", "[There](lesson:1.1#two)\n")
-    running = live(folder)
-    running.site()
-    folder.replace(folder.lesson(), "{#two}", "{#three}")
-    assert running.save(folder.lesson())
-    running.site()
-    assert running.wrong() == ["link-anchor"]
-    folder.replace(folder.lesson(), "{#three}", "{#two}")
-    assert running.save(folder.lesson())
-    site = running.site()
-    assert running.wrong() == []
-    built = builds(folder)
-    assert built is not None and differences(site, built) == []
-
-
-def test_scripts_run_behind_and_only_those_that_changed(
-    make: Make, live: Callable[[Folder], Live], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    started: list[str] = []
-
-    ordinary = ScriptServer.run
-
-    def noted(
-        server: ScriptServer, root: Path, todo: Sequence[ScriptJob], **how: Any
-    ) -> tuple[ScriptRun, ...]:
-        started.extend(job.path for job in todo)
-        return ordinary(server, root, todo, **how)
-
-    monkeypatch.setattr(ScriptServer, "run", noted)
-    folder = make(*(f"## Lesson\n\n{block(f'{name}.py', 'print(1)', '1')}" for name in "ab"))
-    running = live(folder)
-    running.site()
-    assert sorted(started) == ["examples/a.py", "examples/b.py"]
-    folder.replace(folder.lesson(), "## Lesson", "## Another")
-    assert running.save(folder.lesson())
-    running.site()
-    assert len(started) == 2
-    folder.replace(folder.lesson(), "print(1)", "print(1 + 0)")
-    assert running.save(folder.lesson())
-    running.site()
-    assert started[2:] == ["examples/a.py"]
-    folder.write("models/ball.xml", "<mujoco/>")
-    assert not running.save("models/ball.xml")
-    running.site()
-    assert len(started) == 3
 
 
 # --- what others make of a lesson

@@ -17,11 +17,9 @@ from coursebuild.core.scripts.compare import compare
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from support.scratch_course import ROOT, Folder, block
+from support.scratch_course import ROOT, Folder, Make, block
 
 pytestmark = pytest.mark.slow
-
-Make = Callable[..., Folder]
 
 COURSES = {
     "every construct": ROOT / "tests" / "courses" / "full" / "course",

@@ -5,15 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 
 import pytest
 
-from support.scratch_course import FIRST, ROOT, Folder
+from support.scratch_course import FIRST, ROOT, Folder, Make
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 
 def aged(folder: Folder) -> None:

@@ -10,13 +10,13 @@ import pytest
 from coursebuild.preview.editor import open_in_editor
 from support.live_course import Live
 from support.live_course import live as live
-from support.scratch_course import Folder
+from support.scratch_course import Folder, Make
 
 pytestmark = pytest.mark.site
 
 
 def test_place_opens_in_each_kind_of_editor(
-    make: Callable[..., Folder],
+    make: Make,
     live: Callable[[Folder], Live],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

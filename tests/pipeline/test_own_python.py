@@ -13,11 +13,9 @@ import pytest
 
 from coursebuild.core.run.versions import engine_version, python_version
 from support.sandboxes import require_sandbox
-from support.scratch_course import Folder, block
+from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 PYTHON = ".venv/bin/python"
 SCRIPT = """\
@@ -74,84 +72,72 @@ def install(packages: Path, version: str, name: str) -> None:
 def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course: Folder) -> None:
     """And run again when something is installed there; of here they find `mjcourse` only."""
     (packages,) = (course.root / ".venv").glob("lib/python*/site-packages")
-    done = course.run("check")
+    done = course.main("check")
     assert done.status == 0, done.out + done.err
     assert "1 script" in done.out
-    again = course.run("check")
+    again = course.main("check")
     assert again.status == 0
     assert "nothing has changed since the last check" in again.out
     install(packages, "1.1", "Venus")
-    drifted = course.run("check")
+    drifted = course.main("check")
     assert drifted.status == 1
     assert "Venus" in drifted.out
-    assert course.run("update").status == 0
+    assert course.main("update").status == 0
     assert "/.venv Venus mjcourse.spatial" in course.text(course.lesson())
-    explained = course.run("explain", "examples/a.py").out
+    explained = course.main("explain", "examples/a.py").out
     assert "planet 1.1" in explained
     assert "remembered" in explained
-
-
-def test_a_build_says_which_versions_ran_the_scripts(course: Folder) -> None:
-    assert course.run("build").status == 0
+    assert course.main("build").status == 0
     page = course.text("public/lessons/1.1-one.html")
-    assert f"MuJoCo {engine_version()}" in page
-    assert f"Python {python_version()}" in page
+    assert f"MuJoCo {engine_version()}" in page and f"Python {python_version()}" in page
 
 
-WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
-    "missing": (
+WRONG: tuple[tuple[Callable[[Path], object], str], ...] = (
+    (
         lambda prefix: (prefix / "bin/python").unlink(),
         "error[script-python]: there is no interpreter `.venv/bin/python`",
     ),
-    "not an environment": (
+    (
         lambda prefix: (prefix / "pyvenv.cfg").unlink(),
         "error[script-python]: `.venv/bin/python` is not of a virtual environment",
     ),
-    "old": (
+    (
         lambda prefix: (prefix / "pyvenv.cfg").write_text("version_info = 3.9.1.final.0\n"),
         "error[script-python]: `.venv/bin/python` is of Python 3.9.1.final.0",
     ),
-    "without MuJoCo": (
+    (
         lambda prefix: next(prefix.glob("lib/*/*/mujoco-*")).unlink(),
         "error[script-python]: MuJoCo is not installed for `.venv/bin/python`",
     ),
-    "another MuJoCo": (
+    (
         lambda prefix: next(prefix.glob("lib/*/*/mujoco-*")).rename(
             next(prefix.glob("lib/*/site-packages")) / "mujoco-3.1.0.dist-info"
         ),
         f"error[engine-version]: the course is written for MuJoCo {engine_version()}, and 3.1.0 "
         "is installed for `.venv/bin/python`",
     ),
-}
+)
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_an_environment_in_which_scripts_cannot_run_is_told_in_the_map(
-    course: Folder, case: str
-) -> None:
-    spoil, said = WRONG[case]
-    spoil(course.root / ".venv")
-    done = course.main("check")
-    assert done.status == 1
-    assert done.out.startswith(f"{said}"), done.out
-    assert "--> content/course.toml:" in done.out
-    assert done.out.count("error[") == 1
-
-
-def test_a_program_that_is_no_python_ends_the_command_with_one_sentence(course: Folder) -> None:
+def test_an_environment_in_which_scripts_cannot_run_is_told(course: Folder) -> None:
+    done = course.main("check", "--against", "3.1.0")
+    assert done.status == 2
+    assert "scripts of this course run with .venv/bin/python" in done.err
+    for spoil, said in WRONG:
+        spoil(course.root / ".venv")
+        done = course.main("check")
+        assert done.status == 1
+        assert done.out.startswith(said), done.out
+        assert "--> content/course.toml:" in done.out
+        assert done.out.count("error[") == 1
+        environment(course)
     python = course.root / PYTHON
     python.unlink()
     python.write_text("#!/bin/sh\nexit 3\n")
     python.chmod(0o755)
-    done = course.main("check")
+    done = course.main("check", "--no-cache")
     assert done.status == 1
     assert f"{python} cannot run scripts" in done.err
-
-
-def test_another_engine_is_tried_by_another_environment(course: Folder) -> None:
-    done = course.main("check", "--against", "3.1.0")
-    assert done.status == 2
-    assert "scripts of this course run with .venv/bin/python" in done.err
 
 
 def test_the_sandbox_has_this_environment_and_no_other_folder_it_names(make: Make) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -11,9 +11,8 @@ from playwright.sync_api import Browser, expect
 
 from support.preview_page import LESSON, Open, lesson_page, see
 from support.preview_process import serving, wait_for
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, Make, block
 
-Make = Callable[..., Folder]
 pytestmark = pytest.mark.browser
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -14,10 +14,9 @@ from playwright.sync_api import Browser, expect
 from support.lab_page import comes
 from support.preview_page import LESSON, Open, lesson_page, see, texts
 from support.preview_process import serving
-from support.scratch_course import GOOD, ROOT, Folder
+from support.scratch_course import GOOD, ROOT, Make
 from support.static_host import Host
 
-Make = Callable[..., Folder]
 pytestmark = pytest.mark.browser
 FILLER = "".join(f"Paragraph {n}.\n\n" for n in range(80))
 QUIZ = {

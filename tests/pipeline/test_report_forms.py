@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 
 import pytest
 
@@ -13,14 +12,12 @@ from support.scratch_course import (
     FIRST,
     GOOD,
     SECOND,
-    Folder,
+    Make,
     block,
     without_seconds,
 )
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 
 def test_quiet_says_what_is_wrong_and_no_more(make: Make) -> None:
@@ -65,26 +62,6 @@ def test_the_stages_of_a_build(make: Make) -> None:
     assert said[2:4] == ["trying labs", "drawing pages"], "the model's own page has a lab"
     assert said[-1] == "publishing"
     assert re.search("^published [0-9]+ files in public$", done.out, re.MULTILINE)
-
-
-def test_as_many_scripts_run_at_once_as_jobs(make: Make) -> None:
-    meet = """
-import pathlib, sys, time
-mine, other = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-mine.touch()
-for _ in range(12_000):
-    if other.exists():
-        break
-    time.sleep(0.01)
-else:
-    sys.exit("alone")
-"""
-    folder = make(
-        "## Two that meet\n\n"
-        + block("a.py", meet, info='args="../met-a ../met-b" timeout=300')
-        + block("b.py", meet, info='args="../met-b ../met-a" timeout=300')
-    )
-    assert folder.main("check", "--jobs", "2").status == 0
 
 
 def test_json_of_a_clean_course_tells_what_ran_and_of_a_broken_map_the_mistake(make: Make) -> None:

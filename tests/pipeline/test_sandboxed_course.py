@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from support.sandboxes import require_sandbox
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 WRITES = "from pathlib import Path\nPath('new').write_text('x')\nprint(1)"
 
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 
 import pytest
 
-from support.scratch_course import Folder, block
+from support.scratch_course import Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 
 def test_a_learner_runs_the_extracted_file(make: Make) -> None:

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from support.scratch_course import Folder, block
+from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 DOUBLE = """
 import mujoco
@@ -141,14 +137,6 @@ print("right" if data.qpos[0] == 0.75 else "left or right")
 PLAIN = "print('nothing moves', 1.5)\n"
 
 
-def recorded(make: Make, *scripts: str) -> Folder:
-    """A course whose recorded outputs are as the scripts print them."""
-    blocks = [block(f"{'abcd'[i]}.py", code, "?") for i, code in enumerate(scripts)]
-    folder = make("## One\n\n" + "".join(blocks))
-    folder.main("update", "--quiet")
-    return folder
-
-
 def measured(folder: Folder, *arguments: str) -> dict[str, Any]:
     report = json.loads(folder.main("check", "--sensitivity", "--format", "json", *arguments).out)
     assert report["summary"]["errors"] == 0, report["diagnostics"]
@@ -181,15 +169,6 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 @pytest.fixture(scope="module")
 def found(course: Folder) -> dict[str, Any]:
     return measured(course)
-
-
-@pytest.fixture
-def copied(course: Folder, found: dict[str, Any], tmp_path: Path) -> Folder:
-    """The same course, to be changed, with all that is remembered of it."""
-    folder = Folder(tmp_path / "copied")
-    shutil.copytree(course.root, folder.root, symlinks=True)
-    folder.tmp.mkdir()
-    return folder
 
 
 def test_double_pendulum_is_chaotic_and_keeps_its_first_digits(
@@ -264,31 +243,10 @@ def test_report_as_text(course: Folder, found: dict[str, Any]) -> None:
     assert "not asked examples/plain.py  it does not use MuJoCo" in said
 
 
-def test_runs_with_moved_states_are_remembered(make: Make) -> None:
-    folder = recorded(make, FALL)
-    folder.replace(folder.lesson(), "< 0.9999", "< 0.9998")
-    stages = ("moving initial states, 4 of 4", "halving timesteps")
-    first = folder.main("check", "--sensitivity")
-    assert all(stage in first.err for stage in stages)
-    again = folder.main("check", "--sensitivity")
-    assert not any(stage in again.err for stage in stages)
-    assert "of 3 numbers 3 repeat in full" in again.out
-    fresh = folder.main("check", "--sensitivity", "--no-cache")
-    assert all(stage in fresh.err for stage in stages)
-
-
-def test_what_is_known_of_the_run_itself_stays(make: Make) -> None:
-    folder = make("## One\n\n" + block("a.py", PLAIN, "nothing moves 1.5") + block("b.py", FALL))
-    folder.main("check")
-    before = folder.main("explain", "examples/b.py").out
-    folder.replace(folder.lesson(), "bodies {model.nbody}", "{model.nbody} bodies")
-    folder.main("update")
-    folder.main("check", "--sensitivity")
-    folder.replace(folder.lesson(), "{model.nbody} bodies", "bodies {model.nbody}")
-    assert folder.main("explain", "examples/b.py").out == before
-
-
-def test_drifted_outputs_are_not_asked_and_a_warning_may_be_silenced(copied: Folder) -> None:
+def test_drifted_outputs_are_not_asked_and_a_warning_may_be_silenced(
+    course: Folder, found: dict[str, Any], tmp_path: Path
+) -> None:
+    copied = course.duplicate(tmp_path / "copied")
     silence = '\n[[silence]]\nrule = "output-noise"\nreason = "the lesson is about borders"\n'
     copied.write("content/course.toml", copied.text("content/course.toml") + silence)
     assert measured(copied)["noise"] == []
@@ -301,10 +259,8 @@ def test_drifted_outputs_are_not_asked_and_a_warning_may_be_silenced(copied: Fol
 def test_only_the_lessons_that_are_named(make: Make) -> None:
     folder = make(
         "## One\n\n" + block("a.py", PLAIN, "nothing moves 1.5"),
-        "## Two\n\n" + block("b.py", LIMIT, "?"),
+        "## Two\n\n" + block("b.py", LIMIT, "right"),
     )
-    assert "moving initial states" not in folder.main("update", "--dry-run").err
-    folder.main("update", "-q")
     found = measured(folder, "1.1")
     assert (set(found), found["noise"]) == ({"examples/a.py", "noise"}, [])
 
@@ -312,8 +268,9 @@ def test_only_the_lessons_that_are_named(make: Make) -> None:
 # --- update
 
 
-def test_update_warns_of_noise_that_it_records(make: Make) -> None:
+def test_update_warns_of_noise_that_it_records_and_asks_only_where_it_writes(make: Make) -> None:
     folder = make("## One\n\n" + block("a.py", DOUBLE, "?") + block("b.py", FALL, "?"))
+    assert "moving initial states" not in folder.main("update", "--dry-run").err
     done = folder.main("update")
     assert done.status == 0
     assert done.out.count("warning[output-noise]") == 1
@@ -321,10 +278,7 @@ def test_update_warns_of_noise_that_it_records(make: Make) -> None:
     place = done.out[done.out.index("--> ") :].split()[1]
     line = folder.text(folder.lesson()).splitlines()[int(place.split(":")[1]) - 1]
     assert line.startswith("t 30.0 "), "the place is that in the lesson as it is now"
-
-
-def test_update_asks_only_where_it_writes(make: Make) -> None:
-    folder = recorded(make, LIMIT, FALL)
+    before = folder.main("explain", "examples/b.py").out
     folder.replace(folder.lesson(), 'print(f"x ', 'print(f"x = ')
     done = folder.main("update")
     assert done.status == 0
@@ -334,3 +288,14 @@ def test_update_asks_only_where_it_writes(make: Make) -> None:
     done = folder.main("update")
     assert "moving initial states" not in done.err
     assert "every recorded output is up to date" in done.out
+    # Runs with moved states are remembered like others, and in the place of none.
+    folder.replace(folder.lesson(), 'print(f"x = ', 'print(f"x ')
+    assert folder.main("explain", "examples/b.py").out == before
+    folder.main("update", "-q")
+    stages = ("moving initial states, 4 of 4", "halving timesteps")
+    assert stages[1] in folder.main("check", "--sensitivity").err
+    again = folder.main("check", "--sensitivity")
+    assert not any(stage in again.err for stage in stages)
+    assert "of 3 numbers 3 repeat in full" in again.out
+    fresh = folder.main("check", "--sensitivity", "--no-cache")
+    assert all(stage in fresh.err for stage in stages)

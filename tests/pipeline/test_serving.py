@@ -5,27 +5,44 @@ from __future__ import annotations
 import contextlib
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from support.preview_process import Preview, serving, wait_for
-from support.scratch_course import GOOD, Folder
+from support.scratch_course import GOOD, Folder, Make
 
-Make = Callable[..., Folder]
 pytestmark = pytest.mark.site
 
 
 @pytest.fixture(scope="module")
 def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[Preview]:
+    """A preview that opens a browser, which notes what it was told and how it was answered."""
     folder = Folder(tmp_path_factory.mktemp("served") / "a cöurse")
     folder.fill([GOOD + "![A](../pic%20ä.svg) and $x$\n"], stores)
     folder.write("content/pic ä.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
     folder.write("secret.txt", "not of the site")
-    with serving(folder) as running:
+    browser = folder.tmp / "browser"
+    browser.write_text(
+        f"#!{sys.executable}\n"
+        "import pathlib, sys, urllib.request\n"
+        "status = urllib.request.urlopen(sys.argv[1]).status\n"
+        "told = pathlib.Path(sys.argv[0]).with_name('told')\n"
+        "told.with_suffix('.new').write_text(f'{sys.argv[1]} {status}')\n"
+        "told.with_suffix('.new').rename(told)\n"
+    )
+    browser.chmod(0o755)
+    env = {"BROWSER": f"'{browser}' %s"}
+    with serving(folder, "--open", env=env) as running:
         running.heard("checked: ")
         yield running
+
+
+def test_browser_is_opened_when_the_address_answers(preview: Preview) -> None:
+    told = preview.folder.tmp / "told"
+    wait_for(told)
+    assert told.read_text() == f"http://127.0.0.1:{preview.port}/ 200"
 
 
 def test_pages_and_files_have_their_types(preview: Preview) -> None:
@@ -70,19 +87,11 @@ def test_what_has_its_hash_in_its_name_may_be_kept(preview: Preview) -> None:
         assert preview.get(path)[1]["Cache-Control"] == kept
 
 
-def test_address_of_nothing_has_the_page_that_says_so(preview: Preview, make: Make) -> None:
+def test_address_of_nothing_has_the_page_that_says_so(preview: Preview) -> None:
     status, headers, body = preview.get("/no/such/page.html")
     assert (status, headers["Content-Type"]) == (404, "text/html; charset=utf-8")
     assert b"There is no page at this address" in body
     assert b'data-page="no/such/page.html" data-state=""' in body  # it is told once it is there
-    folder = make(GOOD)  # it names everything from where the published site will be
-    folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
-    with serving(folder) as other:
-        status, _, body = other.get("/no/such/page.html")
-        found = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
-        assert (status, len(found)) == (404, 1)
-        assert other.get(found[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
-        assert b"Scratch" in other.get("/a/b/")[2]
 
 
 OUTSIDE = (
@@ -175,15 +184,23 @@ def test_other_origins_can_only_link_to_the_preview(preview: Preview) -> None:
 
 
 def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> None:
+    """Of a course that names everything from where the published site will be, too."""
     origins = ("vscode-webview:", "https://*.example.org:8080")
-    with serving(make(GOOD), *(f"--embed={origin}" for origin in origins)) as preview:
+    folder = make(GOOD)
+    folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
+    with serving(folder, *(f"--embed={origin}" for origin in origins)) as preview:
         status, headers, _ = preview.get("/", **{**LINK, DEST: "iframe"})
         policy = "frame-ancestors vscode-webview: https://*.example.org:8080"
         assert (status, headers["Content-Security-Policy"]) == (200, policy)
         assert preview.get("/", **{SITE: "cross-site", DEST: "script"})[0] == 403
-        for wrong in ("example.org", "https://a;script-src *", "*"):
-            done = preview.folder.main("serve", "--embed", wrong)
-            assert (done.status, "is no origin" in done.err) == (2, True)
+        status, _, body = preview.get("/no/such/page.html")
+        found = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
+        assert (status, len(found)) == (404, 1)
+        assert preview.get(found[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
+        assert b"Scratch" in preview.get("/a/b/")[2]
+    for wrong in ("example.org", "https://a;script-src *", "*"):
+        done = folder.main("serve", "--embed", wrong)
+        assert (done.status, "is no origin" in done.err) == (2, True)
 
 
 def test_other_machines_need_the_token_of_the_link(make: Make) -> None:
@@ -227,20 +244,3 @@ def test_port_or_host_that_cannot_be_had_is_told(preview: Preview) -> None:
         done = preview.folder.main("serve", "--host", host, "--port", str(preview.port))
         assert (done.status, done.out) == (2, "")
         assert f"port {preview.port} of {host} cannot be used: {why}" in done.err
-
-
-def test_browser_is_opened_when_the_address_answers(make: Make, tmp_path: Path) -> None:
-    told = tmp_path / "told"
-    browser = tmp_path / "browser"
-    browser.write_text(
-        f"#!{sys.executable}\n"
-        "import pathlib, sys, urllib.request\n"
-        "status = urllib.request.urlopen(sys.argv[1]).status\n"
-        f"told = pathlib.Path({str(told)!r})\n"
-        "told.with_suffix('.new').write_text(f'{sys.argv[1]} {status}')\n"
-        "told.with_suffix('.new').rename(told)\n"
-    )
-    browser.chmod(0o755)
-    with serving(make(GOOD), "--open", env={"BROWSER": f"{browser} %s"}) as preview:
-        wait_for(told)
-        assert told.read_text() == f"http://127.0.0.1:{preview.port}/ 200"

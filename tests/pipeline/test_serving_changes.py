@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import signal
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from support.preview_process import PATIENT, serving, wait_for
-from support.scratch_course import GOOD, SILENT, Folder, block, ended, wait_until_alone
+from support.scratch_course import GOOD, SILENT, Make, block, ended, wait_until_alone
 
-Make = Callable[..., Folder]
 pytestmark = pytest.mark.site
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,9 +11,8 @@ from hypothesis import strategies as st
 
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.shards import read_shard, read_timings, split, write_timings
-from support.scratch_course import Folder, block
+from support.scratch_course import Make, block
 
-Make = Callable[..., Folder]
 names = st.lists(st.text(max_size=6), max_size=30)
 times = st.dictionaries(st.text(max_size=6), st.floats(0, 1e6), max_size=20)
 

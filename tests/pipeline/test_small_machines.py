@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable
 
 import pytest
 
-from support.scratch_course import GOOD, Folder, block, command
+from support.scratch_course import GOOD, Folder, Make, block, command
 
-Make = Callable[..., Folder]
 pytestmark = pytest.mark.site
 
 

@@ -3,168 +3,106 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import mjcf_texts
-from coursebuild.core.checks.course import check_course
-from coursebuild.core.model import (
-    Course,
-    Document,
-    Mjcf,
-    Recording,
-    Script,
-    ThematicBreak,
-    document_blocks,
-    document_has,
-)
-from coursebuild.core.model.results import Outcome, Results, ScriptRun
-from coursebuild.core.model.summary import without_prose
-from coursebuild.core.pages.document_inputs import document_inputs
-from coursebuild.core.pages.equations import equations_of
-from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.renderer import known_mathml
-from coursebuild.core.pages.urls import Place
-from coursebuild.core.registry import summarize
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
-from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.text.source import Source
-from coursebuild.core.values import decode, encode, fingerprint
-from coursebuild.features.glossary.page import course_terms
-from coursebuild.features.lab.model import Lab
-from coursebuild.features.quiz.checks import check_output_lines
-from coursebuild.features.quiz.model import Quiz
-from coursebuild.pipeline.fingerprints import document_fingerprint
-from coursebuild.pipeline.reading import DocumentSummary
-from support.scratch_course import ROOT
-from support.summary_lessons import MAP, PARTS, document, library_of, with_documents
+from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.load import Loaded, load
+from support.scratch_course import GOOD, ROOT, Folder, block
 
 pytestmark = pytest.mark.site
 
-PROSE = ["Plain words.\n\n", "More of *them*, `code`.\n\n", "- a\n- b\n\n", "***\n\n", "\n"]
 FIXTURES = [
     path for top in ("fixtures", "courses") for path in sorted((ROOT / "tests" / top).rglob("*.md"))
 ]
+ENTRY = '[[level.lesson]]\nid = "1.{0}"\nslug = "l"\ntitle = "L"\nstatus = "complete"\n'
 
 
-def courses(*texts: str) -> tuple[Course, Course]:
-    """A course of these lessons and the last as a page: whole, and of summaries."""
-    parsed = parse_course_map(Source("content/course.toml", MAP))
-    assert parsed.value is not None
-    read = (document(f"content/{i}.md", text) for i, text in enumerate(texts))
-    whole = [replace(one, summaries=summarize(one, known_mathml({})).value) for one in read]
-    kept = [from_store(one) for one in whole]
-    return with_documents(parsed.value, whole), with_documents(parsed.value, kept)
-
-
-def summarized(whole: Document) -> Document:
-    mathml = known_mathml({})
-    summaries = summarize(whole, mathml).value
-    return replace(without_prose(whole), equations=equations_of(whole, mathml), summaries=summaries)
-
-
-def from_store(whole: Document) -> Document:
-    data = encode(DocumentSummary(summarized(whole), (), (), True))
-    found = decode(data, DocumentSummary, whole.source)
-    assert found is not None
-    return found.document
-
-
-def known_of(course: Course) -> Iterator[object]:
-    """Everything that is known of a course by its documents."""
+def known_of(loaded: Loaded) -> Iterator[object]:
+    """What is known of a course by its documents, first what is wrong with it."""
+    course = loaded.course
+    assert course is not None
     extracted = extract(course)
     runs = [
         ScriptRun(e.path, Outcome.OK if i % 3 else Outcome.FAILED, 0, "one 1.5\nx 1\n", "", 0.0)
         for i, e in enumerate(extracted.value, 1)
     ]
     verdicts = verify(course, runs)
-    library = library_of(course, Results(tuple(runs), verdicts, (), (), "3", "3"))
-    yield check_course(course)
-    yield [
-        (text.text, text.code, text.block.span, text.lines_before) for text in mjcf_texts(course)
-    ]
+    yield {(d.rule, d.span.path, d.span.start, d.message) for d in loaded.diagnostics}
+    yield [(t.text, t.code, t.block.span, t.lines_before) for t in mjcf_texts(course)]
     yield extracted.diagnostics
     yield [(e.path, e.text, e.owner, e.script) for e in extracted.value]
     yield [(v.recording.span, v.recording.body, v.status, v.changes) for v in verdicts]
     yield script_findings(course, extracted.value, runs, verdicts)
-    yield list(check_output_lines(course, runs))
-    yield [(n, [(u.owner.id, u.by_lab, u.by_script) for u in us]) for n, us in library.uses.items()]
-    yield {id: [owner.id for owner in owners] for id, owners in library.referrers.items()}
-    yield [(t.term, t.owner.id, [o.id for o in t.used]) for t in course_terms(library)]
-    for one in course.documents:
-        try:
-            yield fingerprint(document_inputs(library, Place("lessons/x.html"), one))
-        except KeyError as error:  # a link that leads nowhere, in a course that is never drawn
-            yield repr(error)
+    yield list(check_runs(course, runs))
+    yield [
+        (name, trial.owner, trial.block.span) for name, (_, trial) in feature_trials(course).items()
+    ]
 
 
-@given(st.lists(st.lists(st.sampled_from(PARTS), max_size=6), min_size=1, max_size=2))
-@settings(max_examples=40)
-def test_a_summary_tells_what_the_document_tells(lessons: list[list[str]]) -> None:
-    whole, kept = courses(*("".join(parts) for parts in lessons))
-    assert list(known_of(whole)) == list(known_of(kept))
+def test_course_of_summaries_tells_what_the_whole_course_tells(tmp_path: Path) -> None:
+    """Of lessons as they are just read, and from the store."""
+    entries = "".join(ENTRY.format(n) for n in range(len(FIXTURES)))
+    folder = Folder(tmp_path)
+    folder.write(
+        "content/course.toml",
+        f'[course]\ntitle = "C"\n\n[[level]]\nid = "1"\ntitle = "L"\n\n{entries}',
+    )
+    for n, path in enumerate(FIXTURES):
+        folder.write(f"content/lessons/1.{n}-l.md", path.read_bytes())
+    (wrong, *whole) = known_of(load(tmp_path))
+    for _ in range(2):
+        with Documents(Memo(tmp_path), 1) as documents:
+            (found, *kept) = known_of(load(tmp_path, documents))
+        assert isinstance(found, set) and isinstance(wrong, set)
+        assert len(wrong) > 1000
+        assert found > wrong, "formulas are looked at as well"
+        assert kept == whole
 
 
-def test_summaries_of_the_fixtures_tell_what_they_tell() -> None:
-    wrong = []
-    for paths in zip(FIXTURES[::2], FIXTURES[1::2], strict=False):
-        whole, kept = courses(*(path.read_text(encoding="utf-8") for path in paths))
-        same = list(known_of(whole)) == list(known_of(kept))
-        for one in (*whole.documents, *kept.documents):
-            blocks = tuple(document_blocks(one))
-            for kind in (Script, Lab, Mjcf, Quiz, Recording):
-                there = any(isinstance(block, kind) for block in blocks)
-                same = same and document_has(one, kind) == there
-        if not same:
-            wrong.append(paths)
-    assert wrong == []
-
-
-def test_prose_is_not_in_a_summary() -> None:
-    whole = document("content/a.md", "Only *prose*, `code` and $x$ here.\n\n- and\n- there\n")
-    assert list(document_blocks(without_prose(whole))) == [ThematicBreak(whole.blocks[0].span)]
-    for text in ("", "\ufeff\n", "[a]: b\n"):
-        assert list(document_blocks(without_prose(document("content/a.md", text)))) == []
-
-
-# --- fingerprints
-
-
-def seen_elsewhere(first: Document) -> list[object]:
-    """What is seen of the first lesson by others: other pages, and whether anything is wrong."""
-    parsed = parse_course_map(Source("content/course.toml", MAP))
-    assert parsed.value is not None
-    second = summarized(document("content/1.md", "".join(PARTS[:9])))
-    course = with_documents(parsed.value, [first, second])
-    runs = [ScriptRun(e.path, Outcome.OK, 0, "one 1.5\n", "", 0.0) for e in extract(course).value]
-    results = Results(tuple(runs), verify(course, runs), (), (), "3", "3")
-    library = library_of(course, results)
-    found: list[object] = [bool(check_course(course))]
-    for page in page_list(library):
-        if page.id != "1.1":
-            try:
-                found.append((page.path, fingerprint(page.inputs(library))))
-            except (KeyError, StopIteration) as error:  # a link or model that is nowhere
-                found.append((page.path, repr(error)))
-    return found
-
-
-@given(st.lists(st.sampled_from(PARTS), max_size=5), st.data())
-@settings(max_examples=40)
-def test_documents_of_one_fingerprint_are_seen_alike(parts: list[str], data: st.DataObject) -> None:
-    other: list[str] = []
-    for part in data.draw(st.one_of(st.just(parts), st.permutations(parts))):
-        other += [*data.draw(st.lists(st.sampled_from(PROSE), max_size=2)), part]
-    one, two = (summarized(document("content/0.md", "".join(text))) for text in (parts, other))
-    if document_fingerprint(one) == document_fingerprint(two):
-        assert seen_elsewhere(one) == seen_elsewhere(two)
-
-
+TEXT = "".join(
+    [
+        "## Heading {#here}\n\n",
+        "# Top [a](lesson:1.2#there) $x$\n\n",
+        "Prose: *[a link](lesson:1.2#here)*, ![p](p.png), <b id=b>html</b>, `12.5`{out} more.\n\n",
+        "The [thing]{term} is *a [b](lesson:1.1)*; see [it](term:thing), [no](term:nothing).\n\n",
+        "$$a$$ {#eq:a}\n\nBy [](#eq:a) and [](lesson:1.2#eq:a), $$b$$ [x](lesson:1.1#eq:gone).\n\n",
+        "## A [title]{term}\n\n> The [thing]{term=other} is\n>\n> $$c$$\n\n",
+        "See lesson 1.2, [x](page:about#here) and [y](examples/a.py), [z](model:box).\n\n",
+        "[^n] and [^n] again\n\n[^n]: A note: [l](#nowhere), $y$, `1.5`{out=examples/a.py}\n\n",
+        '<div id="raw">\n<a href="#gone">x</a>\n</div>\n\n',
+        "> [!note]- A *title* [t](lesson:9.9)\n> Inside <i>x</i>\n>\n> ## In it\n\n",
+        "> quoted `2`{out}\n>\n> - item [i](level:1)\n>   - deeper ![q](no.png)\n\n",
+        "| a | `3`{out} |\n| - | - |\n| [b](lesson:1.1) | $c$ |\n\n",
+        block("a.py", 'print("one", 1.5)\nprint(12.5)\n', "one 1.5\n12.5"),
+        block("a.py", "print(2)\n", "2"),
+        block("b.py", 'print("x 1")\nprint("y 2")\n')
+        + "Output:\n\n| n | v |\n| - | - |\n| x | 1 |\n| [y](lesson:1.2) | $2$ |\n\n",
+        "```mjcf\n<mujoco/>\n```\n\n",
+        "```bench box\n```\n\n",
+        "```bench arm scenario=swing show=table\n```\n\n",
+        '```mjcf fragment="worldbody" error="no"\n<body/>\n```\n\n',
+        '```lab simlab\n{"model": "box", "note": "A [n](lesson:1.2) `4`{out}", "key": 1}\n```\n\n',
+        '```lab other\n{"model": "gone"}\n```\n\n',
+        '```quiz\n{"id": "q", "title": "Q", "questions": [{"kind": "output", "q": "[w](#here) $z$",'
+        ' "script": "examples/a.py", "line": 7, "explain": "## E"},'
+        ' {"kind": "mcq", "q": "W?", "options": ["[o](lesson:1.1)", "b"], "answer": 0,'
+        ' "feedback": ["![f](f.png)", ""]}]}\n```\n\n',
+        "```io\ninput: [i](lesson:3.3)\nprocess: `5`{out}\noutput: o\n```\n\n",
+        "    indented\n\n",
+        "$$\n\\frac{a}{b}\n$$\n\n",
+        "***\n\n",
+    ]
+)
 SEEN = [
     ("{#here}", "{#there}"),
     ("lesson:1.2#here", "lesson:1.1#here"),
@@ -183,12 +121,20 @@ SEEN = [
 ]
 
 
-def test_fingerprint_changes_with_what_others_see_and_not_with_prose() -> None:
-    text = "".join(PARTS)
+def test_fingerprint_changes_with_what_others_see_and_not_with_prose(
+    tmp_path: Path, stores: Path
+) -> None:
+    folder = Folder(tmp_path / "course")
+    folder.fill([TEXT, GOOD], stores)
 
-    def of(text: str) -> str:
-        return document_fingerprint(summarized(document("content/0.md", text)))
+    def of(text: str) -> str | None:
+        folder.write(folder.lesson(), text)
+        with Documents(Memo(folder.root), 1) as documents:
+            course = load(folder.root, documents).course
+            assert isinstance(course, Course)
+            return documents.fingerprint(course)
 
-    assert of("Plain words.\n\n" + text) == of(text) == of(text + "Plain words.\n")
-    assert all(old in text for old, _ in SEEN)
-    assert [new for old, new in SEEN if of(text.replace(old, new, 1)) == of(text)] == []
+    plain = of(TEXT)
+    assert of("Plain words.\n\n" + TEXT) == plain == of(TEXT + "Plain words.\n")
+    assert all(old in TEXT for old, _ in SEEN)
+    assert [new for old, new in SEEN if of(TEXT.replace(old, new, 1)) == plain] == []

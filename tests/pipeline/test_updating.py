@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import platform
 import re
-from collections.abc import Callable
 
 import pytest
 
-from support.scratch_course import GOOD, Folder, block
+from support.scratch_course import GOOD, Make, block
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 EVERYTHING = """## Everything
 

@@ -8,15 +8,12 @@ import signal
 import stat
 import subprocess
 import time
-from collections.abc import Callable
 
 import pytest
 
-from support.scratch_course import GOOD, Folder, block, command, ended
+from support.scratch_course import GOOD, Make, block, command, ended
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 HELD = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)\nprint(1)"
 """A script that goes on when there is a file `go`."""
 

@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -199,6 +199,10 @@ class Folder:
             self.tmp
         )  # of what is passed on to children, that which nothing reads
         return outer | ours | dict(more or {})
+
+
+Make = Callable[..., Folder]
+"""Makes a course of lessons; see the fixture `make`."""
 
 
 def command(*arguments: str) -> list[str]:
