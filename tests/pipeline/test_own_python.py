@@ -72,14 +72,14 @@ def install(packages: Path, version: str, name: str) -> None:
 def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course: Folder) -> None:
     """And run again when something is installed there; of here they find `mjcourse` only."""
     (packages,) = (course.root / ".venv").glob("lib/python*/site-packages")
-    done = course.main("check")
+    done = course.run("check")
     assert done.status == 0, done.out + done.err
     assert "1 script" in done.out
-    again = course.main("check")
+    again = course.run("check")
     assert again.status == 0
     assert "nothing has changed since the last check" in again.out
     install(packages, "1.1", "Venus")
-    drifted = course.main("check")
+    drifted = course.run("check")
     assert drifted.status == 1
     assert "Venus" in drifted.out
     assert course.main("update").status == 0
