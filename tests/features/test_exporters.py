@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from support.archives import entries
 from support.markdown_files import DOCS, fences
 from support.scratch_course import GOOD, Folder
 
@@ -38,45 +39,15 @@ def test_example_of_the_docs_writes_the_lessons_as_a_table(course: Folder) -> No
     assert b"1.1,One,1" in course.read("lessons.csv")
 
 
-def test_exporter_may_pack_files_draw_documents_and_warn(course: Folder) -> None:
-    course.write(
-        "features/lessons.py",
-        """
-from coursebuild.core.features import Exporter, Feature
-from coursebuild.core.model.results import OutputFile
-from coursebuild.core.text.diagnostics import diagnose
-from coursebuild.core.text.rules import Rule
-
-
-def make(context):
-    for lesson in context.course.lessons:
-        page = context.page(lesson.document)
-        yield OutputFile(f"{lesson.id}.html", page.blocks(page.document.blocks).encode())
-        yield diagnose("bare", lesson.document.blocks[0].span, f"{lesson.id} has no frame")
-    yield from (file for path, file in context.site().items() if path.endswith(".css"))
-    yield OutputFile("map.toml", context.read("content/course.toml"))
-
-
-FEATURE = Feature(
-    name="bare",
-    rules=(Rule("bare", "warning", "A page has no frame."),),
-    exporters=(Exporter(name="bare", summary="s", file="b.zip", mark="map.toml", make=make),),
-)
-""",
-    )
-    done = course.main("export", "bare", "--out", "sub/b.zip")
-    assert done.status == 0 and "wrote 4 files to sub/b.zip" in done.out, done.out + done.err
-    assert done.out.count("warning[bare]") == 2
-
-
-def test_exporter_finds_blocks_of_its_own_feature(course: Folder) -> None:
+def test_exporter_may_pack_files_draw_documents_warn_and_find_its_blocks(course: Folder) -> None:
     course.write(
         "features/lessons.py",
         """
 from coursebuild.core.features import Exporter, Feature, FenceKind
 from coursebuild.core.model import FeatureBlock, document_blocks
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.rules import Rule
 
 
 class Note(FeatureBlock, frozen=True):
@@ -87,25 +58,38 @@ class Note(FeatureBlock, frozen=True):
 
 
 def make(context):
-    for document in context.course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, Note):
-                yield OutputFile("notes.txt", block.text.encode())
+    for lesson in context.course.lessons:
+        page = context.page(lesson.document)
+        yield OutputFile(f"{lesson.id}.html", page.blocks(page.document.blocks[:1]).encode())
+        yield diagnose("bare", lesson.document.blocks[0].span, f"{lesson.id} has no frame")
+        notes = (b.text for b in document_blocks(lesson.document) if isinstance(b, Note))
+        yield OutputFile(f"{lesson.id}.txt", "".join(notes).encode())
+    yield from (file for path, file in context.site().items() if path.endswith(".css"))
+    yield OutputFile("map.toml", context.read("content/course.toml"))
 
 
 def parse(fence, texts):
     return Parsed(Note(fence.span, fence.body.text))
 
 
-KIND = FenceKind(name="note", block=Note, parse=parse, draw=None, markdown=None)
-NOTES = Exporter(name="notes", summary="s", file="n.txt", mark="", make=make, archive=False)
-FEATURE = Feature(name="notes", fences=(KIND,), exporters=(NOTES,))
+def text(page, block):
+    return block.text
+
+
+FEATURE = Feature(
+    name="bare",
+    fences=(FenceKind(name="note", block=Note, parse=parse, draw=text, markdown=text),),
+    rules=(Rule("bare", "warning", "A page has no frame."),),
+    exporters=(Exporter(name="bare", summary="s", file="b.zip", mark="map.toml", make=make),),
+)
 """,
     )
     course.write("content/lessons/1.2-two.md", "## Two\n\n```note\nmine\n```\n")
-    done = course.main("export", "notes")
-    assert done.status == 0, done.out + done.err
-    assert course.read("n.txt") == b"mine\n"
+    done = course.main("export", "bare", "--out", "sub/b.zip")
+    assert done.status == 0 and "wrote 6 files to sub/b.zip" in done.out, done.out + done.err
+    assert done.out.count("warning[bare]") == 2
+    packed = entries(course.root / "sub/b.zip")
+    assert packed["1.2.txt"] == b"mine\n" and b'<h2 id="hello">Hello' in packed["1.1.html"]
 
 
 def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:

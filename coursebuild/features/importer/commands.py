@@ -26,14 +26,12 @@ from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.importer.convert import convert, write_course
-from coursebuild.features.importer.values import Leftover
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, open_store
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
 from coursebuild.pipeline.scripts import run as run_scripts
-from coursebuild.report import Report
 from coursebuild.report.values import plural
 
 _LONGEST = 900.0
@@ -65,7 +63,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make a course of one that was written for another tool."""
+    """Write the course as one of coursebuild in a new folder, try its scripts, and check it."""
     if arguments.root is not None:
         raise UsageError("import takes no -C: the new course's folder is named by --out")
     source = Path(arguments.folder)
@@ -74,31 +72,16 @@ def run(arguments: argparse.Namespace) -> int:
         out, arguments.cache, arguments.cache_size, os.environ, fresh=arguments.no_cache
     )
     options = Options(out, arguments.jobs or available_cores(), arguments.quiet, store)
-    return print_report(_import_course(source, options), "text", options)
-
-
-def _import_course(source: Path, options: Options) -> Report:
-    """Write the course in a folder as one of coursebuild to that of the options, and check it.
-
-    Raises:
-        UsageError: there is nothing to import, or the new folder is not empty enough.
-    """
     converted = convert(source)
-    write_course(converted, options.root, source)
-    progress = Progress(quiet=options.quiet)
-    proposed = _try_scripts(options, progress)
+    write_course(converted, out, source)
+    said = [f"wrote {plural(len(converted.files), 'file')} to {out}"]
+    said += _try_scripts(options, Progress(quiet=options.quiet))
+    for left in converted.left:
+        place = f", {left.place}" if left.place else ""
+        said.append(f"left: {left.path}{place}: {left.what}")
     report = check(options)
-    remarks = (
-        f"wrote {plural(len(converted.files), 'file')} to {options.root}",
-        *proposed,
-        *(_said(one) for one in converted.left),
-    )
-    return replace(report, remarks=(*remarks, *report.remarks), depends=None)
-
-
-def _said(left: Leftover) -> str:
-    place = f", {left.place}" if left.place else ""
-    return f"left: {left.path}{place}: {left.what}"
+    report = replace(report, remarks=(*said, *report.remarks), depends=None)
+    return print_report(report, "text", options)
 
 
 # --- scripts
@@ -148,7 +131,8 @@ def _keys(script: Script, done: ScriptRun) -> Iterator[str]:
     missing = _MISSING.search(done.stderr) if done.outcome is Outcome.FAILED else None
     if missing is not None and not script.requires:
         yield f"requires={missing[1].partition('.')[0]}"
-    if done.outcome is Outcome.OK and done.seconds * _ROOM > script.timeout:
+    long = done.outcome is Outcome.OK and done.seconds * _ROOM > script.timeout
+    if long and "timeout=" not in script.span.first_line().text:
         yield f"timeout={math.ceil(done.seconds * _ROOM / 10) * 10}"
     signs = {d.sign for d in done.trace.divergences} if done.trace is not None else set()
     if signs - {Sign.CONTACT} and not script.diverges:

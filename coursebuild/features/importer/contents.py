@@ -12,8 +12,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from msgspec import Struct
-
 from coursebuild.core.files.errors import UsageError
 from coursebuild.features.importer.values import (
     TEXTS,
@@ -37,14 +35,6 @@ _TOP = {"toc", "root", "site-url", "author", "authors", "version"}
 """What only the whole course has, whose title is no level's."""
 
 
-class _Entry(Struct):
-    """A line of a table of contents."""
-
-    file: str
-    title: str
-    inside: list[_Entry]
-
-
 def read_contents(files: Files, folder: str) -> SourceCourse:
     """The course in a folder of notebooks or Markdown, of this name.
 
@@ -53,24 +43,20 @@ def read_contents(files: Files, folder: str) -> SourceCourse:
     """
     settings = [_settings(name, files) for name in ("myst.yml", "_quarto.yml", "_config.yml")]
     title = next((t for s in settings for t in [_title(s)] if t), "")
-    entries = [
-        *_entries(_settings("_toc.yml", files), files),
-        *_entries(settings[0].get("project"), files),
-        *_entries((settings[1].get("book") or {}).get("chapters"), files),
-        *_entries((settings[1].get("website") or {}).get("sidebar"), files),
-    ]
-    if not entries:
-        entries = list(_by_folder(files))
-    if not entries:
+    found = [
+        *_parts(_settings("_toc.yml", files), files),
+        *_parts(settings[0].get("project"), files),
+        *_parts((settings[1].get("book") or {}).get("chapters"), files),
+        *_parts((settings[1].get("website") or {}).get("sidebar"), files),
+    ] or [*_by_folder(files)]
+    if not found:
         raise UsageError(
             "there is nothing to import: no course.json, no notebook and no Markdown file"
         )
-    pages = [e for e in entries if not e.inside and _base(e.file) in _FIRST]
-    entries = [entry for entry in entries if entry not in pages]
+    pages = [one for one in found if isinstance(one, SourceLesson) and _base(one.path) in _FIRST]
+    parts = [one for one in found if one not in pages]
     return SourceCourse(
-        title=title or name_of(folder),
-        levels=tuple(_levels(entries, title)),
-        pages=tuple(_lesson(entry) for entry in pages),
+        title=title or name_of(folder), levels=tuple(_levels(parts, title)), pages=tuple(pages)
     )
 
 
@@ -91,25 +77,31 @@ def _title(settings: Mapping[str, Any]) -> str:
     return ""
 
 
-def _entries(value: object, files: Files) -> Iterator[_Entry]:
-    """The lines of a table of contents, whichever tool's."""
+def _parts(value: object, files: Files) -> Iterator[SourceLesson | SourceLevel]:
+    """The lessons and groups of lessons of a table of contents, whichever tool's."""
     if isinstance(value, str):
-        path = _file(value, files)
-        if path:
-            yield _Entry(path, "", [])
+        if path := _file(value, files):
+            yield SourceLesson(path=path)
     elif isinstance(value, list):
         for item in value:
-            yield from _entries(item, files)
+            yield from _parts(item, files)
     elif isinstance(value, Mapping):
-        yield from _entries(value.get("root"), files)
-        inside = [entry for key in _LISTS for entry in _entries(value.get(key), files)]
+        yield from _parts(value.get("root"), files)
+        inside = [part for key in _LISTS for part in _parts(value.get(key), files)]
         path = next((path for key in _FILES if (path := _file(value.get(key), files))), "")
         titled = next((str(value[key]) for key in _TITLES if value.get(key)), "")
         title = "" if _file(titled, files) else titled
-        if path or (title and inside and not _TOP & value.keys()):
-            yield _Entry(path, title, inside)
+        own = [SourceLesson(path=path, title=title)] if path else []
+        if inside and (path or (title and not _TOP & value.keys())):
+            lessons = tuple(_lessons([*own, *inside]))
+            yield SourceLevel(title=title or name_of(path), lessons=lessons)
         else:
-            yield from inside
+            yield from (*own, *inside)
+
+
+def _lessons(parts: Iterable[SourceLesson | SourceLevel]) -> Iterator[SourceLesson]:
+    for part in parts:
+        yield from (part,) if isinstance(part, SourceLesson) else part.lessons
 
 
 def _file(name: object, files: Files) -> str:
@@ -128,40 +120,24 @@ def _natural(path: str) -> list[tuple[int, int | str]]:
     return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
 
 
-def _by_folder(files: Files) -> Iterator[_Entry]:
+def _by_folder(files: Files) -> Iterator[SourceLesson | SourceLevel]:
     texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural)
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
-        inside = [_Entry(path, "", []) for path in paths if _base(path) not in _NOT_LESSONS]
-        if folder and inside:
-            yield _Entry("", name_of(folder), inside)
+        lessons = [SourceLesson(path=path) for path in paths if _base(path) not in _NOT_LESSONS]
+        if folder and lessons:
+            yield SourceLevel(title=name_of(folder), lessons=tuple(lessons))
         else:
-            yield from inside
+            yield from lessons
 
 
 def _base(path: str) -> str:
     return posixpath.basename(path).split(".")[0].lower()
 
 
-def _lesson(entry: _Entry) -> SourceLesson:
-    return SourceLesson(id="", path=entry.file, title=entry.title)
-
-
-def _flat(entries: Iterable[_Entry]) -> Iterator[_Entry]:
-    for entry in entries:
-        if entry.file:
-            yield entry
-        yield from _flat(entry.inside)
-
-
-def _levels(entries: Iterable[_Entry], title: str) -> Iterator[SourceLevel]:
-    """A level for each part; lessons that stand in none are one as well."""
-    number = itertools.count(1)
-    for grouped, run in itertools.groupby(entries, lambda entry: bool(entry.inside)):
-        if grouped:
-            for entry in run:
-                lessons = tuple(_lesson(one) for one in _flat([entry]))
-                words = entry.title or name_of(entry.file)
-                yield SourceLevel(id=str(next(number)), title=words, lessons=lessons)
+def _levels(parts: Iterable[SourceLesson | SourceLevel], title: str) -> Iterator[SourceLevel]:
+    """A level for each group; lessons that stand in none are one as well."""
+    for kind, run in itertools.groupby(parts, type):
+        if kind is SourceLesson:
+            yield SourceLevel(title=title or "Lessons", lessons=tuple(_lessons(run)))
         else:
-            lessons = tuple(_lesson(entry) for entry in run)
-            yield SourceLevel(id=str(next(number)), title=title or "Lessons", lessons=lessons)
+            yield from (part for part in run if isinstance(part, SourceLevel))

@@ -48,9 +48,9 @@ class Segment(Struct, frozen=True, kw_only=True):
 class SourceLesson(Struct, frozen=True, kw_only=True):
     """A lesson as the map of its course names it."""
 
-    id: str
+    id: str = ""
     """As its own course calls it; empty where that has no ids."""
-    path: str
+    path: str = ""
     """Its file, relative to the folder; empty where it is only planned."""
     title: str = ""
     slug: str = ""
@@ -64,7 +64,7 @@ class SourceLesson(Struct, frozen=True, kw_only=True):
 class SourceLevel(Struct, frozen=True, kw_only=True):
     """A group of lessons."""
 
-    id: str
+    id: str = ""
     title: str
     summary: str = ""
     lessons: tuple[SourceLesson, ...]

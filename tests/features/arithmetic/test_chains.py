@@ -50,6 +50,11 @@ def test_what_holds_is_passed_and_symbols_are_left_alone() -> None:
     assert wrong == []
 
 
+def test_sides_without_a_number_to_compare_are_held_against_each_other() -> None:
+    (found,) = check_arithmetic(r"\sqrt{2} = \sqrt{2.01}")
+    assert found.message == "1.414213562 and 1.417744688 are not the same"
+
+
 @given(st.lists(st.decimals(-1000, 1000, places=4), min_size=1, max_size=6), st.integers(-9, 9))
 def test_a_sum_is_told_just_where_its_last_digit_is_wrong(terms: list[Decimal], off: int) -> None:
     result = sum(terms) + Decimal(off).scaleb(-4)

@@ -112,6 +112,7 @@ DOUBTS = [
     ("content/lessons/1.1-one.md", '<a href="1.2-two.html">there</a>\n'),
     ("content/lessons/1.1-one.md", "As in Lessons 1.1–1.3.\n"),
     ("content/lessons/1.1-one.md", "As in Lessons 1.2 to 1.3.\n"),
+    ("content/lessons/1.1-one.md", "As in Lessons 0.9 to 1.2.\n"),
     ("content/lessons/1.1-one.md", "As in lesson 1.2.\n"),
     ("content/lessons/1.1-one.md", block("c.py", "# LESSONS 1.1 and 1.2\nprint(1)")),
     (MAP, "# Lesson 1.2 is short.\n"),

@@ -176,6 +176,11 @@ LEFT = {
         "```python fragment\nif\n```",
         "line 1: a cell that is no Python is shown and not run: invalid syntax (<unknown>, line 1)",
     ),
+    "```{python}\nx = 1\n```\n```{python}\n%%bash\nls\n```\n```{python}\nprint(x)\n```": (
+        "```python fragment\nx = 1\n```\n\n```bash\nls\n```\n\n"
+        '```python file=examples/l1_1_one.py\n"""One."""\n\nx = 1\n\nprint(x)\n```',
+        "line 4: a cell of `%%bash` is shown and not run",
+    ),
     "```lap\n{}\n```": ("```json\n{}\n```", "line 1: a block `lap`, which is shown as JSON"),
 }
 

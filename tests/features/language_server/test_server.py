@@ -150,6 +150,16 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     editor.until(ONE)
 
 
+def test_what_running_found_follows_its_lines(editor: Editor) -> None:
+    typed = FALL.replace("print(", "print(1 / 0, ")
+    editor.write(ONE, typed)
+    editor.save(ONE)
+    (told,) = editor.until(ONE, "script-failed")
+    editor.write(ONE, "A line more.\n\n" + typed)
+    while editor.told[ONE][0].range.start.line != told.range.start.line + 2:
+        editor.until(ONE, "script-failed")
+
+
 def test_a_map_that_is_being_written_is_told_and_the_rest_stays(editor: Editor) -> None:
     text = editor.texts[MAP]
     editor.write(MAP, text + "\n[[silence]]\nrule = \n")
