@@ -8,7 +8,6 @@ from typing import Any
 
 import nbformat
 import pytest
-from msgspec.structs import replace
 
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages.urls import Place
@@ -183,6 +182,7 @@ def test_a_lesson_as_a_notebook(files: dict[str, bytes]) -> None:
     made = cells(files["lessons/0.1-falling.ipynb"])
     scripts = {cell["id"]: cell for cell in made if cell["cell_type"] == "code"}
     assert list(scripts) == ["setup", "code-a-1", "code-in-callout-1", "code-never-1"]
+    assert 'FILES = ""\n' in source(scripts["setup"]), "each script stands in its own cell alone"
     first = scripts["code-a-1"]
     assert source(first) == ('%%example examples/a.py --n \'a b\'\nprint("one")\nprint("```")')
     assert first["outputs"] == [
@@ -230,18 +230,6 @@ def test_ids_of_cells_differ_whatever_the_headings(make: Make) -> None:
     text = "## 重力\n\na\n\n## " + "x" * 200 + "\n\nb\n\n## 重力\n\nc\n\n## !\n\nd\n"
     ids = [cell["id"] for cell in cells(site(make, text)["lessons/0.1-falling.ipynb"])]
     assert len(set(ids)) == len(ids) == 5
-
-
-def test_a_course_without_written_lessons_has_no_notebook(make: Make) -> None:
-    made = make("Text.")
-    levels = tuple(
-        replace(level, lessons=tuple(replace(x, document=None) for x in level.lessons))
-        for level in made.course.levels
-    )
-    course = replace(made.course, levels=levels)
-    files = replace(made, course=course).site()
-    assert not [path for path in files if path.endswith(".ipynb")]
-    assert b"Optional" in files["llms.txt"]
 
 
 def test_numbers_of_formulas_are_written(make: Make) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 import threading
+import time
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
@@ -141,12 +142,22 @@ class Editor:
             self.told[self.places.path(told.uri)] = list(told.diagnostics)
             self._news.notify_all()
 
-    def until(self, path: str, *rules: str) -> list[types.Diagnostic]:
-        """The diagnostics of a file, once they are of these rules."""
+    def until(self, path: str, *rules: str, line: int | None = None) -> list[types.Diagnostic]:
+        """The diagnostics of a file, once they are of these rules, the first at this line."""
 
         def good() -> bool:
-            return [one.code for one in self.told.get(path, [])] == [*rules]
+            told = self.told.get(path, [])
+            return [one.code for one in told] == [*rules] and (
+                line is None or told[0].range.start.line == line
+            )
 
         with self._news:
             assert self._news.wait_for(good, 120), self.told
             return self.told.get(path, [])
+
+    def eventually(self, answer: Callable[[], T]) -> T:
+        """An answer, asked for until it is something."""
+        until = time.monotonic() + 120
+        while not (found := answer()):
+            assert time.monotonic() < until, self.told
+        return found

@@ -1,6 +1,6 @@
 """Elements of XML, and names that it allows.
 
-Entry points: `element`, `document`; `render_xml`, a file by its template, in which `markup` stands
+Entry points: `element`; `render_xml`, a file by its template, in which `markup` stands
 for elements; `identifier`, a name out of any text.
 """
 
@@ -13,12 +13,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, TypeAlias
 from xml.etree.ElementTree import Element as Element
-from xml.etree.ElementTree import indent, tostring
+from xml.etree.ElementTree import tostring
 
 from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup, escape
-
-XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
 Child: TypeAlias = "Element | str | None"
 
@@ -48,14 +46,6 @@ def add(parent: Element, *children: Child) -> None:
             parent[-1].tail = (parent[-1].tail or "") + _clean(child)
         else:
             parent.text = (parent.text or "") + _clean(child)
-
-
-def document(root: Element, *, pretty: bool = False) -> bytes:
-    """A whole file; `pretty` is for one in which blanks between elements mean nothing."""
-    if pretty:
-        indent(root, " ")
-    text = tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 def render_xml(template: Path, **values: Any) -> bytes:

@@ -67,8 +67,7 @@ BALL = """<!-- A ball in the air. -->
 
 def wait_for_results(editor: Editor) -> None:
     """Until everything has run."""
-    while "nq = 7" not in editor.hover_text(TWO, "model:ba|ll"):
-        pass
+    editor.eventually(lambda: "nq = 7" in editor.hover_text(TWO, "model:ba|ll"))
 
 
 @pytest.fixture(scope="module")
@@ -140,9 +139,8 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     (told,) = editor.until(ONE, "output-drift")
     assert told.range.start.line == 20
     accept = "Accept what `examples/fall.py` prints"
-    action = None
-    while action is None:  # offered once the script has run a second time
-        action = editor.actions(ONE, "at 1.|000 m").get(accept)
+    # offered once the script has run a second time
+    action = editor.eventually(lambda: editor.actions(ONE, "at 1.|000 m").get(accept))
     assert action.kind == types.CodeActionKind.QuickFix and action.diagnostics
     (new,) = editor.edited(action.edit.changes).values()
     assert new == ("A line more.\n\n" + typed).replace("\nafter", "\na ball after")
@@ -156,8 +154,7 @@ def test_what_running_found_follows_its_lines(editor: Editor) -> None:
     editor.save(ONE)
     (told,) = editor.until(ONE, "script-failed")
     editor.write(ONE, "A line more.\n\n" + typed)
-    while editor.told[ONE][0].range.start.line != told.range.start.line + 2:
-        editor.until(ONE, "script-failed")
+    editor.until(ONE, "script-failed", line=told.range.start.line + 2)
 
 
 def test_a_map_that_is_being_written_is_told_and_the_rest_stays(editor: Editor) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from coursebuild.core.pages.xml import document, element
+from coursebuild.core.pages.xml import Element, element, markup
 from coursebuild.features.qti.flow import Flow
 from support.archives import formula_mistakes
 from support.hostile_html import HOSTILE
@@ -72,7 +72,7 @@ def item(flow: Flow, html: str) -> bytes:
         ),
         element("modalFeedback", feedback, *blocks()),
     )
-    return document(root)
+    return markup([root]).encode()
 
 
 def check(html: str) -> Flow:
@@ -100,8 +100,8 @@ def blocks(html: str) -> str:
     )
 
 
-def bare(made: object) -> bytes:
-    data = document(made)  # type: ignore[arg-type]
+def bare(made: Element) -> bytes:
+    data = markup([made]).encode()
     declared = rb'\1 xmlns:m="http://www.w3.org/1998/Math/MathML"'
     return re.sub(rb"(<[a-z:0-9]+)", declared, data, count=1)
 
