@@ -46,25 +46,27 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     for version, number in ((HERE, REAL_NUMBER), (OTHER, 9_001_000)):
         code = ENGINE.format(version=version, number=number)
-        code += "def mju_isBad(x):\n    return 1\n" if version == HERE else ""
-        wheel(folder, version, code)
+        code += "def mju_isBad(x):\n    return 1\n" if version == HERE else "import mujoco_core\n"
+        wheel(folder, version, code, part="" if version == HERE else f"mujoco-core=={version}")
+    wheel(folder, OTHER, "", name="mujoco_core")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
     return folder
 
 
-def wheel(folder: Path, version: str, code: str) -> None:
-    """A MuJoCo as pip installs it."""
-    info = f"mujoco-{version}.dist-info"
+def wheel(folder: Path, version: str, code: str, name: str = "mujoco", part: str = "") -> None:
+    """A MuJoCo as pip installs it, or a package that is a part of it."""
+    info = f"{name}-{version}.dist-info"
     needs = "Requires-Dist: nowhere-to-be-found\n"  # what it needs is what is installed here
+    needs += f"Requires-Dist: {part}\nRequires-Dist: mujoco-usd; extra == 'usd'\n" if part else ""
     files = {
-        "mujoco/__init__.py": code,
-        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: mujoco\nVersion: {version}\n{needs}",
+        f"{name}/__init__.py": code,
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{needs}",
         f"{info}/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
     }
     files[f"{info}/RECORD"] = "".join(f"{file},,\n" for file in [*files, f"{info}/RECORD"])
-    with zipfile.ZipFile(folder / f"mujoco-{version}-py3-none-any.whl", "w") as archive:
+    with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as archive:
         for file, text in files.items():
             archive.writestr(file, text)
 

@@ -7,14 +7,15 @@ Entry points: `other_version`, what the user may name; `latest_version`, the one
    used last are kept.
 2. A new one is made beside its place and renamed there when MuJoCo can be imported in it, so that
    none is ever half there. The remains of a process that was killed are removed the next time.
-3. pip, as the user has configured it, installs MuJoCo and nothing else. All other packages are
-   found where they are installed here.
+3. pip, as the user has configured it, installs MuJoCo, with the packages that it consists of, and
+   nothing else. All other packages are found where they are installed here.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib.metadata
 import importlib.util
 import json
 import os
@@ -42,7 +43,7 @@ _VERSION = re.compile(
     r"\d+(\.\d+){0,3}((a|b|rc)\d+)?(\.post\d+)?(\.dev\d+)?(\+[a-z0-9.]+)?", re.ASCII
 )
 _ENGINE = "mujoco"
-_INSTALL = ("install", "--no-deps", "--no-input", "--progress-bar", "off", "--only-binary", _ENGINE)
+_INSTALL = ("install", "--no-deps", "--no-input", "--progress-bar", "off", "--only-binary", ":all:")
 _LINES = 4
 """Of what pip says where it fails, so many lines are told."""
 _OFFLINE = (
@@ -145,9 +146,13 @@ def _make(prefix: Path, engine: str) -> None:
             shutil.copyfile(configured, new / "pip.conf")
         python = str(new / "bin" / "python")
         pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL]
-        status, said = _run([*pip, f"{_ENGINE}=={engine}"])
-        if status:
-            raise _pip_error(engine, said)
+        wanted, installed = {f"{_ENGINE}=={engine}"}, set[str]()
+        while wanted:
+            status, said = _run([*pip, *sorted(wanted)])
+            if status:
+                raise _pip_error(engine, said)
+            installed |= wanted
+            wanted = _parts(_packages(new)) - installed
         lines = (f"import site; site.addsitedir({folder!r})\n" for folder in site_folders())
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, said = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
@@ -157,6 +162,16 @@ def _make(prefix: Path, engine: str) -> None:
         new.rename(prefix)
     finally:
         shutil.rmtree(new, ignore_errors=True)
+
+
+def _parts(packages: Path) -> set[str]:
+    """What MuJoCo needs of its own packages, as `mujoco-core==4.0.0`."""
+    needs = {
+        need
+        for installed in importlib.metadata.distributions(path=[str(packages)])
+        for need in installed.requires or ()
+    }
+    return {need for need in needs if need.startswith(f"{_ENGINE}-") and "extra ==" not in need}
 
 
 def _pip_error(engine: str, said: str) -> EffectError:
