@@ -170,8 +170,7 @@ class BackgroundRebuild:
         verdict = summary_line(report).rpartition(": ")[2]
         if now and before is not None:
             verdict = f"{verdict} ({', '.join(counts)})" if counts else f"still {verdict}"
-        if now or now != before:
-            self._progress.say(f"checked: {verdict}")
+        self._progress.say(f"checked: {verdict}")
 
     # --- scripts
 
