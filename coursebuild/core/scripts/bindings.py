@@ -252,7 +252,7 @@ def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:
         return diagnose(
             "binding-orphan",
             binding.text_span,
-            f"`{binding.text}` has no recorded output above it to lean on",
+            f"`{binding.text}` is bound, and no recorded output stands above it",
             help="write it below the output, or name the script: `{out=examples/…}`",
         )
     return diagnose(

@@ -13,6 +13,7 @@ Entry points: `failure` (a run), `silence` (an output is recorded and nothing wa
 
 from __future__ import annotations
 
+import posixpath
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -270,6 +271,10 @@ def effects(
     found = () if run.trace is None else run.trace.effects
     for kind, (rule, said, help) in _EFFECTS.items():
         if these := [each for each in found if each.kind is kind]:
+            what = these[0].what
+            if kind is EffectKind.WRITE and what.endswith((".svg", ".png")):
+                name = posixpath.basename(what)
+                help = f"to show it, save it as `{name}`, and say `figure={name}` on the fence"
             yield _found(rule, extraction, these, extractions, f"`{run.path}` {said}", help)
 
 

@@ -103,7 +103,8 @@ class _Decoder:
         if isinstance(node, ErrorNode):  # reported when it was read
             return _FAILED
         message = wrong_type(node, name, type, self.words)
-        return self.report("field-type", node.mark, message, help or type_help(node, type))
+        help = help or type_help(node, type) or _described(name, type)
+        return self.report("field-type", node.mark, message, help)
 
     def value(self, node: Node, type: inspect.Type, name: str, remarks: dict[str, Any]) -> object:
         """The value of a node of which a type is declared."""
@@ -227,8 +228,7 @@ class _Decoder:
         missing = [field for field in type.fields if field.required and field.name not in values]
         for lacking in missing:
             if lacking.name not in meant:  # a misspelt field is one mistake
-                about = description(lacking)
-                help = about and f"`{lacking.name}`: {about}"
+                help = _described(lacking.name, lacking.type)
                 self.report("field-missing", node.mark, f"`{lacking.name}` is missing", help)
         if missing or _FAILED in values.values():
             return _FAILED
@@ -293,10 +293,15 @@ class _Decoder:
         return self.report("field-missing", node.mark, f"`{tag}` is missing", help)
 
 
-def description(field: inspect.Field) -> str:
-    """What a field is, as its declaration says."""
-    extra = field.type.extra_json_schema if isinstance(field.type, inspect.Metadata) else None
+def description(type: inspect.Type) -> str:
+    """What a field of this type is, as its declaration says."""
+    extra = type.extra_json_schema if isinstance(type, inspect.Metadata) else None
     return str((extra or {}).get("description", ""))
+
+
+def _described(name: str, type: inspect.Type) -> str:
+    about = description(type)
+    return about and f"`{name}`: {about}"
 
 
 def _owners(key: str, variants: Mapping[str, inspect.StructType]) -> list[str]:

@@ -87,7 +87,11 @@ def _repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
         return None
     key, first = reader.known
     notes = (Note("the first one is here", first.span),)
-    return diagnose("field-repeated", key.span, f"`{key.value}` is given twice", notes=notes)
+    message = f"`{key.value}` is given twice"
+    before, header = (one.source.line_text(one.line).strip() for one in (first.span, key.span))
+    single = before.startswith("[") and re.match(r"\[[^\[]+\.", header)
+    help = f"if there are several, write each header with two brackets: `[{header}]`"
+    return diagnose("field-repeated", key.span, message, notes=notes, help=help if single else "")
 
 
 class _TableParts(Struct):

@@ -48,7 +48,7 @@ _FOREIGN: dict[str, tuple[str, str, str]] = {
         "a callout is a quotation: `> [!note]`, and `> ` before each line of it",
     ),
     "latex": (
-        r"\\\([^\n]*?[\\^_=+][^\n]*?\\\)|^\\\[\s[\s\S]*?\\\]|\$\0+\$"
+        r"\\\((?:[^\n]*?[\\^_=+][^\n]*?|[ ]?[A-Za-z][ ]?)\\\)|^\\\[\s[\s\S]*?\\\]|\$\0+\$"
         r"|\\(?:begin|ref|eqref|cite)\{[^{}\n\0]*\}",
         "is no formula here, and is shown as text",
         "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",

@@ -54,7 +54,7 @@ class Overlays(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Camera(Struct, frozen=True, forbid_unknown_fields=True):
-    """MuJoCo's free camera; what is left out is the engine's default for the model."""
+    """The free camera of MuJoCo; what is left out is the engine's default for the model."""
 
     azimuth: Annotated[float | None, Meta(description="degrees")] = None
     elevation: Annotated[float | None, Meta(description="degrees, negative to look down")] = None

@@ -6,6 +6,7 @@ Entry points: `trial_diagnostics(lab, trial)`, `deep_diagnostics(lab, trial)`,
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from msgspec import Struct
@@ -93,9 +94,17 @@ def code_diagnostic(lab: Lab, piece: LabCode, message: str) -> Diagnostic:
     """A piece of code that cannot be part of a lab."""
     message = message[:1].lower() + message[1:].rstrip(".")
     what = f"{_named(lab, piece.entry)} has code that cannot run: {message}"
-    return diagnose("lab-code", lab.place(piece.entry), what, help=_HELP[piece.form])
+    help = _PYTHON_HELP if _PYTHON.search(piece.code) else _HELP[piece.form]
+    return diagnose("lab-code", lab.place(piece.entry), what, help=help)
 
 
+_PYTHON = re.compile(r"\b(and|or|not)\b| if .* else ")
+_OF_MATH = re.compile(
+    r"ReferenceError: (abs|sqrt|exp|log|a?(?:sin|cos|tan)|atan2|floor|ceil|round|min|max|pow|pi)\b"
+)
+_PYTHON_HELP = (
+    "code in a lab is JavaScript: `&&`, `||`, `!`, and `test ? a : b` for `a if test else b`"
+)
 _HELP = {
     "statements": "",
     "expression": "an expression has a value and no `;`, as in `data.qpos[0]`",
@@ -185,7 +194,9 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
     message = (failure.message or "something that has no text").rstrip(".")
     match failure.kind:
         case "throws":
-            return f"{name} throws{when}: {message}", ""
+            known = _OF_MATH.search(message)
+            help = f"did you mean `Math.{known[1].replace('pi', 'PI')}`?" if known else ""
+            return f"{name} throws{when}: {message}", help
         case "nan":
             help = (
                 "where there is to be no value, give `null`" if failure.entry[0] != "expect" else ""

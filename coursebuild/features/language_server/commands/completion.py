@@ -127,7 +127,7 @@ def _fields(library: Library, place: FieldPlace) -> Mapping[str, str]:
     match place.key:
         case "":
             missing = {n: one for n, one in place.fields.items() if n not in place.given}
-            return {f"{quote}{name}{quote}": description(one) for name, one in missing.items()}
+            return {f"{quote}{name}{quote}": description(one.type) for name, one in missing.items()}
         case "rule":
             warnings = (rule for rule in RULES.values() if rule.severity == "warning")
             return {f'"{one.name}"': one.summary for one in warnings}

@@ -99,7 +99,7 @@ def _of_field(library: Library, source: Source, offset: int) -> Referent | None:
         return Referent(place.span, title, at, model.LessonTarget(lesson.id, None))
     if key == "rule" and place.text in RULES:
         return Referent(place.span, RULES[place.text].summary)
-    said = "" if key else description(place.field)
+    said = "" if key else description(place.field.type)
     return Referent(place.span, f"`{place.text}`: {said}") if said else None
 
 
