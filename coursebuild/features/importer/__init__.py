@@ -1,7 +1,7 @@
 """`coursebuild import FOLDER`: a course of another tool becomes one of coursebuild.
 
 1. The folder's map says which lessons there are: a `course.json`, the table of contents of Jupyter
-   Book, MyST or Quarto, or the files themselves (`course_json`, `contents`).
+   Book, MyST, Quarto or MkDocs, or the files themselves (`course_json`, `contents`).
 2. Each lesson is read as segments: prose, fences and cells of code (`segments`, `notebook`).
 3. What differs between the dialects is written as coursebuild reads it (`prose`, `blocks`,
    `cells`).

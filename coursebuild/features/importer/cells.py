@@ -19,6 +19,7 @@ _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULT
 """Of Quarto, and of MyST."""
 _DEFINES = re.compile(r"(?:@|(?:async )?def |class )")
 _TIMED = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
+_SHOWS = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
@@ -62,6 +63,8 @@ def _code(cell: Segment, context: LessonContext) -> str:
     for magic in _MAGIC.findall(text):
         context.leave(cell.place, f"`{magic.strip()}`, which is for Jupyter alone")
     text = _MAGIC.sub("", text)
+    if _SHOWS.search(text):
+        context.leave(cell.place, "a figure: save it by `plt.savefig`, and name it by `figure=`")
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError) as error:

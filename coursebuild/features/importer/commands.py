@@ -51,7 +51,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """What can be said."""
     parser.description = (
         "Write a course of another tool as one of coursebuild: a course.json with Markdown,\n"
-        "Jupyter notebooks, MyST or Quarto. Its folder is only read."
+        "Jupyter notebooks, MyST, Quarto or MkDocs. Its folder is only read."
     )
     add_running(parser)
     parser.add_argument("folder", metavar="FOLDER", help="what to import")

@@ -1,7 +1,8 @@
 """The map of a course without a `course.json`: the table of contents of its tool, or its files.
 
 Entry point: `read_contents`. Read are `_toc.yml` of Jupyter Book, `myst.yml` of MyST, `_quarto.yml`
-of Quarto; without one of these the files, in the order of their names, a folder for a level.
+of Quarto, `mkdocs.yml` of MkDocs; without a table of contents the files, in the order of their
+names, a folder for a level.
 """
 
 from __future__ import annotations
@@ -41,13 +42,15 @@ def read_contents(files: Files, folder: str) -> SourceCourse:
     Raises:
         UsageError: there is nothing to import.
     """
-    settings = [_settings(name, files) for name in ("myst.yml", "_quarto.yml", "_config.yml")]
+    names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
+    settings = [_settings(name, files) for name in names]
     title = next((t for s in settings for t in [_title(s)] if t), "")
     found = [
         *_parts(_settings("_toc.yml", files), files),
         *_parts(settings[0].get("project"), files),
         *_parts((settings[1].get("book") or {}).get("chapters"), files),
         *_parts((settings[1].get("website") or {}).get("sidebar"), files),
+        *_nav(settings[3].get("nav"), str(settings[3].get("docs_dir", "docs")), files),
     ] or [*_by_folder(files)]
     if not found:
         raise UsageError(
@@ -72,8 +75,10 @@ def _settings(name: str, files: Files) -> Mapping[str, Any]:
 
 def _title(settings: Mapping[str, Any]) -> str:
     for where in (settings, *(settings.get(key) for key in ("project", "book", "website"))):
-        if isinstance(where, Mapping) and isinstance(where.get("title"), str):
-            return " ".join(where["title"].split())
+        if isinstance(where, Mapping):
+            title = where.get("title", where.get("site_name"))
+            if isinstance(title, str):
+                return " ".join(title.split())
     return ""
 
 
@@ -102,6 +107,17 @@ def _parts(value: object, files: Files) -> Iterator[SourceLesson | SourceLevel]:
 def _lessons(parts: Iterable[SourceLesson | SourceLevel]) -> Iterator[SourceLesson]:
     for part in parts:
         yield from (part,) if isinstance(part, SourceLesson) else part.lessons
+
+
+def _nav(lines: object, folder: str, files: Files) -> Iterator[SourceLesson | SourceLevel]:
+    """The lines of MkDocs' `nav`: a file, or a title with a file or with further lines."""
+    for line in lines if isinstance(lines, list) else ():
+        for title, value in line.items() if isinstance(line, Mapping) else [("", line)]:
+            if isinstance(value, list):
+                if inside := tuple(_lessons(_nav(value, folder, files))):
+                    yield SourceLevel(title=str(title), lessons=inside)
+            elif path := _file(posixpath.join(folder, str(value)), files):
+                yield SourceLesson(path=path, title=str(title))
 
 
 def _file(name: object, files: Files) -> str:

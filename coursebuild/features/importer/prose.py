@@ -22,6 +22,7 @@ _LINE = re.compile(
     r"\((?P<address>[^()\s]+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
+    r"|(?P<paren>\\\((?P<inner>[^\n]+?)\\\))"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
     r"|(?P<cite>\[-?@[\w:.-]+(?:[;,][^\[\]\n]*)?\])"
     r"|(?P<substitution>\{\{[^{}\n]*\}\})"
@@ -38,6 +39,7 @@ _ENVIRONMENT = re.compile(
     r"\\end\{(?P=env)(?P=star)\})(?P<after>[ \t]*(?=\n|\Z))",
     re.DOTALL,
 )
+_BRACKETS = re.compile(r"^[ \t]*\\\[(?P<tex>.+?)\\\][ \t]*$", re.DOTALL | re.MULTILINE)
 _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
 )
@@ -68,7 +70,8 @@ def _line(line: str, context: LessonContext, place: str) -> str:
 
 
 def formulas(text: str) -> str:
-    """Displayed formulas with labels as `{#eq:name}`, and environments of LaTeX in dollar signs."""
+    """Displayed formulas with labels as `{#eq:name}`; those of LaTeX in dollar signs."""
+    text = _BRACKETS.sub(lambda m: f"$${m['tex']}$$", text)
     text = _ENVIRONMENT.sub(lambda m: f"{m['before']}$${m['tex']}$${m['after']}", text)
     return _DISPLAY.sub(_display, text)
 
@@ -124,6 +127,8 @@ def _rewritten(match: re.Match[str], context: LessonContext, place: str) -> str:
         case "link":
             text = _line(match["text"], context, place)
             return _linked(text, context.link(match["address"], place), match["title"] or "")
+        case "paren":
+            return f"${match['inner'].strip()}$"
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":

@@ -118,10 +118,17 @@ def read_text(path: Path, name: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+class _Yaml(yaml.SafeLoader):  # type: ignore[misc]  # which has no types
+    """YAML in which what other tools tag, as by `!!python/name:`, is nothing."""
+
+
+_Yaml.add_multi_constructor("", lambda loader, tag, node: None)
+
+
 def read_yaml(text: str) -> Any:
     """What a text of YAML says; `None` where it is none."""
     try:
-        return yaml.safe_load(text)
+        return _Yaml(text).get_single_data()
     except (yaml.YAMLError, ValueError, RecursionError):  # such as a date that is none
         return None
 

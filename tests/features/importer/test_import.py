@@ -1,4 +1,4 @@
-"""`coursebuild import`: courses of four kinds, and folders that cannot be imported.
+"""`coursebuild import`: courses of five kinds, and folders that cannot be imported.
 
 A case is a folder beside this file with `source/`, a course of another tool, and `expected/`: what
 an author finds in the new one, with the report in `said.txt`. `pytest --rewrite-fixtures` writes
@@ -31,7 +31,7 @@ def texts(folder: Path) -> dict[str, bytes]:
 
 
 def test_there_is_a_course_of_each_kind() -> None:
-    assert CASES == ["levels", "myst", "notebooks", "quarto"]
+    assert CASES == ["levels", "mkdocs", "myst", "notebooks", "quarto"]
 
 
 @pytest.mark.site
