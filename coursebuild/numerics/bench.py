@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import refsafe_from
-from coursebuild.numerics.front import front, verdict, words
+from coursebuild.numerics.front import front, verdict
 from coursebuild.numerics.measure import Errors, fitted_orders
 from coursebuild.numerics.observe import quantity_name
 from coursebuild.numerics.pilot import pilot
@@ -31,7 +31,7 @@ from coursebuild.numerics.reports.bench import (
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.text import solving
+from coursebuild.numerics.reports.text import setting_text, solving
 from coursebuild.numerics.rows import Basis, MeasuredRow, measured
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.settings import own_setting, settings, stable
@@ -69,7 +69,7 @@ def measure_scenario(
     basis = Basis(model, first, own, cones, invariant, beyond)
     found = []
     for setting in settings(model, first, quick=quick):
-        tell(f"{scene.name}: {words(setting)}")
+        tell(f"{scene.name}: {setting_text(setting)}")
         found.append(measured(basis, setting))
     rows = tuple(one.row for one in found)
     if clock is not None:

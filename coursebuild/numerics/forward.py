@@ -32,7 +32,6 @@ from coursebuild.numerics.integrate import (
     Rate,
     State,
     dop853,
-    quaternion_rate,
 )
 from coursebuild.numerics.pilot import apart
 from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
@@ -137,7 +136,8 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
         mujoco.mj_forward(model, data)
         slope[places] = qvel[moves]
         for at, dof in zip(turns, first, strict=True):
-            slope[at : at + 4] = quaternion_rate(state[at : at + 4], qvel[dof : dof + 3])
+            half = qvel[dof : dof + 3] / 2
+            mujoco.mju_mulQuatAxis(slope[at : at + 4], state[at : at + 4], half)
         slope[nq:end] = data.qacc
         slope[end:] = data.act_dot
         return slope

@@ -15,8 +15,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import MeasuredSetting, RowVerdict, WorkPrecisionRow
-from coursebuild.numerics.reports.text import seconds_text
+from coursebuild.numerics.reports.bench import RowVerdict, WorkPrecisionRow
+from coursebuild.numerics.reports.text import setting_text
 
 COST_SLACK, ERROR_SLACK = 0.03, 0.05
 """Relative: costs repeat to a few per cent only."""
@@ -96,7 +96,7 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
     other = _place(better)
     assert other is not None
     ratios = other.cost.value / mine.cost.value, other.error / mine.error if mine.error else 1.0
-    text = f"{words(better.setting)} is {_compared(*ratios)}"
+    text = f"{setting_text(better.setting)} is {_compared(*ratios)}"
     return RowVerdict(False, row.dominated_by, *ratios, seen, text + told)
 
 
@@ -106,27 +106,19 @@ def _enough(rows: Rows, own: float, *, hopeless: bool) -> str:
     if not unseen:
         return ", and that of every other setting too" if hopeless else ""
     cost, least = min((row.cost.value, n) for n, row in enumerate(unseen) if row.cost)
-    name, times = words(unseen[least].setting), f"{cost / own:.2g} times its cost"
+    name, times = setting_text(unseen[least].setting), f"{cost / own:.2g} times its cost"
     return f"; the cheapest without one that is seen is {name}, at {times}"
 
 
 def _lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
     """Of an own setting under which the scene does not run; the best one that does is named."""
-    text = f"the scene does not run under its own setting, {words(row.setting)}: "
+    text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
     found = [(p.error, p.cost.value, n) for n, r in enumerate(rows) if r.front and (p := _place(r))]
     better = min(found)[2] if found else None
     if better is not None:
-        text += f"; {words(rows[better].setting)} is the most accurate that does"
+        text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
     return RowVerdict(False, better, None, None, None, text)
-
-
-def words(setting: MeasuredSetting) -> str:
-    """A setting in a sentence."""
-    more = [setting.solver and f"{setting.solver}, at most {setting.iterations} iterations"]
-    more.append(setting.cone and f"{setting.cone} cone")
-    text = f"{setting.integrator} at {seconds_text(setting.timestep)}"
-    return ", ".join((text, *(part for part in more if part)))
 
 
 def _compared(cost: float, error: float) -> str:

@@ -2,7 +2,7 @@
 
 Entry points: `bulirsch_stoer(rate, start, times, tolerance)` and `dop853(rate, start, times)` of
 scipy, which share nothing, so that the two together say how well a motion is known;
-`cumulative_integral(function, times, width)`; `quaternion_rate`, of an attitude.
+`cumulative_integral(function, times, width)`.
 
 *Bulirsch–Stoer*: Gragg's midpoint rule, extrapolated.
 
@@ -120,7 +120,7 @@ def _midpoint(rate: Rate, y: State, slope: State, step: Any, n: int) -> State:
     return smooth
 
 
-def dop853(rate: Rate, start: Array, times: Array, tolerance: float = 1e-13) -> Array:
+def dop853(rate: Rate, start: Array, times: Array) -> Array:
     """The states (n, d) at the rising times (n,) s; `start` (d,) is the state at time 0.
 
     Raises:
@@ -133,9 +133,8 @@ def dop853(rate: Rate, start: Array, times: Array, tolerance: float = 1e-13) -> 
     for time in times.tolist():
         if time > now:
             first = min(step, time - now) if math.isfinite(step) else None
-            least = max(tolerance, 2.3e-14)  # what scipy allows
             solver = DOP853(
-                lambda _, y: rate(y), now, y, time, rtol=least, atol=tolerance, first_step=first
+                lambda _, y: rate(y), now, y, time, rtol=1e-13, atol=1e-13, first_step=first
             )
             while solver.status == "running":
                 solver.step()
@@ -168,20 +167,3 @@ def cumulative_integral(function: Callable[[Array], Array], times: Array, width:
     pieces = function(at.ravel()).reshape(at.shape) @ weights * widths / 2
     total: Array = np.cumsum(pieces.reshape(-1, parts).sum(axis=1))
     return total
-
-
-# ----------------------------------------------------------------------------------------- rates
-
-
-def quaternion_rate(q: Array, omega: Array) -> Array:
-    """dq/dt (4,) of one quaternion for an angular velocity (3,) in the body's frame, rad/s."""
-    q0, q1, q2, q3 = q.tolist()
-    w1, w2, w3 = omega.tolist()
-    return np.array(
-        [
-            (-q1 * w1 - q2 * w2 - q3 * w3) / 2,
-            (q0 * w1 + q2 * w3 - q3 * w2) / 2,
-            (q0 * w2 + q3 * w1 - q1 * w3) / 2,
-            (q0 * w3 + q1 * w2 - q2 * w1) / 2,
-        ]
-    )

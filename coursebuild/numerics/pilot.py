@@ -193,16 +193,8 @@ def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
     if not beyond.size:
         return float(times[-1]), None
     end = int(beyond[0])
-    usable = [
-        (float(t), math.log(gap))
-        for t, gap in zip(times[: end + 1], gaps[: end + 1], strict=True)
-        if gap > 0
-    ]
-    horizon = float(times[max(0, end - 1)])
-    if len(usable) < 3:  # too quick to be followed: from the nudge to the horizon
-        return horizon, math.log(APART / NUDGE) / float(times[end])
-    x, y = np.array(usable).T
-    return horizon, float(np.polyfit(x, y, 1)[0])
+    growth = math.log(float(gaps[end]) / NUDGE) / float(times[end])
+    return float(times[max(0, end - 1)]), growth
 
 
 def _bounds(model: Any, scenario: Scenario, seen: Peaks) -> Setup:

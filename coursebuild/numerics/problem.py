@@ -10,7 +10,8 @@ or the equations that the first reference goes by. Whoever changes one of them a
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -89,6 +90,11 @@ class Scenario(Struct, frozen=True):
         if self.hold:
             looks = whole_number(self.hold, self.sample, "the hold", "the sampling interval")
         return self.controls[min(look // looks, len(self.controls) - 1)]
+
+    def commands(self, timestep: float) -> Iterator[tuple[float, ...]]:
+        """What is commanded in each step (s), one after the other."""
+        for look in range(len(self.times)):
+            yield from itertools.repeat(self.command(look), self.steps(timestep))
 
 
 def whole_number(length: float, part: float, length_name: str, part_name: str) -> int:

@@ -21,6 +21,7 @@ where something touches; `conserved(…)`, `energy_beyond(…)`.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -45,15 +46,13 @@ from coursebuild.numerics.engine import (
 from coursebuild.numerics.forward import Method, forward_states, tends_to
 from coursebuild.numerics.integrate import (
     NoConvergenceError,
-    Rate,
-    State,
     bulirsch_stoer,
     dop853,
 )
 from coursebuild.numerics.measure import energy_drift, energy_scale, errors, momentum_drift
 from coursebuild.numerics.observe import Sticks, sticking, visible_error
 from coursebuild.numerics.pilot import Pilot, apart
-from coursebuild.numerics.problem import ROUNDING, Array, Integrator, Motion, Setup, Sizes
+from coursebuild.numerics.problem import ROUNDING, Integrator, Motion, Setup, Sizes
 from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
 from coursebuild.numerics.settings import CONES
@@ -162,14 +161,10 @@ def _integrated(model: Any, first: Pilot, quick: bool) -> Known:
     def run(method: Method) -> EngineStates:
         return forward_states(exact, first.scene.scenario, times, method, evaluations=most)
 
-    states = run(_bulirsch_stoer)
+    states = run(partial(bulirsch_stoer, tolerance=1e-13))
     source = "Bulirsch–Stoer over mj_forward"
     other, second = run(dop853), "DOP853 over mj_forward"
     return _compared(model, "ode", source, states, second, other, first.horizon)
-
-
-def _bulirsch_stoer(rate: Rate, start: State, times: Array) -> State:
-    return bulirsch_stoer(rate, start, times, 1e-13)
 
 
 def _tended(model: Any, first: Pilot, found: Known) -> bool:

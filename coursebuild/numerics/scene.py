@@ -89,16 +89,16 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
     Raises:
         SceneError: one does not fit the model.
     """
-    powers = QUICK_LADDER if quick else LADDER
+    step = float(model.opt.timestep)
+    steps = [step * 2.0**power for power in (QUICK_LADDER if quick else LADDER)]
     if not model.nv:
         if declared is not None and declared.scenarios:
             raise SceneError("nothing can move in the model", declared.scenarios[0].span)
         return ()
     if declared is not None and declared.scenarios:
         visible = declared.visible
-        return tuple(_declared(model, one, visible, powers) for one in declared.scenarios)
+        return tuple(_declared(model, one, visible, steps) for one in declared.scenarios)
     visible = Visible() if declared is None else declared.visible
-    step = float(model.opt.timestep)
     scenario = _timed(step, None, None, None, ())
     names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
     found = []
@@ -106,7 +106,7 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
         name = names[max(key, 0)]
         title = "from the model's own state" if key < 0 else f"from the keyframe {name}"
         one = Scenario(scenario.duration, scenario.sample, keyframe=key)
-        found.append(Scene(name, title, one, _ladder(one, step, powers), step, visible, None))
+        found.append(Scene(name, title, one, _ladder(one, step, steps), step, visible, None))
     return tuple(found)
 
 
@@ -124,7 +124,7 @@ def thickness(model: Any) -> Array:
 
 
 def _declared(
-    model: Any, declared: DeclaredScenario, visible: Visible, powers: Sequence[int]
+    model: Any, declared: DeclaredScenario, visible: Visible, steps: Sequence[float]
 ) -> Scene:
     step = float(model.opt.timestep)
     times = _timed(step, declared.duration, declared.sample, declared.hold, declared.controls)
@@ -137,9 +137,13 @@ def _declared(
         hold=times.hold,
         keyframe=_keyframe(model, declared.keyframe),
     )
-    ladder = _ladder(scenario, step, powers)
-    if declared.timesteps:
-        ladder = _chosen(scenario, step, declared)
+    for one in declared.timesteps:
+        count = round(scenario.sample / one)
+        if count < 1 or abs(count * one - scenario.sample) > 1e-9 * scenario.sample:
+            message = f"the timestep {one:g} s does not divide the sample, {scenario.sample:g} s"
+            help = "give `sample` a value that all timesteps divide"
+            raise SceneError(message, declared.place("timesteps"), help)
+    ladder = _ladder(scenario, step, declared.timesteps or steps)
     if scenario.duration > LONGEST * ladder[0]:
         message = f"{scenario.duration:g} s in steps of {ladder[0]:g} s are over {LONGEST:,} steps"
         place = declared.place("duration" if declared.duration is not None else "timesteps")
@@ -226,21 +230,10 @@ def _looks(basis: int, total: int) -> int:
     return min(sorted(divisors), key=badness)
 
 
-def _ladder(scenario: Scenario, own: float, powers: Sequence[int]) -> tuple[float, ...]:
+def _ladder(scenario: Scenario, own: float, steps: Sequence[float]) -> tuple[float, ...]:
+    """The model's own timestep and those near others (s) that divide the sample, rising."""
     kept = {round(scenario.sample / own): own}
-    for power in powers:
-        count = max(1, round(scenario.sample / (own * 2.0**power)))
+    for step in steps:
+        count = max(1, round(scenario.sample / step))
         kept.setdefault(count, _decimal(scenario.sample / count))
-    return tuple(kept[count] for count in sorted(kept, reverse=True))
-
-
-def _chosen(scenario: Scenario, own: float, declared: DeclaredScenario) -> tuple[float, ...]:
-    kept = {round(scenario.sample / own): own}
-    for step in declared.timesteps:
-        count = round(scenario.sample / step)
-        if count < 1 or abs(count * step - scenario.sample) > 1e-9 * scenario.sample:
-            message = f"the timestep {step:g} s does not divide the sample, {scenario.sample:g} s"
-            help = "give `sample` a value that all timesteps divide"
-            raise SceneError(message, declared.place("timesteps"), help)
-        kept.setdefault(count, step)
     return tuple(kept[count] for count in sorted(kept, reverse=True))

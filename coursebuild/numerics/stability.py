@@ -110,17 +110,12 @@ def bounded(problem: Problem) -> Problem:
     return replace(problem, energy_bound=float(most))
 
 
-def boundary(problem: Problem, integrator: Integrator, density: Density = DENSE) -> BoundaryLine:
-    """Look for the largest stable timestep.
-
-    Raises:
-        ValueError: the problem names no timesteps to look between.
-    """
-    if problem.search is None:
-        raise ValueError(f"{problem.name} has no range of timesteps to search")
+def boundary(problem: Problem, integrator: Integrator) -> BoundaryLine:
+    """Look for the largest stable timestep of a problem that names timesteps to look between."""
+    assert problem.search is not None
     low, high = problem.search
     search = max(low, problem.span / MOST_STEPS), high
-    found = scan(lambda step: attempt(problem, integrator, step), search, density)
+    found = scan(lambda step: attempt(problem, integrator, step), search)
     row = stable_row(integrator, found, problem, problem.span)
     theory = None if problem.limit is None else problem.limit(integrator)
     lost = found.lost

@@ -11,9 +11,9 @@ Entry point: `measure_sweep(spec, scene, sweep, …)`.
 from __future__ import annotations
 
 import copy
-import math
 import re
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any
 
 import mujoco
@@ -220,14 +220,15 @@ def _contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     """With what contacts and solver do, step by step."""
     one = _runnable(model)
     one.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)
-    step, every = float(one.opt.timestep), scenario.steps(float(one.opt.timestep))
+    step = float(one.opt.timestep)
+    steps = scenario.steps(step) * len(scenario.times)
     data, other = initial_data(scenario, one), initial_data(scenario, one)
     now: dict[Pair, _Hit] = {}
     hits: list[_Hit] = []
     deepest = residual = force = iterations = 0.0
-    for number in range(every * len(scenario.times)):
-        if scenario.controls:
-            data.ctrl[:] = scenario.command(number // every)
+    for command in scenario.commands(step):
+        if command:
+            data.ctrl[:] = command
         advance(one, data)
         residual = max(residual, float(data.solver_fwdinv.max()))
         force = max(force, float(np.linalg.norm(data.qfrc_constraint)))
@@ -256,7 +257,7 @@ def _contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
         slip=max(hit.slid for hit in hits) if hits else None,
         restitution=hardest.apart / hardest.closing if hardest is not None else None,
         residual=residual / force if force else None,
-        iterations=iterations / (every * len(scenario.times)) if force else None,
+        iterations=iterations / steps if force else None,
     )
 
 
@@ -296,8 +297,7 @@ def _rollouts(
     mujoco.mj_getState(model, data, state, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))
     begins, control = np.tile(state, (batch, 1)), None
     if scenario.controls:
-        looks = [math.floor(n / scenario.steps(step)) for n in range(steps)]
-        control = np.tile([scenario.command(look) for look in looks], (batch, 1, 1))
+        control = np.tile([*islice(scenario.commands(step), steps)], (batch, 1, 1))
 
     def job(pool: mujoco.rollout.Rollout) -> Job:
         datas = [mujoco.MjData(model) for _ in range(max(1, pool.nthread))]

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import Any, TypeAlias
 
 import mujoco
@@ -161,7 +162,13 @@ def scenario_job(
     """Runs scenarios from the full states in which they begin; `actuators`: those commanded."""
     data, chosen = mujoco.MjData(model), slice(None) if actuators is None else list(actuators)
     runs = [
-        (state, [(np.array(command)[chosen], steps) for command, steps in _parts(one, timestep)])
+        (
+            state,
+            [
+                (np.array(command)[chosen] if command else None, len([*steps]))
+                for command, steps in groupby(one.commands(timestep))
+            ],
+        )
         for one, state in begins
     ]
 
@@ -169,21 +176,8 @@ def scenario_job(
         for state, parts in runs:
             mujoco.mj_setState(model, data, state, STATE)
             for command, steps in parts:
-                if command.size:
+                if command is not None:
                     data.ctrl[:] = command
                 mujoco.mj_step(model, data, steps)
 
     return job
-
-
-def _parts(scenario: Scenario, timestep: float) -> list[tuple[tuple[float, ...], int]]:
-    """Commands, and for how many steps each holds; as few parts as there can be."""
-    every = scenario.steps(timestep)
-    found: list[tuple[tuple[float, ...], int]] = []
-    for look in range(len(scenario.times)):
-        command = scenario.command(look)
-        if found and found[-1][0] == command:
-            found[-1] = command, found[-1][1] + every
-        else:
-            found.append((command, every))
-    return found

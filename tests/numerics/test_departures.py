@@ -195,3 +195,7 @@ def test_boundaries_and_runs_of_cases() -> None:
         ("Euler", "beyond", "diverged", "reset"),
         ("Euler at 10 ms", "status", "ok", "reset"),
     ]
+    near = replace(old, boundaries=(replace(line, largest=0.22), *old.boundaries[1:]))
+    for pair in ((old, near), (near, old)):
+        figures = {one.figure for one in case_departures(pair[:1], pair[1:], BANDS)}
+        assert figures == {"monotone", "beyond"}, "a limit beyond which some are stable is fuzzy"

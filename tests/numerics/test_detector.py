@@ -58,11 +58,11 @@ def test_a_slow_growth_without_any_warning_is_seen() -> None:
     assert any(reason.startswith("positions reached") for reason in found.reasons)
 
 
-@pytest.mark.parametrize("field", ["qpos", "qvel"])
-def test_a_state_that_is_no_number(field: str) -> None:
-    model, data = begun(0.01)
-    getattr(data, field)[0] = np.nan
-    assert judge(model, data, 0.0).reasons[0] == "the state is not finite"
+def test_a_state_that_is_no_number() -> None:
+    for field in ("qpos", "qvel"):
+        model, data = begun(0.01)
+        getattr(data, field)[0] = np.nan
+        assert judge(model, data, 0.0).reasons[0] == "the state is not finite"
 
 
 def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
@@ -75,13 +75,11 @@ def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
     assert "as deep in each other" in run.judgement.reasons[0]
 
 
-@pytest.mark.parametrize("integrator", [Integrator.EULER, Integrator.RK4])
-def test_no_error_is_given_for_a_run_that_was_lost(integrator: Integrator) -> None:
+def test_no_error_is_given_for_a_run_that_was_lost() -> None:
     problem = problem_named("damped-spring-0")
     fast = replace(problem, mjcf=problem.mjcf.replace('stiffness="100"', 'stiffness="1e6"'))
-    found = measure(fast, integrator, 0.02)
-    assert found.status == "diverged"
-    assert (found.position, found.velocity) == (None, None)
+    found = measure(fast, Integrator.RK4, 0.02)
+    assert (found.status, found.position, found.velocity) == ("diverged", None, None)
 
 
 def test_where_energy_can_be_judged() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.numerics.front import front, verdict
-from coursebuild.numerics.reports.bench import RowVerdict, WorkPrecisionRow
+from coursebuild.numerics.reports.bench import WorkPrecisionRow
 from support.bench_reports import lost, row
 
 Point = tuple[float, float] | None
@@ -52,62 +52,43 @@ def test_errors_of_zero_and_nothing_at_all() -> None:
     assert on_it(None, None) == [False, False]
 
 
-def judged(*points: Point, known: bool = True) -> RowVerdict:
+OWN = "no other setting is cheaper without being less accurate"
+GONE = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
+SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
+
+
+@pytest.mark.parametrize(
+    ("points", "better", "text"),
+    [
+        (
+            ((1, 1e-3), (4, 1e-7)),
+            None,
+            f"{OWN}; a learner would not notice its error, which is 0.001 of what can be seen",
+        ),
+        (
+            ((1, 2.5), (0.94, 2.5e-6)),
+            1,
+            f"RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; {SEEN}; the "
+            "cheapest without one that is seen is RK4 at 10 ms, at 0.94 times its cost",
+        ),
+        (((1, 2.5), (2, 2.4)), None, f"{OWN}; {SEEN}, and that of every other setting too"),
+        ((None, (1, 2.0)), 1, f"{GONE}; RK4 at 10 ms is the most accurate that does"),
+        ((None, None), None, GONE),
+    ],
+)
+def test_verdicts(points: tuple[Point, ...], better: int | None, text: str) -> None:
     rows = placed(*points)
-    return verdict(rows, [one.seen >= 1 if known and one.seen else None for one in rows])
+    found = verdict(rows, [None if one.seen is None else one.seen >= 1 for one in rows])
+    assert (found.better, found.text) == (better, text)
+    assert found.on_front == (better is None and points[0] is not None)
 
 
-def test_a_verdict_on_a_good_choice() -> None:
-    found = judged((1, 1e-3), (4, 1e-7))
-    assert (found.on_front, found.better, found.noticeable) == (True, None, False)
-    assert found.text == (
-        "no other setting is cheaper without being less accurate; a learner would not notice its "
-        "error, which is 0.001 of what can be seen"
-    )
-
-
-def test_a_verdict_on_a_bad_one() -> None:
-    found = judged((1, 2.5), (0.94, 2.5e-6))
-    assert (found.on_front, found.better, found.noticeable) == (False, 1, True)
-    assert found.cost_ratio == pytest.approx(0.94)
-    assert found.error_ratio == pytest.approx(1e-6)
-    assert found.text == (
-        "RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; a learner would "
-        "notice its error, which is 2.5 times what can be seen; the cheapest without one that is "
-        "seen is RK4 at 10 ms, at 0.94 times its cost"
-    )
-
-
-def test_a_verdict_names_what_would_be_enough() -> None:
-    assert judged((0.5, 50), (2, 1e-6)).text.endswith(
-        "a learner would notice its error, which is 50 times what can be seen; the cheapest "
-        "without one that is seen is RK4 at 10 ms, at 4 times its cost"
-    )
-    hopeless = judged((0.5, 50), (2, 5))
-    assert hopeless.text.endswith("times what can be seen, and that of every other setting too")
-    assert judged((0.5, 0.5), (2, 1e-6)).text.endswith("which is 0.5 of what can be seen")
-
-
-def test_a_verdict_where_too_little_is_known() -> None:
-    found = judged((1, 2.0), (0.5, 2.0), known=False)
+def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
+    found = verdict(placed((1, 2.0), (0.5, 2.0)), [None, None])
     assert found.noticeable is None
     assert found.text == (
         "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
         "would notice its error is not known"
     )
-
-
-def test_a_verdict_where_the_scene_does_not_run() -> None:
-    found = judged(None, (1, 2.0))
-    assert (found.on_front, found.better, found.cost_ratio) == (False, 1, None)
-    assert found.text == (
-        "the scene does not run under its own setting, Euler at 2 ms: the state is not finite; "
-        "RK4 at 10 ms is the most accurate that does"
-    )
-    assert judged(None, None).text.endswith("Euler at 2 ms: the state is not finite")
-
-
-def test_a_verdict_where_nothing_was_timed() -> None:
     found = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
-    assert (found.on_front, found.noticeable) == (False, False)
     assert found.text.startswith("nothing was timed, so that no setting can be called better; a ")

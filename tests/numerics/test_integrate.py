@@ -26,8 +26,8 @@ def test_two_methods_agree_on_an_orbit_of_high_eccentricity() -> None:
 
     start = np.array([0.2, 0.0, 0.0, 3.0])  # e = 0.8
     found = bulirsch_stoer(rate, start, TIMES)
-    # A relative error of 1e-16 in a step moves the phase by this after three turns.
-    assert np.max(np.abs(found - dop853(rate, start, TIMES, 1e-16))) < 1e-10
+    # A relative error of 1e-13 in a step moves the phase by this after three turns.
+    assert np.max(np.abs(found - dop853(rate, start, TIMES))) < 1e-8
     energy = (found[:, 2] ** 2 + found[:, 3] ** 2) / 2 - 1 / np.hypot(found[:, 0], found[:, 1])
     assert np.max(np.abs(energy + 0.5)) < 1e-12
 

@@ -43,10 +43,10 @@ measure = "body:ball"
 """
 
 
-def swept(lines: str, mjcf: str = BALL, *, timed: bool = False) -> SweepReport:
-    text = f'{TOML}\n[[sweep]]\nname = "s"\n{lines}\n'
+def swept(lines: str, mjcf: str = BALL, *, toml: str = TOML, timed: bool = False) -> SweepReport:
+    text = f'{toml}\n[[sweep]]\nname = "s"\n{lines}\n'
     declared = parse_declarations(Source("models/m.toml", text)).value
-    assert declared is not None, parse_declarations(Source("models/m.toml", text)).diagnostics
+    assert declared is not None
     (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), declared)
     ticks = iter(range(0, 10**12, 2_000_000))
     clocks = (lambda: next(ticks), lambda: next(ticks)) if timed else None
@@ -85,15 +85,9 @@ def test_a_solver_with_little_time_leaves_more() -> None:
     )
     floor = '<option solver="CG"/><worldbody><geom type="plane" size="1 1 1"/>'
     mjcf = f"<mujoco>{floor}{boxes}</worldbody></mujoco>"
-    text = TOML.replace("qvel = [-1]\n", "").replace('measure = "body:ball"\n', "")
-    lines = 'vary = { "option.iterations" = [1, 3, 100], "option.tolerance" = [1e-2, 1e-10] }'
-    declared = parse_declarations(
-        Source("models/m.toml", f'{text}\n[[sweep]]\nname = "s"\n{lines}\n')
-    ).value
-    assert declared is not None
-    (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), declared)
-    spec = mujoco.MjSpec.from_string(mjcf)
-    one, three, all_, rough, fine = measure_sweep(spec, scene, declared.sweeps[0], None).rows
+    vary = 'vary = { "option.iterations" = [1, 3, 100], "option.tolerance" = [1e-2, 1e-10] }'
+    toml = TOML.replace("qvel = [-1]\n", "").replace('measure = "body:ball"\n', "")
+    one, three, all_, rough, fine = swept(vary, mjcf, toml=toml).rows
     assert one.residual and three.residual and all_.residual and rough.residual and fine.residual
     assert one.residual > 10 * three.residual >= 10 * all_.residual
     assert rough.residual > 1e3 * fine.residual

@@ -5,10 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
+from coursebuild.numerics.reports.text import usual_setting
 from coursebuild.numerics.scene import scenes
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -25,17 +28,10 @@ def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[Scenar
 
 
 def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisionRow:
-    (found,) = (
-        one
-        for one in report.rows
-        if (one.setting.integrator, one.setting.timestep) == (integrator, timestep)
-        and (one.setting.solver, one.setting.iterations, one.setting.cone)
-        == next(
-            (own.setting.solver, own.setting.iterations, own.setting.cone)
-            for own in report.rows
-            if own.own
-        )
-    )
+    usual = usual_setting(report.rows)
+    assert usual is not None
+    like = replace(usual, integrator=integrator, timestep=timestep)
+    (found,) = (one for one in report.rows if one.setting == like)
     return found
 
 

@@ -1,13 +1,12 @@
 """Measured figures as a page sets them: numbers in words of a book, and tables.
 
 Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, numbers; `said`,
-`sentence`, `about_reference`; `again`, the command that makes them again.
+`sentence`, `about_reference`.
 """
 
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterator
 
 from markupsafe import Markup, escape
@@ -145,13 +144,10 @@ def factor(value: float | None) -> str:
 
 def size(count: int) -> str:
     """Bytes."""
-    if count < 10_000:
-        return f"{count:,} B".replace(",", _THIN)
-    for unit in ("kB", "MB"):
-        count_of = count / (1e3 if unit == "kB" else 1e6)
-        if count_of < 10_000 or unit == "MB":
-            return f"{count_of:,.0f} {unit}".replace(",", _THIN)
-    raise AssertionError(count)
+    share, unit = count / 1e6, "MB"
+    if count < 1e7:
+        share, unit = (count, "B") if count < 1e4 else (count / 1e3, "kB")
+    return f"{share:,.0f} {unit}".replace(",", _THIN)
 
 
 def where(words: Strings, machine: Machine) -> str:
@@ -169,11 +165,6 @@ def sentence(text: str) -> str:
     """A clause as a sentence of its own."""
     text = text[:1].upper() + text[1:]
     return text if not text or text.endswith((".", "?", "!")) else f"{text}."
-
-
-def again(command: str, *names: str) -> str:
-    """What to type to have it measured again."""
-    return " ".join(["coursebuild", command, *map(shlex.quote, names)])
 
 
 def about_reference(words: Strings, report: ScenarioReport) -> Iterator[str]:

@@ -14,7 +14,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.figures import again, factor, power, sentence, size, where, whole
+from coursebuild.features.bench.figures import factor, power, sentence, size, where, whole
 from coursebuild.features.bench.model import declared_scenarios
 from coursebuild.features.bench.scenarios import (
     ScenarioView,
@@ -85,10 +85,10 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
             if one not in {scenario.name for scenario in scenarios}
         ),
         where="" if scene is None else where(words, scene.machine),
-        command=again("bench", name, "--record"),
+        command=BENCH.command(name),
         file="" if scene is None else place.href(urls.file_path(BENCH.path(name))),
         diet=None if diet is None else _diet(words, place, diet),
-        diet_command=again("diet", name, "--record"),
+        diet_command=DIET.command(name),
         numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
         sweeps=tuple(
             sweep_view(words, one, scenario_anchor(f"sweep-{one.name}")) for one in sweeps
@@ -137,7 +137,7 @@ def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
         summary,
         tuple(_finding(words, one) for one in diet.findings),
         where(words, diet.machine),
-        again("diet", diet.model, "--record"),
+        DIET.command(diet.model),
         place.href(urls.file_path(DIET.path(diet.model))),
     )
 

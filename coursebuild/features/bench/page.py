@@ -20,10 +20,11 @@ from coursebuild.core.model import document_blocks, scenario_anchor
 from coursebuild.core.model.results import Machine
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escaped, guarded
-from coursebuild.features.bench.figures import Grid, again, where
+from coursebuild.features.bench.figures import Grid, where
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenarios import plots, scenario_view, sweep_view
 from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.reports.records import BENCH
 from coursebuild.numerics.reports.sweep import SweepReport
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def _shown(page: PageContext, block: Bench) -> ShownBench:
 
 def _view(page: PageContext, block: Bench) -> BenchView:
     words, shown = page.renderer.words, _shown(page, block)
-    nothing = BenchView(block.model, shown.href, again("bench", block.model, "--record"))
+    nothing = BenchView(block.model, shown.href, BENCH.command(block.model))
     if shown.report is None or shown.machine is None:
         return nothing
     made = where(words, shown.machine)

@@ -5,6 +5,7 @@ Entry points: `numerics_values(library)`; `case_view`, of one case.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from operator import attrgetter
@@ -18,7 +19,6 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import (
     FigurePart,
     Grid,
-    again,
     grid,
     percent,
     power,
@@ -111,7 +111,7 @@ def numerics_values(library: Library) -> dict[str, object]:
         "integrators": KNOWN,
         "where": dict.fromkeys(where(words, one.machine) for one in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
-        "command": again("stability", "--record"),
+        "command": STABILITY.command(),
     }
 
 
@@ -167,7 +167,7 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         tuple(Markup(case_svg(report, one, f"{name}-{one.name}")) for one in shown),
         tuple(one for one in grids if one is not None),
         tuple(_notes(words, report)),
-        again("bench", model) if model else again("stability", report.name),
+        f"coursebuild {shlex.join(('bench', model) if model else ('stability', report.name))}",
         place.href(urls.model_page_path(model)) if model else "",
     )
 

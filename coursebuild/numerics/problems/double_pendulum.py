@@ -45,6 +45,8 @@ _PARTED = 0.1
 """rad: a motion that is off by as much is another one."""
 _MEMBERS, _AROUND = 12, 1e-3
 """Of an ensemble, and how far they begin from the case, rad."""
+_STEP, _SPAN = 1e-3, 50.0
+"""s, of what is measured: the timestep, and the time over which an exponent is."""
 
 _LINK = '<joint type="hinge" axis="0 1 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 0.01 1"/>'
 MJCF = model_text(
@@ -114,9 +116,9 @@ def _ensemble() -> list[DoublePendulum]:
     ]
 
 
-def horizons(integrator: Integrator, timestep: float = 1e-3) -> list[float]:
+def horizons(integrator: Integrator) -> list[float]:
     """When the error of the angles first passes 0.1 rad, s, for each member of the ensemble."""
-    model, found = compiled(MJCF, integrator, timestep), []
+    model, found = compiled(MJCF, integrator, _STEP), []
     for member in _ensemble():
         scenario = Scenario(20.0, 0.05, (member.upper, member.lower))
         run = simulate(replace(problem(), scenario=scenario), model).states
@@ -127,26 +129,26 @@ def horizons(integrator: Integrator, timestep: float = 1e-3) -> list[float]:
     return found
 
 
-def exponents(integrator: Integrator, timestep: float = 1e-3, span: float = 50.0) -> list[float]:
+def exponents(integrator: Integrator) -> list[float]:
     """The largest Lyapunov exponent, 1/s, for each member of the ensemble.
 
     Two runs of each, brought near to each other again and again.
     """
-    model, found = compiled(MJCF, integrator, timestep), []
+    model, found = compiled(MJCF, integrator, _STEP), []
     for member in _ensemble():
-        scenario = Scenario(span, 0.5, (member.upper, member.lower))
+        scenario = Scenario(_SPAN, 0.5, (member.upper, member.lower))
         data, near = initial_data(scenario, model), initial_data(scenario, model)
         distance, total = 1e-8, 0.0
         near.qpos[0] += distance
         for _ in scenario.times:
             for one in (data, near):
-                advance(model, one, scenario.steps(timestep))
+                advance(model, one, scenario.steps(_STEP))
             apart = np.concatenate([near.qpos - data.qpos, near.qvel - data.qvel])
             size = float(np.linalg.norm(apart))
             total += math.log(size / distance)
             near.qpos[:] = data.qpos + apart[:2] * distance / size
             near.qvel[:] = data.qvel + apart[2:] * distance / size
-        found.append(total / span)
+        found.append(total / _SPAN)
     return found
 
 

@@ -156,9 +156,12 @@ class Tumbling(Struct, frozen=True):
         return turning_at_rest(times, self.attitude(times), self.omega(times))
 
 
-def measured_crossing(integrator: Integrator, nudge: float, timestep: float = 2e-3) -> float:
+def measured_crossing(integrator: Integrator, nudge: float) -> float:
     """When a simulation first has ω₂ = 0, s: by Hermite's cubic within the step that crosses."""
-    one = _begun_with(nudge)
+    from scipy.interpolate import CubicHermiteSpline
+    from scipy.optimize import brentq
+
+    one, timestep = _begun_with(nudge), 2e-3
     model = compiled(one.mjcf, integrator, timestep)
     data = initial_data(one.scenario, model)
     mujoco.mj_forward(model, data)
@@ -168,21 +171,11 @@ def measured_crossing(integrator: Integrator, nudge: float, timestep: float = 2e
         mujoco.mj_forward(model, data)
         after, slope_after = float(data.qvel[4]), float(data.qacc[4])
         if after <= 0.0:
-            part = _root(before, after, slope * timestep, slope_after * timestep)
-            return (step + part) * timestep
+            ends = [step * timestep, (step + 1) * timestep]
+            curve = CubicHermiteSpline(ends, [before, after], [slope, slope_after])
+            return float(brentq(curve, *ends, xtol=1e-15))
         before, slope = after, slope_after
     return math.inf
-
-
-def _root(y0: float, y1: float, d0: float, d1: float) -> float:
-    """Where Hermite's cubic on [0, 1] with y0 > 0 ≥ y1 is 0, by bisection."""
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        s = (low + high) / 2
-        r = 1 - s
-        y = r * r * (y0 * (1 + 2 * s) + d0 * s) + s * s * (y1 * (3 - 2 * s) - d1 * r)
-        low, high = (s, high) if y > 0 else (low, s)
-    return (low + high) / 2
 
 
 def kinetic_drift(integrator: Integrator) -> float:

@@ -14,7 +14,7 @@ declared, quick=…)`, the scenarios that a smaller model is judged by.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -60,15 +60,6 @@ def _shortened(scene: Scene) -> Scene:
     return replace(scene, scenario=replace(scene.scenario, duration=short))
 
 
-def steps_of(scene: Scene) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """The numbers of all steps at the model's own timestep, each with the command that holds."""
-    every = scene.scenario.steps(scene.own)
-    for look in range(len(scene.scenario.times)):
-        command = scene.scenario.command(look)
-        for step in range(look * every, (look + 1) * every):
-            yield step, command
-
-
 class MotionComparison(Struct, frozen=True):
     """How a changed model did in all scenarios."""
 
@@ -112,7 +103,7 @@ def _begin(base: Any, changed: Any, index: IndexMap, scene: Scene) -> tuple[Any,
 def _same_bits(base: Any, changed: Any, index: IndexMap, scene: Scene) -> bool:
     data, other = _begin(base, changed, index, scene)
     end = float(other.time) + scene.scenario.duration
-    for step, command in steps_of(scene):
+    for step, command in enumerate(scene.scenario.commands(scene.own)):
         if command:
             data.ctrl[:] = command
             other.ctrl[:] = data.ctrl[index["nu"]]
@@ -161,7 +152,7 @@ def _shots(base: Any, changed: Any, index: IndexMap, scene: Scene, *, whole: boo
     data, other = _begin(base, changed, index, scene)
     every, length = (max(1, round(span / scene.own)) for span in (SHOTS, SHOT))
     worst = 0.0
-    for step, command in steps_of(scene):
+    for step, command in enumerate(scene.scenario.commands(scene.own)):
         if command:
             data.ctrl[:] = command
             other.ctrl[:] = data.ctrl[index["nu"]]
@@ -197,7 +188,7 @@ def watch(model: Any, scene: Scene) -> Seen:
     start, made = float(data.time), 0
     touching: set[tuple[int, int]] = set()
     most, constrained, thick = Peaks(), False, thickness(model)
-    for _, command in steps_of(scene):
+    for command in scene.scenario.commands(scene.own):
         if command:
             data.ctrl[:] = command
         advance(model, data)

@@ -1,7 +1,7 @@
 """What differs between two compiled models, and between their states: all by which code could tell.
 
-Entry points: `ModelDifference`, `difference(whole, changed)`; `VIEWS`, the words by which code asks
-a model for one thing.
+Entry points: `difference(whole, changed)`, `beyond(fields, kinds)`; `VIEWS`, the words by which
+code asks a model for one thing.
 
 The fields are those that MuJoCo's structures have, whatever their names.
 """
@@ -15,7 +15,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from msgspec import Struct
 
 _VIEW = re.compile(r"Mj(?:Model|Data)(\w+)Views")
 VIEWS: dict[str, str] = {
@@ -31,28 +30,19 @@ _LISTS = re.compile(r"n?names(_map)?|n?paths|nbuffer|narena|name_\w+adr|n?bvh.*"
 """What lists the names, paths and boxes of all things, and says how much memory there is."""
 
 
-class ModelDifference(Struct, frozen=True):
-    """By what code could tell two models apart."""
-
-    fields: frozenset[str] = frozenset()
-    """That hold something else."""
-
-    def __or__(self, other: ModelDifference) -> ModelDifference:
-        return ModelDifference(self.fields | other.fields)
-
-    def beyond(self, kinds: frozenset[str]) -> frozenset[str]:
-        """Fields that are neither those of these kinds nor lists nor references by number."""
-        own = tuple(
-            start
-            for prefix, size, kind in _prefixes()
-            if kind in kinds
-            for start in (f"{prefix}_", size)
-        )
-        return frozenset(
-            one
-            for one in self.fields
-            if not (one.startswith(own) or one.endswith("id") or _LISTS.fullmatch(one))
-        )
+def beyond(fields: frozenset[str], kinds: frozenset[str]) -> frozenset[str]:
+    """Fields that are neither those of these kinds nor lists nor references by number."""
+    own = tuple(
+        start
+        for prefix, size, kind in _prefixes()
+        if kind in kinds
+        for start in (f"{prefix}_", size)
+    )
+    return frozenset(
+        one
+        for one in fields
+        if not (one.startswith(own) or one.endswith("id") or _LISTS.fullmatch(one))
+    )
 
 
 @functools.cache
@@ -62,15 +52,13 @@ def _prefixes() -> tuple[tuple[str, str, str], ...]:
     return tuple(one for one in found if hasattr(mujoco.MjModel, one[1]))
 
 
-def difference(whole: Any, changed: Any) -> ModelDifference:
-    """What differs between two models, or two states."""
+def difference(whole: Any, changed: Any) -> frozenset[str]:
+    """The fields that hold something else in another model, or another state."""
     rest = dict(_leaves(changed))
-    return ModelDifference(
-        frozenset(
-            name.rpartition(".")[2]
-            for name, value in _leaves(whole)
-            if not _same(value, rest.get(name))
-        )
+    return frozenset(
+        name.rpartition(".")[2]
+        for name, value in _leaves(whole)
+        if not _same(value, rest.get(name))
     )
 
 

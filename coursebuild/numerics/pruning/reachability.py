@@ -10,8 +10,7 @@ the fields that the bound rests on.
    farther from the anchor of the first joint than the sum of the distances from anchor to anchor,
    whatever angles the joints take; limits are not relied on, as they are soft. After one joint only
    it cannot be nearer either.
-3. A slide adds how far it can go: that it has a range is relied on, with as much again beyond both
-   of its ends. One without a range, a free body and a mocap body can be anywhere.
+3. A free body, a slide and a mocap body can be anywhere.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from collections.abc import Collection
 import mujoco
 from msgspec import Struct
 
-from coursebuild.numerics.pruning.differences import VIEWS, ModelDifference
+from coursebuild.numerics.pruning.differences import VIEWS
 
 _LEAVE_MODELS_ALONE = frozenset(
     "__future__ bisect collections colorsys copy csv dataclasses datetime decimal enum fractions"
@@ -94,22 +94,16 @@ class Reader(Struct, frozen=True):
     """Why it may use everything; empty where it does not."""
 
     def notices(
-        self, names: Collection[str], kinds: Collection[str], change: ModelDifference
+        self, names: Collection[str], kinds: Collection[str], change: Collection[str]
     ) -> bool:
         """Whether it may notice that things of these names and kinds are gone."""
         return bool(
             not self.names.isdisjoint(names)
             or not self.kinds.isdisjoint(kinds)
-            or not self.words.isdisjoint(change.fields)
-            or (
-                change.fields and not _NUMBERS.isdisjoint(self.members | {p for _, p in self.parts})
-            )
+            or not self.words.isdisjoint(change)
+            or (change and not _NUMBERS.isdisjoint(self.members | {p for _, p in self.parts}))
             or self.touches(_REFERENCES)
         )
-
-    @property
-    def _asked(self) -> set[str]:
-        return {part for _, part in self.parts}
 
     def touches(self, fields: Collection[str]) -> bool:
         """Whether it may change one of these fields of a model, for one thing or for all."""
@@ -128,7 +122,7 @@ class Readers(Struct, frozen=True):
     files: tuple[Reader, ...] = ()
 
     def noticing(
-        self, names: Collection[str], kinds: Collection[str], change: ModelDifference
+        self, names: Collection[str], kinds: Collection[str], change: Collection[str]
     ) -> Reader | None:
         """The first who may notice that things are gone."""
         return next((one for one in self.files if one.notices(names, kinds, change)), None)

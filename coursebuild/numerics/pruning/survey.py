@@ -33,7 +33,7 @@ from coursebuild.numerics.pruning.candidates import (
     unread,
 )
 from coursebuild.numerics.pruning.compare import TOLERANCE, MotionComparison, Seen, watch
-from coursebuild.numerics.pruning.differences import ModelDifference, difference
+from coursebuild.numerics.pruning.differences import beyond, difference
 from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.model_text import ModelText
@@ -187,9 +187,7 @@ class _Surveyor:
 
     def _unread(self, item: Item) -> bool:
         names = {item.name} | {one.get("class") or "" for e in item.gone for one in e.walk()}
-        return (
-            self.order.readers.noticing(names - {""}, {item.view} - {""}, ModelDifference()) is None
-        )
+        return self.order.readers.noticing(names - {""}, {item.view} - {""}, frozenset()) is None
 
     def _holds(self, items: Sequence[Item]) -> bool:
         """Whether nothing but these would be missing, in any state."""
@@ -199,9 +197,9 @@ class _Surveyor:
         kinds = frozenset(one.view for one in items if one.view)
         change = difference(self.order.text.model, trial.model)
         own = {field for one in items for field in _OWN_FIELDS.get(one.kind, ())}
-        if change.beyond(kinds) - own:
+        if beyond(change, kinds) - own:
             return False
-        if "tree_sleep_policy" in change.fields and self._may_sleep():
+        if "tree_sleep_policy" in change and self._may_sleep():
             return False
         change |= self.trials.state_difference(trial)
         if self.order.readers.noticing((), kinds, change) is not None:
@@ -280,7 +278,8 @@ class _Surveyor:
 
     def _found(self, items: Sequence[Item], reason: str, label: str, apart: float) -> _Found:
         kind, trial = items[0].kind, self.trials.without(items)
-        change, edits = ModelDifference(), self.trials.edits(items)
+        change: frozenset[str] = frozenset()
+        edits = self.trials.edits(items)
         saving = Saving(None, None, False, 0, self.trials.bytes_of(edits))
         if trial is not None:  # not where it goes only with what uses it
             timed = not kind.startswith("unused-") or kind == "unused-site"

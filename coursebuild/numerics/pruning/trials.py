@@ -16,7 +16,7 @@ from msgspec import Struct
 from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
 from coursebuild.numerics.pruning.candidates import Item
 from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
-from coursebuild.numerics.pruning.differences import ModelDifference, difference
+from coursebuild.numerics.pruning.differences import difference
 from coursebuild.numerics.pruning.edits import (
     ModelEdit,
     drop_attribute,
@@ -117,9 +117,10 @@ class PruningTrials:
         except (ValueError, mujoco.FatalError):
             return None
 
-    def state_difference(self, trial: PrunedModel) -> ModelDifference:
+    def state_difference(self, trial: PrunedModel) -> frozenset[str]:
         """By what code could tell both apart in some states of the whole model."""
-        whole, found = self.text.model, ModelDifference()
+        whole: Any = self.text.model
+        found: frozenset[str] = frozenset()
         for state in self._states:
             data, other = mujoco.MjData(whole), mujoco.MjData(trial.model)
             mujoco.mj_setState(whole, data, state, STATE)

@@ -22,7 +22,6 @@ from coursebuild.numerics.reports.strokes import Entry
 from coursebuild.numerics.reports.text import (
     KNOWN,
     Quantity,
-    integrator_rank,
     interval_text,
     setting_text,
     solving,
@@ -50,8 +49,8 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     if quantity is None:
         return None
     timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
-    names = sorted({row.setting.integrator for row in report.rows}, key=integrator_rank)
-    lines = tuple(_line(report, quantity, timed, name, names) for name in names)
+    measured = {row.setting.integrator for row in report.rows}
+    lines = tuple(_line(report, quantity, timed, name) for name in KNOWN if name in measured)
     return Chart(
         title=(
             f"{report.title or report.name}: error of {quantity.label} "
@@ -74,7 +73,6 @@ def _line(
     quantity: Quantity,
     timed: Sequence[WorkPrecisionRow],
     name: str,
-    names: Sequence[str],
 ) -> Line:
     """The rows of an integrator."""
     usual = usual_setting(report.rows)
@@ -92,9 +90,7 @@ def _line(
                 ringed=row.own,
             )
         )
-    unknown = [one for one in names if one not in KNOWN]
-    number = KNOWN.index(name) if name in KNOWN else len(KNOWN) + unknown.index(name)
-    return Line(name, number, tuple(points))
+    return Line(name, KNOWN.index(name), tuple(points))
 
 
 def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:

@@ -6,7 +6,6 @@ Entry points: `quantities(report)`, `telling`; `setting_text`, `seconds_text`, `
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
@@ -75,27 +74,14 @@ def is_cut_short(report: ScenarioReport) -> bool:
     return any(math.isclose(one.searched[1], longest, rel_tol=1e-9) for one in report.stable)
 
 
-def integrator_rank(name: str) -> tuple[int, str]:
-    """By which integrators are told: those of MuJoCo in their order, then others by name."""
-    return (KNOWN.index(name) if name in KNOWN else len(KNOWN), name)
-
-
 def solving(setting: MeasuredSetting) -> tuple[str, int, str]:
     """All of a setting but integrator and timestep."""
     return setting.solver, setting.iterations, setting.cone
 
 
 def usual_setting(rows: Sequence[WorkPrecisionRow]) -> MeasuredSetting | None:
-    """One with the solver, iterations and cone of the scene itself; of most rows where it has none.
-
-    `None` where there are no rows.
-    """
-    for row in rows:
-        if row.own:
-            return row.setting
-    counted = Counter(solving(row.setting) for row in rows)
-    most = max(sorted(counted), key=counted.__getitem__, default=None)
-    return next((row.setting for row in rows if solving(row.setting) == most), None)
+    """The scene's own; `None` where there are no rows."""
+    return next((row.setting for row in rows if row.own), None)
 
 
 def seconds_text(value: float, digits: int = 6) -> str:
@@ -134,14 +120,6 @@ def solving_parts(setting: MeasuredSetting, like: MeasuredSetting | None = None)
     return parts
 
 
-_STATUS = {
-    "ok": "ok",
-    "slow-growth": "grew",
-    "diverged": "diverged",
-    "reset": "reset",
-}
-
-
 def status_text(status: str) -> str:
     """How a run went, in words."""
-    return _STATUS.get(status, status)
+    return "grew" if status == "slow-growth" else status

@@ -12,20 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.core.text.diagnostics import diagnose
-from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.bench.text import bench_text
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     checked_text,
-    failure_text,
     measured_json,
     measured_text,
 )
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import RowVerdict
 from coursebuild.numerics.reports.departures import Checked, Departure
-from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report import Style
 from coursebuild.report.terminal import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene
@@ -130,28 +126,6 @@ def test_wide_characters_take_two_cells() -> None:
 # --- JSON
 
 
-def test_json_says_what_is_wrong() -> None:
-    span = Source("models/arm.xml", "<mujoco/>").span(0, 3)
-    departure = Departure("swing", "RK4 at 1 ms", "error of position", "1", "2", "± 5 %")
-    found = json.loads(
-        measured_json(
-            {},
-            Measurement(
-                (),
-                (diagnose("model-error", span, "the model `arm` does not compile: no"),),
-                (ReportFailure("a", "b"),),
-                (Checked("arm", "x.json", (departure,), ("c",)),),
-                ("d",),
-            ),
-        )
-    )
-    assert found["diagnostics"][0]["message"] == "the model `arm` does not compile: no"
-    assert found["diagnostics"][0]["line"] == 1
-    assert found["failures"] == [{"message": "a", "help": "b"}]
-    assert found["checked"][0]["departures"][0]["measured"] == "2"
-    assert found["remarks"] == ["d"]
-
-
 @given(value=st.floats())
 def test_json_has_no_number_that_is_none(value: float) -> None:
     odd = replace(row(), position=(value, value), cost=Interval(value, value, value), growth=value)
@@ -194,11 +168,4 @@ arm  3 figures not as recorded in content/reports/arm.bench.json
 leg  as recorded in content/reports/arm.bench.json
   recorded with MuJoCo 3.13.0, measured with 3.14.0
 """
-    )
-
-
-def test_a_failure_as_text() -> None:
-    assert failure_text(ReportFailure("a\x1b", "b"), Style()) == "error: a␛\n  help: b\n"
-    assert failure_text(ReportFailure("a"), Style(colour=True)) == (
-        "\x1b[1;31merror\x1b[0m\x1b[1m: a\x1b[0m\n"
     )

@@ -17,11 +17,13 @@ pytestmark = pytest.mark.site
 BALL = """\
 <mujoco>
   <worldbody>
-    <body><joint type="slide" axis="0 0 1"/><geom size="0.1"/></body>
+    <body><joint name="j" type="slide" axis="0 0 1"/><geom size="0.1"/></body>
   </worldbody>
+  <sensor><jointpos name="height" joint="j"/></sensor>
 </mujoco>
 """
 TOML = '[[scenario]]\nname = "up"\nqpos = [1]\nqvel = [3]\nduration = 0.4\nsample = 0.1\n'
+TOML += 'measure = "sensor:height"\n'
 EXACT = """\
 print("reading")
 
@@ -55,6 +57,7 @@ def test_errors_are_taken_from_what_the_course_knows(course: Path) -> None:
         (own,) = (row for row in found.rows if row.own)
         assert own.position is not None
         assert own.position[0] == pytest.approx(9.81 * 0.4 * 0.002 / 2)
+        assert own.figure == pytest.approx(own.position)
     asked = TOML + 'reference = "ode"\n'
     assert report(course, EXACT.format(velocity=""), asked).reference == "ode"
 

@@ -108,16 +108,6 @@ def test_scenarios_measured_before_an_interruption_are_kept(course: Path) -> Non
     assert [one.name for one in found.reports[0].scenarios] == ["swing", "other"]
 
 
-def test_damaged_measurement_is_made_again(course: Path) -> None:
-    fake = Fake()
-    bench(options(course), measuring=fake)
-    for kind in ("bench", "bench-scenarios"):
-        for path in (course / ".coursebuild" / kind).iterdir():
-            path.write_bytes(path.read_bytes()[:-1])
-    bench(options(course), measuring=fake)
-    assert asked(fake) == ["box", "box"]
-
-
 def test_two_runs_at_once_measure_one_after_the_other(course: Path) -> None:
     running: list[int] = []
     most = 0

@@ -96,17 +96,6 @@ def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture
     assert departure["recorded"] == "-0.01095"
 
 
-def test_a_case_that_was_not_recorded(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run(course, "projectile", "--record")
-    capsys.readouterr()
-    assert run(course, "flat-plate", "--check") == 1
-    assert capsys.readouterr().out.endswith(
-        "\n  flat-plate\n"
-        "    figure  recorded  measured  band\n"
-        "    case     nothing     there  the same\n"
-    )
-
-
 def test_where_there_is_no_report_or_a_damaged_one(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

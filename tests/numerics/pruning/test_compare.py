@@ -14,9 +14,8 @@ from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import (
     compare,
     pruning_scenes,
-    steps_of,
 )
-from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
+from coursebuild.numerics.pruning.index_map import Gone, IndexMap, index_map
 from coursebuild.numerics.scene import Scene
 from support.surveys import declared
 
@@ -75,43 +74,15 @@ def test_contacts_count_though_nothing_moves() -> None:
     assert not found.identical
 
 
-FULL = """<mujoco><worldbody>
-  <body name="m" mocap="true"/><body name="n" mocap="true"/>
-  <body name="a"><freejoint/><geom name="ga" size=".1"/><body><joint type="ball"/><geom size=".1"/>
-  </body></body>
-  <body name="b"><joint name="j"/><geom name="gb" size=".1"/></body></worldbody>
-  <actuator><motor joint="j"/><general joint="j" dyntype="integrator"/>
-    <general joint="j" dyntype="filter" dynprm="1"/></actuator>
-  <sensor><framepos objtype="body" objname="a"/><clock/><framequat objtype="body" objname="b"/>
-  </sensor></mujoco>"""
-
-
-def test_a_state_is_brought_over() -> None:
-    model = mujoco.MjModel.from_xml_string(FULL)
-    spec = mujoco.MjSpec.from_string(FULL)
-    spec.delete(spec.sensors[0])
-    spec.delete(spec.body("a"))
-    other = spec.compile()
-    left = index_map(model, Gone(frozenset({model.body("a").id}), sensors=frozenset({0})))
-    assert fits(left, model, other)
-    data, into = mujoco.MjData(model), mujoco.MjData(other)
-    data.qpos[:], data.qvel[:] = range(12), range(10)
-    data.time, data.act[:], data.ctrl[:] = 3.0, [1, 2], [4, 5, 6]
-    data.mocap_pos[1], data.xfrc_applied[model.body("b").id] = 7, 8
-    transfer(model, data, left, other, into)
-    assert (into.time, into.qpos.tolist(), into.qvel.tolist()) == (3.0, [11.0], [9.0])
-    assert into.act.tolist() == [1, 2] and into.ctrl.tolist() == [4, 5, 6]
-    assert into.mocap_pos[1].tolist() == [7] * 3
-    assert into.xfrc_applied[other.body("b").id].tolist() == [8] * 6
-
-
 def test_scenarios_as_the_author_wrote_them() -> None:
-    model = mujoco.MjModel.from_xml_string(FULL)
     text = """[[scenario]]\nname = "push"\nduration = 1\nsample = 0.1\nhold = 0.2
-controls = [[1, 0, 0], [2, 0, 0]]\nqvel = [0, 0, 0, 0, 0, 0, 0, 0, 0, 5]\n"""
+controls = [[1], [2]]\nqvel = [0, 5]\n"""
+    mjcf = DOUBLE.format(mass=1.0).replace('<joint axis="0 1 0"/>', '<joint name="j"/>', 1)
+    motor = "<actuator><motor joint='j'/></actuator></mujoco>"
+    model = mujoco.MjModel.from_xml_string(mjcf.replace("</mujoco>", motor))
     (scene,) = pruning_scenes(model, declared(text))
     assert (scene.name, scene.scenario.qvel[-1]) == ("push", 5)
-    given = [(step, command[0]) for step, command in steps_of(scene)]
+    given = [(step, command[0]) for step, command in enumerate(scene.scenario.commands(0.002))]
     assert given == [(step, 1 if step < 100 else 2) for step in range(500)]
     (short,) = pruning_scenes(model, declared(text), quick=True)
-    assert len(list(steps_of(short))) == 250
+    assert short.scenario.duration == 0.5

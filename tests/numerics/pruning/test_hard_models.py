@@ -87,20 +87,6 @@ def test_includes_are_changed_where_they_stand() -> None:
     whole(files)
 
 
-def test_what_is_new_is_written_into_the_models_own_file() -> None:
-    far = '<geom size=".1" pos="9 0 0"/>'
-    swing = '<body><joint axis="0 1 0"/><geom size=".1" pos=".2 0 0"/></body>'
-    files = {
-        PATH: '<mujoco>\n  <include file="b.xml"/>\n'
-        f"  <worldbody>{far}{swing}</worldbody>\n</mujoco>",
-        "models/b.xml": '<x><option gravity="0 0 -5"><flag warmstart="enable"/></option></x>',
-    }
-    model, survey = tried(files, locked={"models/b.xml": "models/c.xml uses models/b.xml too"})
-    assert found(survey)["contact-off"].fixable
-    assert '<mujoco>\n  <option><flag contact="disable"/></option>\n' in fixed(model, survey)
-    whole(files)
-
-
 @pytest.mark.parametrize(
     ("files", "words"),
     [
@@ -240,18 +226,6 @@ def test_muscles_filters_and_delays() -> None:
     _, left = whole(text)
     assert 'act="0 .5 .1" ctrl="0 1 .2"/>' in left
     assert 'name="idle"' not in left and 'name="f"' in left and 'name="v"' in left
-
-
-def test_two_elements_that_a_reader_of_xml_takes_for_one() -> None:
-    """Comments inside of elements, quotes of both kinds, a name with a quote, no line ends."""
-    text = (
-        "<mujoco><sensor><!-- a --><clock name='é\"'/><!-- <clock/> --></sensor><worldbody>"
-        "<body ><!-- x --><joint name='a&amp;b' axis='0 1 0'/><geom size='.1' pos='.2 0 0'/>"
-        "<site name='>'/></body></worldbody></mujoco>"
-    )
-    survey, left = whole(text)
-    assert names(found(survey)["sensor-unread"]) == ['é"']
-    assert "<sensor><!-- a --><!-- <clock/> --></sensor>" in left and "<site" not in left
 
 
 SHAPES = ("sphere", "box", "capsule", "ellipsoid", "cylinder")

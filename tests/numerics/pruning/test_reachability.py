@@ -75,30 +75,6 @@ def test_what_is_said_to_be_separate_never_touches() -> None:
     assert wrong == []
 
 
-def test_the_bound_tells_an_arm_from_what_it_cannot_reach() -> None:
-    """The bound is no empty one."""
-    model = compiled(
-        """<geom name="base" size=".1 .1 .1" type="box"/>
-        <geom name="wall" type="plane" size="1 1 1" pos="-1 0 0" zaxis="1 0 0"/>
-        <body pos="0 0 .6"><joint axis="0 0 1"/>
-          <geom name="one" type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>
-          <body pos=".3 0 0"><joint axis="0 1 0"/>
-            <geom name="two" type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>
-            <body pos=".3 0 0"><joint axis="0 1 0"/>
-              <geom name="three" size=".03" pos=".1 0 0"/></body></body></body>"""
-    )
-    name = {model.geom(i).name: i for i in range(model.ngeom)}
-    apart = separate(model, possible_pairs(model))
-
-    def separated(a: str, b: str) -> bool:
-        return tuple(sorted((name[a], name[b]))) in apart
-
-    assert separated("base", "one")
-    assert separated("wall", "one") and separated("wall", "three")
-    assert not separated("base", "three") and not separated("one", "three")
-    assert tuple(sorted((name["one"], name["two"]))) not in possible_pairs(model)
-
-
 def test_only_bounded_joints_keep_a_body_away() -> None:
     for joint, bounded in (
         ('<joint type="hinge" axis="0 1 0"/>', True),

@@ -101,6 +101,3 @@ def _rows(found: Sequence[Departure]) -> list[str]:
             Column("band", tuple(one.band for one in found), left=True),
         ]
     )
-
-
-# --- stability
