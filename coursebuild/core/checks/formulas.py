@@ -1,7 +1,7 @@
 """Formulas: which ones a course has, and where those that do not parse stand.
 
-Entry points: `course_formulas(course)`, `check_formulas(course, typeset)`; `document_formulas`,
-`formula_texts` and `formula_findings` for one document.
+Entry points: `course_formulas(course)`; `document_formulas`, `formula_texts` and
+`formula_findings` for one document.
 """
 
 from __future__ import annotations
@@ -49,17 +49,10 @@ def document_formulas(document: Document) -> tuple[Formula, ...]:
     return tuple(dict.fromkeys(formula for formula, _ in _uses(document)))
 
 
-def check_formulas(
-    course: Course, typeset: Mapping[Formula, str | MathError]
-) -> tuple[Diagnostic, ...]:
-    """One diagnostic for each place where a formula that does not parse stands."""
-    return tuple(d for document in course.documents for d in formula_findings(document, typeset))
-
-
 def formula_findings(
     document: Document, typeset: Mapping[Formula, str | MathError]
 ) -> tuple[Diagnostic, ...]:
-    """The same of one document."""
+    """One diagnostic for each place where a formula that does not parse stands."""
     found: list[Diagnostic] = []
     if not any(isinstance(result, MathError) for result in typeset.values()):
         return ()
@@ -67,8 +60,9 @@ def formula_findings(
         result = typeset[formula]
         if not isinstance(result, MathError):
             continue
-        size = len(tex.text)
-        at = min(result.position, max(size - 1, 0)) if result.position is not None else None
-        span = tex.span() if at is None else tex.span(at, max(at + 1, min(size, at + 1)))
+        span = tex.span()
+        if result.position is not None:
+            at = min(result.position, len(tex.text) - 1)
+            span = tex.span(at, at + 1)
         found.append(diagnose("math-syntax", span, f"the formula does not parse: {result.message}"))
     return tuple(found)

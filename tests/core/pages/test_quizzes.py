@@ -21,18 +21,6 @@ def quiz(*questions: dict[str, Any], title: str = "Check", id: str = "0.1-check"
     return f"```quiz\n{json.dumps(data)}\n```\n"
 
 
-def test_a_question_with_an_id_is_named_by_it(make: Make) -> None:
-    question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
-    html = make(quiz(question)).html()
-    assert 'id="0.1-check.why" data-question="why" data-number="1" data-kind="open">' in html
-
-
-def test_a_question_can_be_linked_to(make: Make) -> None:
-    question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
-    html = make("See [it](#0.1-check.why).\n\n" + quiz(question)).html()
-    assert '<a href="#0.1-check.why">it</a>' in html
-
-
 def output_question(line: int) -> str:
     return SCRIPT + quiz(
         {"kind": "output", "q": "What?", "of": "examples/a.py", "line": line, "explain": "E."}
@@ -63,13 +51,6 @@ def test_an_output_question_is_graded_as_its_recording_is_compared(
     assert f'data-answer="two" data-compare="{rule}">' in html
 
 
-def test_an_output_question_is_graded_by_the_recording_of_its_own_script(make: Make) -> None:
-    other = SCRIPT.replace("a.py", "b.py") + "Output:\n\n```text exact\none\ntwo\n```\n\n"
-    own = "Output:\n\n```text rtol=1e-3\none\ntwo\n```\n\n```quiz"
-    html = make(other + output_question(2).replace("```quiz", own)).html()
-    assert 'data-compare="rtol=0.001 atol=0.0">' in html
-
-
 def test_an_empty_line_of_an_output_is_shown_and_not_graded(make: Make) -> None:
     run = ScriptRun("examples/a.py", Outcome.OK, 0, "one\n\nthree\n", "", 0.0)
     html = make(output_question(2), runs={"examples/a.py": run}).html()
@@ -93,23 +74,12 @@ def test_without_a_run_there_is_no_key(make: Make, outcome: Outcome) -> None:
     assert "The answer is not known" in html
 
 
-def test_a_title_that_a_heading_says_is_not_said_twice(make: Make) -> None:
-    question = {"kind": "open", "q": "Why?", "reference": "So."}
-    html = make("## Check\n\n" + quiz(question)).html()
-    assert 'aria-label="Check">\n<ol class="questions">' in html
-
-
 def test_a_heading_that_has_the_quizs_id_keeps_it(make: Make) -> None:
     question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
     html = make("## Check\n\nSee [it](#check).\n\n" + quiz(question, id="check")).html()
     assert html.count('id="check"') == 1
     assert '<section class="quiz" data-quiz="check"' in html
     assert 'id="check.why"' in html
-
-
-def test_a_quiz_without_a_title_has_a_name_all_the_same(make: Make) -> None:
-    html = make(quiz({"kind": "open", "q": "Why?", "reference": "So."}, title="")).html()
-    assert 'aria-label="Questions">\n<ol class="questions">' in html
 
 
 def test_a_prediction_with_several_right_options_says_so(make: Make) -> None:

@@ -240,21 +240,6 @@ def test_the_page_home_opens_the_home_page(make: Make) -> None:
     assert "Come in." in site["index.md"].decode()
 
 
-def test_the_model_page(site: dict[str, bytes]) -> None:
-    page = pages(site)["models/box.html"]
-    assert "<div><dt>Total mass</dt><dd>1.5 kg</dd></div>" in page
-    assert "<div><dt>Keyframes</dt><dd>start, unnamed</dd></div>" in page
-    assert "Sites" not in page
-    assert '<a href="../lessons/0.1-falling.html">Lesson 0.1: Falling</a>' in page
-    assert "(lab, script, link)" in page
-    assert '<a href="box.xml" download>Download</a>' in page
-    assert '<span class="t">&lt;worldbody/&gt;</span>' in page
-    assert '<li><a href="index.html">Models</a></li>' in page
-    card = pages(site)["models/index.html"].split('<li class="card">')[1]
-    assert '<a href="box.html">box</a>' in card
-    assert '<a href="../lessons/0.1-falling.html" title="Falling">0.1</a>' in card
-
-
 def test_styles_in_elements_become_classes_of_the_sheet(make: Make) -> None:
     made = make('Text.\n\n<p style="color: red">x</p>\n')
     site = made.site(FILES)

@@ -24,11 +24,6 @@ def test_texts_have_values_plural_forms_and_a_language_to_fall_back_on() -> None
         english("a.z")
 
 
-def test_a_language_without_a_file_is_english(assets: Assets) -> None:
-    unknown, english = (strings_for(assets.templates, name) for name in ("xx", "en"))
-    assert unknown.entries == english.entries
-
-
 def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None:
     templates = (
         *assets.templates,

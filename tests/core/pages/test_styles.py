@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.styles import class_name, hoist, style_rules
+from coursebuild.core.pages.styles import class_name, hoist
 
 PAD = class_name("padding: 0")
 
@@ -53,16 +55,7 @@ def test_what_only_looks_like_a_style_stays(html: str) -> None:
     ["} body { display: none", "color: red /* ", 'content: "', "a: </style>", "a: \\7d"],
 )
 def test_a_declaration_cannot_reach_out_of_its_rule(declaration: str) -> None:
-    from html import escape
-
     assert hoist(f'<b style="{escape(declaration)}">') == ("<b>", frozenset())
-
-
-def test_rules_are_sorted_and_once_each() -> None:
-    rules = style_rules(["margin: 0", "padding: 0", "margin: 0"])
-    assert rules.splitlines() == sorted(rules.splitlines())
-    assert rules.count("{") == 2
-    assert f".{PAD}{{padding: 0}}\n" in rules
 
 
 @given(st.text(alphabet="<>/=\"' abcstyle-!\n"))

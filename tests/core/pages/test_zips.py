@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts, OutputFile
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.zips import Package, Surroundings, imported_modules, imports
+from coursebuild.core.pages.zips import Package, Surroundings, imports
 from coursebuild.core.pages.zips import archives as zip_archives
 from coursebuild.core.text.source import Source
 from support.rendered_course import Make
@@ -99,6 +99,8 @@ def test_the_course_archive_has_scripts_models_library_and_requirements(made: An
     readme = archive.read("bodies-axes/README.md").decode()
     assert readme.startswith("# Bodies & <axes>: scripts\n")
     assert "python examples/one.py\n" in readme
+    assert imports("from . import x\nfrom a.b import c\nimport d.e as f\n") == {"a", "d"}
+    assert imports("import (\n") == frozenset()
 
 
 def test_a_lesson_archive_has_what_its_scripts_import(made: Any) -> None:
@@ -121,28 +123,18 @@ def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
 
 
 @pytest.mark.site
-@pytest.mark.parametrize(
-    "load",
-    ['model_path("box")', '(lambda name: model_path(name))("box")'],
-    ids=["named", "handed on"],
-)
-def test_an_unpacked_script_finds_its_library_and_its_models(
-    make: Make, tmp_path: Path, load: str
-) -> None:
-    text = f"""```python file=examples/a.py
+def test_an_unpacked_script_finds_its_library_and_its_models(make: Make, tmp_path: Path) -> None:
+    text = """```python file=examples/a.py
 from mjcourse import model_path, spatial
-print({load}.read_text().strip().splitlines()[0], spatial.__name__)
+path = (lambda name: model_path(name))("box")
+print(path.read_text().strip().splitlines()[0], spatial.__name__)
 ```
 """
     site = make(text).site()
     zipfile.ZipFile(io.BytesIO(site["examples.zip"])).extractall(tmp_path)
-    done = subprocess.run(
-        [sys.executable, "-I", "-c", RUNNER],
-        cwd=tmp_path / "bodies-axes",
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, "-I", "-c", RUNNER]
+    folder = tmp_path / "bodies-axes"
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ('<mujoco model="box"> mjcourse.spatial\n', "")
 
 
@@ -151,16 +143,3 @@ import runpy, sys
 sys.path[:0] = ["examples"]
 runpy.run_path("examples/a.py", run_name="__main__")
 """
-
-
-def test_what_scripts_import_from_others(made: Any) -> None:
-    assert imported_modules(made.course, AROUND) == (
-        "matplotlib",
-        "mujoco",
-        "numpy",
-        "scipy",
-        "torch",
-        "yaml",
-    )
-    assert imports("from . import x\nfrom a.b import c\nimport d.e as f\n") == {"a", "d"}
-    assert imports("import (\n") == frozenset()

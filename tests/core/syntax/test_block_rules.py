@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from markdown_it.rules_block import StateBlock
 
-from coursebuild.core.model import Table
-from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.markdown import block_tokens
 from coursebuild.core.syntax.spans import BlockState, locate
 from coursebuild.core.syntax.tables import read_table
@@ -46,14 +44,3 @@ def test_cells_are_those_of_markdown_it(text: str) -> None:
             table, after = read_table(tokens, i, base, lambda _: (), lambda _: None)
             ours = [cell.text.text for row in (table.header, *table.rows) for cell in row]
             assert ours == [one.content for one in tokens[i:after] if one.type == "inline"]
-
-
-def test_cells_of_a_table_in_a_quote_know_their_places() -> None:
-    source = Source("a.md", "> | a | b \\| c |\n> |:-:|---|\n> | 1 |\n")
-    quote = parse_document(source, frozenset(), lesson=True).value.blocks[0]
-    table = quote.blocks[0]  # type: ignore[union-attr]
-    assert isinstance(table, Table)
-    assert table.align == ("center", None)
-    assert [cell.text.text for cell in table.header] == ["a", "b | c"]
-    assert [cell.span.text for cell in table.header] == ["a", "b \\| c"]
-    assert [cell.span.text for cell in table.rows[0]] == ["1", ""]

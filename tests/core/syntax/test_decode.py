@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import Meta, Struct
 
@@ -103,12 +103,6 @@ def test_what_an_author_is_told(request: pytest.FixtureRequest) -> None:
     check_texts("fields", lambda text: (None, read(text).diagnostics), rewriting=rewriting)
 
 
-def test_an_unknown_field_leaves_the_rest_usable() -> None:
-    decoding = read('{"name": "x", "shape": {"radius": 2, "weight": 1}, "parts": [{"name": ""}]}')
-    assert decoding.value is None
-    assert Disc(2.0) in decoding.structs.values()
-
-
 def test_markdown_is_found_in_the_order_of_the_text() -> None:
     decoding = read('{"title": "t $x$", "name": "n", "note": "long"}')
     assert [(node.value, kind) for node, kind in decoding.texts] == [
@@ -159,7 +153,6 @@ def accepted(text: str) -> Body | None:
         return None
 
 
-@settings(max_examples=200)
 @given(DOCUMENTS)
 def test_decoding_agrees_with_msgspec(value: object) -> None:
     text = json.dumps(value)
@@ -194,23 +187,5 @@ def test_schemas_say_what_the_declarations_say(name: str, root: type[Struct]) ->
     assert set(main["properties"]) == set(root.__struct_fields__)
     assert main["additionalProperties"] is False
 
-    def references(value: object) -> set[str]:
-        if isinstance(value, dict):
-            own = {value["$ref"]} if "$ref" in value else set()
-            return own.union(*(references(inner) for inner in value.values()))
-        if isinstance(value, list):
-            return set().union(*(references(inner) for inner in value))
-        return set()
-
-    assert references(schema) == {f"#/$defs/{key}" for key in definitions}
     described = [key for key, item in definitions.items() if not item.get("description")]
     assert described == []
-
-
-def test_schemas_know_what_may_be_left_out() -> None:
-    quiz = json.loads(json_schema("quiz"))["$defs"]
-    assert quiz["Slider"]["required"] == ["label", "min", "max", "value"]
-    assert quiz["SimLab"]["oneOf"] == [{"required": ["model"]}, {"required": ["xml"]}]
-    course = json.loads(json_schema("course"))["$defs"]
-    assert course["SilenceTable"]["required"] == ["rule", "reason"]
-    assert quiz["MultipleChoice"]["properties"]["q"]["contentMediaType"] == "text/markdown"

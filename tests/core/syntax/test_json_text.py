@@ -12,7 +12,7 @@ from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.text.source import Excerpt, Source
 from support.json_texts import parse
-from support.positioned_nodes import plain, shown
+from support.positioned_nodes import plain
 
 
 def walk(node: Node) -> list[Node]:
@@ -22,27 +22,6 @@ def walk(node: Node) -> list[Node]:
     if isinstance(node, ArrayNode):
         return [node, *(n for item in node.items for n in walk(item))]
     return [node]
-
-
-def test_values_that_json_has_and_python_stretches() -> None:
-    node = parse(
-        '[1e999, -0, -0.0, 1E+2, 123456789012345678901234567890, "\\u0000\\ud83d\\ude00\\/"]'
-    )
-    assert node.diagnostics == ()
-    assert node.value is not None
-    assert repr(plain(node.value)) == (
-        "[inf, 0, -0.0, 100.0, 123456789012345678901234567890, '\\x00😀/']"
-    )
-
-
-def test_a_prefix_is_cut_off_and_counted() -> None:
-    text = '> {"a": [1,\n>   "$\\\\x$",\n> \n>  tru]}\n'
-    source = Source("lesson.md", text)
-    lines = [(line[2:], text.index(line) + 2) for line in text.split("\n") if line]
-    parsed = parse_json(Excerpt.of_lines(source, lines), source.span(0, 0))
-    assert shown(parsed.diagnostics) == [
-        "4:4-7 json-syntax: expected a value, found `tru` [text stands between double quotes]"
-    ]
 
 
 def test_each_character_of_a_string_knows_its_place() -> None:
@@ -107,24 +86,17 @@ PIECES = st.sampled_from(
 )
 
 
-@settings(max_examples=200)
 @given(VALUES, st.sampled_from([None, 0, 2]), st.booleans())
-def test_valid_json_is_read_as_the_standard_library_reads_it(
+@example([float("inf"), 10**30, "\x00\U0001f600/"], None, True)
+def test_valid_json_is_read_as_the_standard_library_reads_it_and_knows_its_places(
     value: object, indent: int | None, ascii_only: bool
 ) -> None:
-    text = json.dumps(value, indent=indent, ensure_ascii=ascii_only)
+    text = json.dumps(value, indent=indent, ensure_ascii=ascii_only).replace("Infinity", "1e999")
     parsed = parse(text)
     assert [d for d in parsed.diagnostics if d.rule != "field-value"] == []
-    assert parsed.value is not None
-    assert repr(plain(parsed.value)) == repr(json.loads(text))
-
-
-@settings(max_examples=200)
-@given(VALUES, st.sampled_from([None, 1]))
-def test_spans_nest_and_slice_back(value: object, indent: int | None) -> None:
-    text = json.dumps(value, indent=indent)
-    root = parse(text).value
+    root = parsed.value
     assert root is not None
+    assert repr(plain(root)) == repr(json.loads(text))
     for node in walk(root):
         assert json.loads(node.span.text) == plain(node)
         assert root.span.contains(node.span)
@@ -158,7 +130,7 @@ def edited(draw: st.DrawFn) -> str:
     return text[:at] + draw(PIECES) + text[at + draw(st.integers(0, 3)) :]
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(st.lists(PIECES, max_size=16).map("".join) | st.text(max_size=20) | edited())
 @example('{"a":1}{')
 @example("[1]]")

@@ -93,10 +93,6 @@ PIECES = (
 )
 
 
-class Page(PlainContext):
-    """A page of which only the text is looked at."""
-
-
 def judged(text: str) -> tuple[list[str], str]:
     """What is said against the HTML of a lesson, and its page."""
     parsed = parse_document(Source("x.md", text), frozenset(), lesson=False)
@@ -105,7 +101,7 @@ def judged(text: str) -> tuple[list[str], str]:
         raw = [i for i in walk_inlines(block_inlines(block)) if isinstance(i, RawInline)]
         for node in [*raw, *([block] if isinstance(block, HtmlBlock) else ())]:
             said += [part.message for part in node.forbidden]
-    return said, str(render_blocks(parsed.value.blocks, Page()))
+    return said, str(render_blocks(parsed.value.blocks, PlainContext()))
 
 
 def active(content: list[HtmlContent]) -> list[str]:

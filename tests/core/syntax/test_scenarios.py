@@ -59,8 +59,9 @@ def parse(text: str) -> Parsed[Declarations | None]:
     return parse_declarations(Source("models/arms/arm.toml", text))
 
 
-def test_everything_that_a_file_can_say() -> None:
-    parsed = parse(COMPLETE)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_everything_that_a_file_can_say(newline: str) -> None:
+    parsed = parse(COMPLETE.replace("\n", newline))
     assert not parsed.diagnostics
     declared = parsed.value
     assert declared is not None
@@ -102,13 +103,6 @@ def test_a_file_may_say_nothing(text: str) -> None:
     assert parsed.value is not None
     assert (parsed.value.scenarios, parsed.value.keep) == ((), ())
     assert (parsed.value.visible.share, parsed.value.visible.angle) == (0.01, 1.0)
-
-
-def test_line_ends_of_windows() -> None:
-    parsed = parse(COMPLETE.replace("\n", "\r\n"))
-    assert parsed.diagnostics == ()
-    assert parsed.value is not None
-    assert parsed.value.scenarios[0].place("hold").text == "0.5"
 
 
 @settings(max_examples=60)

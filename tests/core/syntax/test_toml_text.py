@@ -17,7 +17,7 @@ from coursebuild.core.syntax.nodes import (
 )
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.source import Source
-from support.positioned_nodes import plain, shown
+from support.positioned_nodes import plain
 
 DATES = (datetime.date, datetime.time)
 
@@ -76,14 +76,10 @@ x = false
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_every_kind_of_statement(newline: str) -> None:
+def test_every_kind_of_statement_and_its_place(newline: str) -> None:
     text = ALL.replace("\n", newline)
-    assert repr(plain(root_of(text))) == repr(dated(tomllib.loads(text)))
-
-
-@pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_places(newline: str) -> None:
-    root = root_of(ALL.replace("\n", newline))
+    root = root_of(text)
+    assert repr(plain(root)) == repr(dated(tomllib.loads(text)))
 
     def at(*path: str | int) -> str:
         node: Node | None = root
@@ -128,16 +124,6 @@ def test_each_character_of_a_string_knows_its_place() -> None:
     assert [b.excerpt.span(i, i + 1).line for i in range(3)] == [6, 6, 7]
 
 
-def test_tex_in_a_string_that_reads_it_otherwise() -> None:
-    text = 'a = "about $\\tau$"\nb = \'about $\\tau$\'\nc = "a\\tb"\n'
-    parsed = parse_toml(Source("x.toml", text))
-    assert parsed.value is not None
-    assert shown(parsed.diagnostics) == [
-        r"1:13-17 field-value: `\t` of `\tau` is read as a control character"
-        r" [double the backslash: `\\tau`, or put the text between single quotes]"
-    ]
-
-
 # ------------------------------------------------------------------------------------- properties
 
 PIECES = st.sampled_from(
@@ -158,7 +144,7 @@ def edited(draw: st.DrawFn, text: str) -> str:
     return text[:at] + draw(PIECES) + text[at + draw(st.integers(0, 3)) :]
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(st.lists(PIECES, max_size=14).map("".join) | st.text(max_size=20) | edited(ALL))
 @example("a=[]\na.b=1\n")
 @example("[a.b.c]\n[a]\nb.x=1\n")
@@ -175,30 +161,20 @@ def test_values_and_validity_are_those_of_tomllib(text: str) -> None:
     else:
         assert parsed.value is not None
         assert repr(plain(parsed.value)) == repr(expected)
+        check_places(parsed.value, text)
     for diagnostic in parsed.diagnostics:
         assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
-        assert diagnostic.message == diagnostic.message.strip(" .")
 
 
-@settings(max_examples=200)
-@given(st.lists(PIECES, max_size=14).map("".join))
-def test_spans_nest(text: str) -> None:
-    root = parse_toml(Source("x.toml", text)).value
-    if root is None:
-        return
-
-    def check(node: Node) -> None:
-        inner: list[Node] = []
-        if isinstance(node, ObjectNode):
-            inner = [n for member in node.members for n in (member.key, member.value)]
-        elif isinstance(node, ArrayNode):
-            inner = list(node.items)
-        assert node.span.contains(node.mark)
-        for child in inner:
-            assert root is not None
-            assert 0 <= child.span.start <= child.span.end <= len(text)
-            if node is not root and not text.count("["):
-                assert node.span.contains(child.span)
-            check(child)
-
-    check(root)
+def check_places(node: Node, text: str) -> None:
+    """A node holds its mark, and where the text has no headers, all that is in it."""
+    inner: list[Node] = []
+    if isinstance(node, ObjectNode):
+        inner = [n for member in node.members for n in (member.key, member.value)]
+    elif isinstance(node, ArrayNode):
+        inner = list(node.items)
+    assert node.span.contains(node.mark)
+    for child in inner:
+        assert 0 <= child.span.start <= child.span.end <= len(text)
+        assert node.span.contains(child.span) or "[" in text or node.span.start == 0
+        check_places(child, text)

@@ -27,11 +27,6 @@ def test_position(text: str, offset: int, position: tuple[int, int]) -> None:
     assert Source("x.md", text).position(offset) == position
 
 
-def test_line_text_is_without_its_end_and_empty_out_of_range() -> None:
-    source = Source("x.md", "one\r\ntwo\n\rfour")
-    assert [source.line_text(n) for n in range(6)] == ["", "one", "two", "", "four", ""]
-
-
 def test_span_of_several_lines() -> None:
     source = Source("x.md", "one\ntwo\nthree")
     span = source.span(1, 9)

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-
 from coursebuild.core.text.source import Excerpt, Source
-from coursebuild.core.text.units import COMMON, check_unit
+from coursebuild.core.text.units import check_unit
 
 USUAL = (
     *(
@@ -61,18 +57,3 @@ def test_what_is_no_unit_is_told_with_the_likely_one() -> None:
         assert [one.partition(": ")[2] for one in told(unit)] == [f"did you mean `{meant}`?"], unit
     assert told("strides") == ["strides: leave it out, and say in words what is counted"]
     assert [unit for unit in WRONG if not told(unit)] == []
-
-
-def test_common_units_are_known_to_pint_which_is_not_asked() -> None:
-    from pint import UnitRegistry
-
-    registry = UnitRegistry()  # type: ignore[var-annotated]
-    assert [unit for unit in COMMON if unit not in registry] == []
-    code = (
-        "import json, sys\n"
-        "from coursebuild.core.text.units import check_unit\n"
-        "from coursebuild.core.text.source import Source\n"
-        "for unit in json.loads(sys.argv[1]): list(check_unit(Source('a', unit).excerpt()))\n"
-        "assert 'pint' not in sys.modules\n"
-    )
-    subprocess.run([sys.executable, "-c", code, json.dumps([*USUAL, *COMMON])], check=True)
