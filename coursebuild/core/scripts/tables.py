@@ -143,8 +143,7 @@ class TableMatcher:
     def _aligned(self) -> list[int]:
         """A line for each row that stands in one but for its numbers; -1 for the others."""
         found = [-1] * len(self.rows)
-        free = [True] * (len(self.rows) + 1)
-        for row, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight, free):
+        for row, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
             found[row] = line
         return found
 

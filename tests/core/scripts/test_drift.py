@@ -21,6 +21,7 @@ def drift(recorded: str, printed: str, comparison: Comparison = EXACT) -> Diagno
         ("E 6.641", "E 6.702", "this run printed 6.702 (relative error 9.2e-03, 2 digits agree)"),
         ("E 1.0", "E 1.5", "this run printed 1.5 (relative error 5.0e-01, no digit agrees)"),
         ("E 1.00", "E 1.05", "this run printed 1.05 (relative error 5.0e-02, 1 digit agrees)"),
+        ("E 1.00", "E 1.01", "this run printed 1.01 (relative error 1.0e-02, 2 digits agree)"),
         ("E 0.0", "E 1.5", "this run printed 1.5"),
         ("E 1.0", "E nan", "this run printed nan"),
         ("E 1e-9", "E 1e500", "this run printed 1e500"),

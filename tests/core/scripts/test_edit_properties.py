@@ -40,6 +40,11 @@ RULES = st.lists(
 ).map(tuple)
 
 
+def assume_writable(recorded: str, printed: str) -> None:
+    lines = (recorded + "\n" + printed).split("\n")
+    assume(printed.strip() and not any(re.match(r" {0,3}```", line) for line in lines))
+
+
 @given(
     OUTPUTS,
     OUTPUTS,
@@ -56,10 +61,7 @@ def test_after_an_update_all_is_well(
     prefix: str,
     eol: str,
 ) -> None:
-    assume(printed.strip())
-    assume(
-        not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + printed).split("\n"))
-    )
+    assume_writable(recorded, printed)
     lesson = recording(recorded, prefix=prefix, eol=eol)
     found = updated_body(lesson, comparison, filters, printed, printed)
     if found is None:
@@ -80,10 +82,7 @@ ELLIPTIC = st.lists(
 def test_an_update_with_ellipses_is_right_or_refused(
     recorded: str, printed: str, comparison: Comparison, prefix: str, eol: str
 ) -> None:
-    assume(printed.strip())
-    assume(
-        not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + printed).split("\n"))
-    )
+    assume_writable(recorded, printed)
     lesson = recording(recorded, prefix=prefix, eol=eol)
     found = updated_body(lesson, comparison, (), printed, printed)
     if isinstance(found, Edit):
@@ -95,10 +94,7 @@ def test_an_update_with_ellipses_is_right_or_refused(
 
 @given(OUTPUTS, OUTPUTS, OUTPUTS)
 def test_what_two_runs_disagree_on_is_never_written(recorded: str, first: str, second: str) -> None:
-    assume(
-        first.strip()
-        and not any(re.match(r" {0,3}```", line) for line in (recorded + "\n" + first).split("\n"))
-    )
+    assume_writable(recorded, first)
     lesson = recording(recorded)
     found = updated_body(lesson, EXACT, (), first, second)
     same = compare(recording(first), EXACT, (), second).status == "verified"

@@ -85,11 +85,9 @@ binding-mismatch at 12:2 `2.006`
         ("4 flips", "a 4 flips\nb 9 flips", "a 12 flips\nb 5 flips", "12 is printed where 4 was",
             "12 flips"),
         # rounded as the author rounds; where digits would be lost there is nothing to write
-        ("2.01", "a 2.00613", "a 3.14159", "3.14159 is printed where 2.00613 was", "3.14"),
         ("3.9 × 10⁻¹¹", "a 3.9e-11 b 5", "a 4.9e-11 b 5", "4.9e-11 is printed where 3.9e-11", ""),
         ("2.5", "a 2.5\nb 3", "a nan\nb 3", "nan is printed where 2.5 was", ""),
         ("2.01", "a 2.00613", "a 0.00314", "0.00314 is printed where 2.00613 was", ""),
-        ("12", "a 12", "a 0.2", "0.2 is printed where 12 was", ""),
         ("12", "a 12", "a 0", "0 is printed where 12 was", "0"),
         # with its unit it would be another one
         ("2.5 J", "a 2.5\nb 3", "a 3.5\nb 4 J", "3.5 is printed where 2.5 was", ""),
@@ -119,26 +117,19 @@ def test_the_number_in_the_same_place_is_proposed(
         ("Euler:\nerr 2.5\nRK4:\nerr 1", "Euler:\nerr 7.5", "7.5"),
         # one that is gone may have been what the number was about
         ("Euler:\nerr 2.5\nRK4:\nerr 1", "Midpoint:\nerr 7.5\nRK4:\nerr 1", None),
-        ("Euler:\nerr 2.5", "Midpoint:\nerr 7.5", None),
-        ("err 2.5", "Midpoint:\nerr 7.5", None),
         ("Euler:\nerr 2.5", "Euler:\nsteps\nerr 7.5", None),
-        ("Euler\nerr 2.5", "Euler\nblew up\nRK4\nerr 7.5", None),
         ("Euler:\nerr 2.5\nRK4:\nE 1", "Euler:\nE 1\nRK4:\nerr 7.5", None),
         # rows are known by the number that they begin with
-        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.1 7.5\n0.2 9", "7.5"),
         ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5\n0.2 9", "7.5"),
         ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5", "7.5"),
         ("n err\n0 10 3.5\n0 20 2.5", "n err\n0 10 8\n0 20 7.5", None),
         ("n err\n10 3.5\n20 2.5\n40 4.5", "n err\n10 3.1\n30 2.1\n40 4.1", None),
-        ("n err\n10 3.5\n20 2.5", "n err\n30 0.35\n40 0.25", None),
         ("1 0 2.5\n2 1 9", "2 0 8\n1 1 7.5", "7.5"),
-        ("1.5\n2.5\n3.5", "1.6\n2.6\n3.6", None),
         ("dt 0.1\nerr 2.5\ndt 0.2\nerr 9", "dt 0.05\nerr 2.4\ndt 0.1\nerr 7.5", None),
         ("err 2.5", "err 2.6\nerr 2.7", None),
         # another wording is another quantity
         ("period 2.5 s", "frequency 2.6 s", None),
         ("period 2.5 s", "period 2.6 ms", None),
-        ("a 2.5 b 3", "b 3 a 2.6", None),
     ],
 )  # fmt: skip
 def test_which_line_is_the_same(before: str, now: str, successor: str | None) -> None:
@@ -172,7 +163,6 @@ def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
     ("binding", "printed", "near", "better"),
     [
         # proposed where no other number can be meant
-        ("2.5", "a 2.6", "2.6", "2.6"),
         ("2.5", "a 2.6 2.60", "2.6", "2.6"),
         ("2.5", "a 2.6 9.1", "2.6", ""),
         ("b 2.5", "a 2.4 b 9.1", "9.1", "b 9.1"),
@@ -185,7 +175,6 @@ def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
         ("829.030", "-829.031 829.031", "829.031", ""),
         ("1.50, -2.0", "1.50 2.00\n1.50 -2.1", "1.50, 2.00", ""),
         ("0.1", "0.0001 0.5", "0.5", ""),
-        ("0", "2.5 -0.7", "-0.7", ""),
         ("5.1", "nan inf 9.0", "9.0", ""),
     ],
 )
