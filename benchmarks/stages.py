@@ -24,7 +24,7 @@ from markupsafe import Markup
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import course_formulas
-from coursebuild.core.files.resources import bundled_files, template_texts
+from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Results
 from coursebuild.core.model.summary import without_prose
@@ -176,7 +176,7 @@ def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
 
 def lessons(course: Course, results: Results, repeat: int) -> None:
     """What each step costs a lesson: time of one core, nothing remembered from lesson to lesson."""
-    library = Library.of(course, results, Assets(template_texts(), bundled_files()))
+    library = Library.of(course, results, Assets(template_texts(), Bundle()))
     texts = {document.source.path: document for document in course.documents}
     sheets = (page.inputs(library) for page in page_list(library))
     drawn = [(inputs, texts[inputs.document]) for inputs in sheets if inputs.document]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -50,7 +49,7 @@ def beside(root: Path) -> list[str]:
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    (tmp_path / "course").mkdir()
+    (tmp_path / "course/content").mkdir(parents=True)
     return tmp_path / "course"
 
 
@@ -67,17 +66,3 @@ def spared(root: Path, pages: Pages) -> Path:
     assert texts(root / SPARE) == TEXTS | {"a.html": "a.html 0"}
     pages.made.clear()
     return root
-
-
-@pytest.fixture
-def links(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Which files are linked."""
-    found: list[str] = []
-    really = os.link
-
-    def link(source: str, target: str, *, follow_symlinks: bool = True) -> None:
-        found.append(source.rpartition("public/")[2])
-        really(source, target, follow_symlinks=follow_symlinks)
-
-    monkeypatch.setattr(os, "link", link)
-    return found

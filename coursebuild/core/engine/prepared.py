@@ -31,12 +31,8 @@ def prepared_cut(key: str) -> bytes | None:
 
 def prepared_copy(key: str) -> bytes | None:
     """A compressed copy, by the key that `render.compressed` gives it."""
-    file = _copies().get(key)
+    file: str | None = _made_ahead("copies.json").get(key)
     return None if file is None else (prepared_folder() / file).read_bytes()
-
-
-def _copies() -> dict[str, str]:
-    return _made_ahead("copies.json")
 
 
 @functools.cache

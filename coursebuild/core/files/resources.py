@@ -1,8 +1,8 @@
 """Where the files lie that come with the tool and are not Python.
 
-Entry points: `assets_dir`, for what the build of the package bundles for browsers; `templates_dir`,
-for the pages' templates; `bundled_files` and `template_texts` read them whole, `Bundle` one by one;
-`rules_page`, the page of all rules.
+Entry points: `assets_dir`, for what the build of the package bundles for browsers, and `Bundle`,
+its files; `templates_dir`, for the pages' templates, and `template_texts`; `rules_page`, the page
+of all rules.
 
 In an installed package all are inside it. In a source tree they are where they are made:
 `site/dist`, `templates` and `docs`.
@@ -48,11 +48,6 @@ def rules_page() -> str:
     return (folder / "rules.md").read_text(encoding="utf-8")
 
 
-def bundled_files() -> tuple[tuple[str, bytes], ...]:
-    """Every bundled file by path relative to `assets_dir()`, sorted."""
-    return tuple((name, path.read_bytes()) for name, path in _bundled(assets_dir()))
-
-
 class Bundle(Mapping[str, bytes]):
     """The bundled files by path relative to `assets_dir()`, sorted; read when asked for."""
 
@@ -74,14 +69,9 @@ class Bundle(Mapping[str, bytes]):
 
     def _found(self) -> tuple[str, ...]:
         if self._paths is None:
-            self._paths = tuple(name for name, _ in _bundled(self._folder))
+            paths = _paths(self._folder)
+            self._paths = tuple(path for path in paths if Path(path).name != "stamp.json")
         return self._paths
-
-
-def _bundled(folder: Path) -> Iterator[tuple[str, Path]]:
-    for path in _paths(folder):
-        if not path.endswith("/stamp.json") and path != "stamp.json":
-            yield path, folder / path
 
 
 def _paths(folder: Path) -> Iterator[str]:

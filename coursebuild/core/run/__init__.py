@@ -13,5 +13,4 @@
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
 - `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
 - `child`: processes that answer
-- `exit_immediately`: the end of this process
 """

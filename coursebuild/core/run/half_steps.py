@@ -101,7 +101,7 @@ class _HalfSteps:
     def _note(self) -> None:
         if not self._has_halved and mujoco_tracing.tracer is not None:
             self._has_halved = True
-            mujoco_tracing.tracer.moved("p")
+            mujoco_tracing.tracer.note("p")
 
     def _rollout(self, real: Callable[..., None]) -> Callable[..., None]:
         numpy = self._numpy

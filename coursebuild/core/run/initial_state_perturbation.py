@@ -204,7 +204,7 @@ class _Perturbation:
 
     def _note(self, record: str) -> None:
         if mujoco_tracing.tracer is not None:
-            mujoco_tracing.tracer.moved(record)
+            mujoco_tracing.tracer.note(record)
 
 
 class _Plan:

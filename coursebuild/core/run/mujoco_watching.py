@@ -191,7 +191,8 @@ class _Watch:
             return
         path, line = _script_line(tracer.root)
         parts = (kind, detail, time, model, path, str(line))
-        tracer.diverged("\t".join(part.replace("\t", " ").replace("\0", "") for part in parts))
+        fields = (part.replace("\t", " ").replace("\0", "") for part in parts)
+        tracer.note("d" + "\t".join(fields))
 
 
 def _references(held: Mapping[int, object], key: int) -> int:

@@ -25,7 +25,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 from msgspec.structs import replace
 
@@ -76,32 +76,12 @@ def run_scripts(
     jobs: Sequence[ScriptJob],
     *,
     parallel: int,
-    started: Started = _ignore,
-    finished: Finished = _ignore,
-    place: OtherEnvironment | None = None,
     sandbox: Sandbox | None = None,
+    **others: Any,
 ) -> tuple[ScriptRun, ...]:
-    """Run scripts; those marked `norun` are not, and nothing is told of them.
-
-    Args:
-        root: the course folder, which becomes the working directory.
-        jobs: what to run, in the order of their start.
-        parallel: how many at a time, at least 1.
-        started: is called in this thread; what it raises ends the run.
-        finished: likewise.
-        place: another interpreter that is to run them.
-        sandbox: what is to be around each.
-
-    Returns:
-        What each did, in the order of the jobs.
-
-    Raises:
-        EffectError: there is no place for temporary files, or the interpreter is none.
-    """
+    """Run scripts once, in a sandbox or not: see `ScriptServer.run`."""
     with ScriptServer(sandbox=sandbox) as server:
-        return server.run(
-            root, jobs, parallel=parallel, started=started, finished=finished, place=place
-        )
+        return server.run(root, jobs, parallel=parallel, **others)
 
 
 class ScriptServer:
@@ -147,12 +127,25 @@ class ScriptServer:
         place: OtherEnvironment | None = None,
         unwanted: Callable[[frozenset[str]], bool] | None = None,
     ) -> tuple[ScriptRun, ...]:
-        """As `run_scripts`; one run at a time.
+        """Run scripts; those marked `norun` are not, and nothing is told of them.
 
-        `unwanted` is asked now and then, with the paths of the scripts that run, whether to stop.
+        Only one run at a time.
+
+        Args:
+            root: the course folder, which becomes the working directory.
+            jobs: what to run, in the order of their start.
+            parallel: how many at a time, at least 1.
+            started: is called in this thread; what it raises ends the run.
+            finished: likewise.
+            place: another interpreter that is to run them.
+            unwanted: is asked now and then whether to stop, with the paths of what runs.
+
+        Returns:
+            What each did, in the order of the jobs.
 
         Raises:
-            RunStoppedError: it said so.
+            EffectError: there is no place for temporary files, or the interpreter is none.
+            RunStoppedError: the run is unwanted.
         """
         work = _Work(root.resolve(), jobs, started, finished, place, self._sandbox)
         if not work.waiting:

@@ -168,14 +168,14 @@ class Tracer:
         folder = self._project_folder(sys.path[0])
         if folder is not None:
             names = sorted(name for name in modules if not self._is_frozen(name))
-            self._note(f"v{folder}\t{','.join(names)}")
-        self._note("b")
+            self.note(f"v{folder}\t{','.join(names)}")
+        self.note("b")
 
     def read(self, path: object) -> None:
         """A file was opened for reading, or an attempt was made."""
         at = self._relevant(path)
         if at is not None and at not in self._written:
-            self._note(f"r{at}")
+            self.note(f"r{at}")
 
     def imported(self, name: str, path: Sequence[object] | None) -> None:
         """A module was looked for: it depends on what stands, or does not, in earlier folders."""
@@ -194,14 +194,14 @@ class Tracer:
                 continue
             candidates = f"{at}/{last}/__init__.py", f"{at}/{last}.py"
             if last.isidentifier() and not any(map(_exists, candidates)):
-                self._note(f"v{at}\t{last}")
+                self.note(f"v{at}\t{last}")
                 continue
             for candidate in candidates:
-                self._note(f"r{candidate}")
+                self.note(f"r{candidate}")
                 if _exists(candidate):
                     return
         if not dot and name not in self._standard:
-            self._note(f"m{name}")
+            self.note(f"m{name}")
             if name == "mujoco" and not self.has_mujoco:
                 self.opaque(UNSEEN_MUJOCO)
             if name in _READS_UNSEEN and PathFinder.find_spec(name) is not None:
@@ -221,21 +221,13 @@ class Tracer:
         """Native code was loaded from a file, or from all in a folder."""
         at = self._relevant(path)
         if at is not None and not self.by_import():
-            self._note(f"r{at}")
+            self.note(f"r{at}")
             if at.startswith(self.root):
                 self.opaque(NATIVE)
 
-    def diverged(self, fields: str) -> None:
-        """A simulation was lost."""
-        self._note(f"d{fields}")
-
-    def moved(self, record: str) -> None:
-        """Something about a run whose initial states are moved."""
-        self._note(record)
-
     def opaque(self, why: str) -> None:
         """There may be more than is noted."""
-        self._note(f"o{why}")
+        self.note(f"o{why}")
 
     def _effect(self, kind: str, what: str, why: str) -> None:
         """Something beyond the script is changed or asked, unless a package does while imported."""
@@ -245,7 +237,7 @@ class Tracer:
         self.opaque(why)
         if f"{kind}{line}" not in self._noted:  # once for each line
             self._noted.add(f"{kind}{line}")
-            self._note(f"{kind}{what}\t{line}")
+            self.note(f"{kind}{what}\t{line}")
 
     def by_import(self) -> bool:
         """Whether what happens is done by a package while it is imported, not by the script."""
@@ -289,7 +281,7 @@ class Tracer:
         if file is not None:
             at = self._relevant(file)
             if at is not None:
-                self._note(f"r{at}")
+                self.note(f"r{at}")
                 if at.startswith(self.root):
                     self.opaque(NATIVE)
         elif isinstance(name, str):
@@ -306,7 +298,7 @@ class Tracer:
         if at is None:
             return
         if at == self.root[:-1] or at.startswith(self.root):
-            self._note(f"l{at}")
+            self.note(f"l{at}")
         elif not self.by_import():
             self.opaque(LISTS_OUTSIDE)
 
@@ -370,7 +362,8 @@ class Tracer:
         # An environment in the folder of the course holds packages, which count by their versions.
         return None if f"{at}/".startswith(self._inside or ("\0",)) else at
 
-    def _note(self, record: str) -> None:
+    def note(self, record: str) -> None:
+        """Add a record, unless it is there already."""
         if record in self._noted:
             return
         self._noted.add(record)

@@ -9,7 +9,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -46,21 +45,12 @@ def test_every_position_of_an_entry_on_the_disk(tmp_path: Path) -> None:
     for at in range(len(whole)):
         entry(tmp_path).write_bytes(whole[:at] + bytes([whole[at] ^ 0x10]) + whole[at + 1 :])
         fresh = Memo(tmp_path)
-        lines = heard(fresh)
         assert fresh.get("kind", KEY, bytes) is None
         said = f"the entry kind/{KEY[:12]}… in .coursebuild is damaged: it is made again"
-        assert lines == [said]
+        assert heard(fresh) == [said], "what was found before anybody listened is told later"
         assert not entry(tmp_path).exists()
         assert fresh.get_or_create("kind", KEY, lambda: b"made again") == b"made again"
         assert Memo(tmp_path).get("kind", KEY, bytes) == b"made again"
-
-
-def test_damage_found_before_anybody_listens_is_told_later(tmp_path: Path) -> None:
-    entry(tmp_path).parent.mkdir(parents=True)
-    entry(tmp_path).write_bytes(b"nonsense")
-    store = Memo(tmp_path)
-    assert store.get("kind", KEY, bytes) is None
-    assert len(heard(store)) == 1
 
 
 # --- several processes
@@ -131,22 +121,19 @@ def test_a_writer_that_was_killed_leaves_nothing_that_is_served_or_stays(tmp_pat
 # --- places that take nothing
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EDQUOT])
 @pytest.mark.parametrize("call", ["write_bytes", "replace"])
 def test_a_disk_that_takes_nothing_costs_time_and_is_told_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str, code: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
     def refuse(*_: object) -> None:
-        raise OSError(code, os.strerror(code))
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, call, refuse)
     store = Memo(tmp_path)
     lines = heard(store)
     assert store.get_or_create("kind", KEY, lambda: b"a") == b"a"
     assert store.get_or_create("kind", key(2), lambda: b"b") == b"b"
-    words = os.strerror(code)
-    said = f"results cannot be kept in .coursebuild: {words[0].lower()}{words[1:]}"
-    assert lines == [said]
+    assert lines == ["results cannot be kept in .coursebuild: no space left on device"]
     assert [path for path in tmp_path.rglob("*") if path.name.startswith(".new-")] == []
 
 
@@ -209,33 +196,22 @@ def test_a_group_lists_its_newest_and_drops_the_rest(tmp_path: Path) -> None:
 # --- the limit
 
 
-@pytest.fixture
-def many(tmp_path: Path) -> Iterator[Path]:
-    """Ten thousand entries of one hundred bytes and their hash, each used a second later."""
+def test_entries_are_cut_to_the_limit_the_oldest_first(tmp_path: Path) -> None:
     folder = tmp_path / ".coursebuild"
-    for kind in range(10):
-        (folder / f"kind{kind}").mkdir(parents=True)
-        for number in range(1000):
-            path = folder / f"kind{kind}" / key(number)
-            path.write_bytes(b"x" * 132)
-            used = 1_000_000 + number * 10 + kind
-            os.utime(path, (used, used))
-    yield folder
-
-
-@pytest.mark.site
-def test_ten_thousand_entries_are_cut_to_the_limit_the_oldest_first(many: Path) -> None:
-    others = ["lock", "content.toml", "kind0/notes"]
-    for name in others:
-        (many / name).write_text("not an entry")
-    prune(many, 660_000)
-    left = [path for path in many.rglob("*") if path.is_file() and path.name not in others[0:2]]
-    hashed = [path for path in left if len(path.name) == 64]
-    assert len(hashed) == 4500  # down to nine tenths of the limit
-    assert min(path.stat().st_mtime for path in hashed) == 1_000_000 + 5500
-    assert all((many / name).exists() for name in others)
-    prune(many, 660_000)
-    assert all(path.exists() for path in hashed)
+    for number in range(1000):
+        path = folder / f"kind{number % 10}" / key(number)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"x" * 132)
+        os.utime(path, (1000 + number, 1000 + number))
+    others = [folder / name for name in ("lock", "content.toml", "kind0/notes")]
+    for path in others:
+        path.write_text("not an entry")
+    for _ in range(2):
+        prune(folder, 66_000)
+        left = [path for path in folder.rglob("*") if path.is_file() and path not in others]
+        assert len(left) == 450, "down to nine tenths of the limit, and then no further"
+        assert min(path.stat().st_mtime for path in left) == 1000 + 550
+    assert all(path.exists() for path in others)
 
 
 def test_what_is_used_stays(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ import pytest
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
 from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
-from support.published_sites import links as links
 from support.published_sites import pages as pages
 from support.published_sites import root as root
 from support.published_sites import spared as spared
@@ -99,7 +98,7 @@ def test_changes_by_hand(
     assert (out / "b/c.html").read_text() == "b/c.html 1"
     publish(spared, out, pages(**MANY | {"a": "3"}))
     assert texts(out) == TEXTS | {"a.html": "a.html 3"}
-    assert beside(spared) == ["public"]
+    assert beside(spared) == ["content", "public"]
 
 
 def test_what_is_unlinked_in_the_spare_stays_in_the_site(spared: Path, pages: Pages) -> None:
@@ -144,4 +143,4 @@ def test_something_else_for_a_spare(spared: Path, tmp_path: Path, pages: Pages, 
         assert publish(spared, spared / "public", pages(**MANY | {"a": key})) == ("a.html",)
         assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
     assert texts(elsewhere) == before
-    assert beside(spared) == ["public"]
+    assert beside(spared) == ["content", "public"]

@@ -16,15 +16,22 @@ from coursebuild.core.engine.publish import publish
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
-from support.published_sites import links as links
 from support.published_sites import pages as pages
 from support.published_sites import root as root
 from support.published_sites import spared as spared
 
 
 def test_what_did_not_change_is_neither_made_nor_linked(
-    spared: Path, pages: Pages, links: list[str]
+    spared: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    links: list[str] = []
+    really = os.link
+
+    def link(source: str, target: str, *, follow_symlinks: bool = True) -> None:
+        links.append(source.rpartition("public/")[2])
+        really(source, target, follow_symlinks=follow_symlinks)
+
+    monkeypatch.setattr(os, "link", link)
     assert publish(spared, spared / "public", pages(**MANY | {"b__d": "2"})) == ("b/d.html",)
     assert links == ["a.html"]  # which changed the time before
     assert texts(spared / "public") == TEXTS | {"b/d.html": "b/d.html 2"}
@@ -32,7 +39,7 @@ def test_what_did_not_change_is_neither_made_nor_linked(
     assert publish(spared, spared / "public", pages(**MANY | {"b__d": "3"})) == ("b/d.html",)
     assert links == ["a.html"]
     assert pages.made == ["b/d.html", "b/d.html"]
-    assert beside(spared) == ["public"]
+    assert beside(spared) == ["content", "public"]
 
 
 @pytest.mark.site
@@ -71,7 +78,7 @@ def test_two_places_have_one_spare(spared: Path, pages: Pages) -> None:
         for out in ("public", "other"):
             publish(spared, spared / out, pages(**MANY | {"a": key}))
             assert texts(spared / out) == TEXTS | {"a.html": f"a.html {key}"}
-    assert beside(spared) == ["other", "public"]
+    assert beside(spared) == ["content", "other", "public"]
 
 
 def test_a_place_on_another_file_system_than_the_course(
@@ -88,7 +95,7 @@ def test_a_place_on_another_file_system_than_the_course(
     for key in "23":
         assert publish(spared, spared / "public", pages(**MANY | {"a": key})) == ("a.html",)
         assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
-        assert beside(spared) == ["public"]
+        assert beside(spared) == ["content", "public"]
 
 
 def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages: Pages) -> None:
@@ -98,7 +105,7 @@ def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages:
     with pytest.raises(KeyboardInterrupt):
         publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", broken)])
     assert texts(spared / "public") == TEXTS
-    assert beside(spared) == ["public"]
+    assert beside(spared) == ["content", "public"]
     assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html",)
 
 
@@ -116,7 +123,7 @@ def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool
     with pytest.raises(EffectError, match="somebody else changes what is being written"):
         publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "1", make)])
     assert texts(spared / "public") == TEXTS
-    assert beside(spared) == ["public"]
+    assert beside(spared) == ["content", "public"]
     publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", lambda: b"new")])
     assert texts(spared / "public") == TEXTS | {"x.html": "new"}
 

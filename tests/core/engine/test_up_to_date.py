@@ -15,35 +15,35 @@ from coursebuild.core.engine import up_to_date
 from coursebuild.core.engine.up_to_date import Watcher, unchanged
 
 COMMAND = ("build", "public")
-AGO = 3_600_000_000_000
-"""ns."""
+WELL = "all is well\n"
+LESSON, MODEL = "content/lessons/1.1-a.md", "models/m.xml"
 
 
-def age(folder: Path) -> None:
-    """Let everything be an hour old, at times that no coarse clock gives."""
-    for path in (folder, *folder.rglob("*")):
+def age(*paths: Path, seconds: float = 3600, coarse: bool = False) -> None:
+    """Let files be as old as that, at times that no coarse clock gives, or at such."""
+    for path in paths:
         if not path.is_symlink():
-            then = time.time_ns() - AGO
-            os.utime(path, ns=(then, then - then % 1_000_000 + 123_457))
+            then = time.time_ns() - int(seconds * 1e9)
+            os.utime(path, ns=(then, then - then % 1_000_000 + (0 if coarse else 123_457)))
 
 
 @pytest.fixture
 def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path / "course"
-    for path in ("content/lessons/1.1-a.md", "content/course.toml", "models/m.xml", "data/d.csv"):
+    made = ("public/index.html", "examples/a.py")
+    for path in (LESSON, "content/course.toml", MODEL, "data/d.csv", *made):
         (root / path).parent.mkdir(parents=True, exist_ok=True)
-        (root / path).write_text(path)
-    for path in ("public/index.html", "examples/a.py"):
-        (root / path).parent.mkdir(parents=True)
         (root / path).write_text(path)
     (tmp_path / "site-packages/numpy-2.0.dist-info").mkdir(parents=True)
     monkeypatch.setattr(sys, "path", [str(tmp_path / "site-packages")])
-    age(root)
+    age(root, *root.rglob("*"))
     return root
 
 
-def keep(root: Path, said: str = "all is well\n") -> bool:
+def keep(root: Path, said: str = WELL, during: Callable[[Path], object] = bool) -> bool:
+    """Whether a command could note how all was when it had done its work."""
     watcher = Watcher(str(root), COMMAND)
+    during(root)
     return watcher.keep(said, ["data/d.csv", "data/not-there.csv"], ["public", "examples"])
 
 
@@ -51,12 +51,11 @@ def said(root: Path) -> str | None:
     return unchanged(str(root), COMMAND)
 
 
-@pytest.mark.parametrize("text", ["all is well\n", "", "é\n\nwarning: x\n", "\n\n\n", "\udc80\n"])
-def test_what_was_said_is_said_again(root: Path, text: str) -> None:
+def test_what_was_said_is_said_again(root: Path) -> None:
     assert said(root) is None
-    assert keep(root, text)
-    assert said(root) == text
-    assert said(root) == text
+    for text in (WELL, "", "é\n\nwarning: x\n", "\n\n\n", "\udc80\n"):
+        assert keep(root, text)
+        assert [said(root), said(root)] == [text, text]
 
 
 def rewrite(path: str) -> Callable[[Path], None]:
@@ -69,23 +68,23 @@ def rewrite(path: str) -> Callable[[Path], None]:
 
 def replace(root: Path) -> None:
     """Another file with the same name, size and time."""
-    file = root / "models/m.xml"
-    status = file.stat()
-    (root / "models/new").write_bytes(file.read_bytes())
-    os.utime(root / "models/new", ns=(status.st_atime_ns, status.st_mtime_ns))
-    (root / "models/new").replace(file)
+    status = (root / MODEL).stat()
+    new = root / "models/new"
+    new.write_bytes((root / MODEL).read_bytes())
+    os.utime(new, ns=(status.st_atime_ns, status.st_mtime_ns))
+    new.replace(root / MODEL)
 
 
 def put_the_time_back(root: Path) -> None:
     """After another text, as long as it was."""
-    before = (root / "models/m.xml").stat()
-    rewrite("models/m.xml")(root)
-    os.utime(root / "models/m.xml", ns=(before.st_atime_ns, before.st_mtime_ns))
+    before = (root / MODEL).stat()
+    rewrite(MODEL)(root)
+    os.utime(root / MODEL, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
 def link_away(root: Path) -> None:
-    (root / "models/m.xml").rename(root.with_name("away.xml"))
-    (root / "models/m.xml").symlink_to(root.with_name("away.xml"))
+    (root / MODEL).rename(root.with_name("away.xml"))
+    (root / MODEL).symlink_to(root.with_name("away.xml"))
 
 
 def install(root: Path) -> None:
@@ -103,13 +102,12 @@ def add(root: Path) -> None:
 
 
 def remove(root: Path) -> None:
-    (root / "models/m.xml").unlink()
+    (root / MODEL).unlink()
 
 
-LESSON = "content/lessons/1.1-a.md"
+REWRITTEN = (LESSON, MODEL, "data/d.csv", "public/index.html", "examples/a.py")
 CHANGES: dict[str, Callable[[Path], object]] = {
-    **{path: rewrite(path) for path in (LESSON, "models/m.xml", "data/d.csv")},
-    **{path: rewrite(path) for path in ("public/index.html", "examples/a.py")},
+    **{path: rewrite(path) for path in REWRITTEN},
     "touched": lambda root: os.utime(root / "content/course.toml"),
     "a file more": add,
     "a folder more": lambda root: (root / "content/new").mkdir(),
@@ -134,13 +132,11 @@ def test_any_change_is_seen(root: Path, change: Callable[[Path], object]) -> Non
     assert said(root) is None
 
 
-@pytest.mark.parametrize(("name", "value"), [("MUJOCO_GL", "osmesa"), ("PYTHONPATH", "/elsewhere")])
-def test_what_decides_which_code_runs_is_seen(
-    root: Path, monkeypatch: pytest.MonkeyPatch, name: str, value: str
-) -> None:
-    assert keep(root)
-    monkeypatch.setenv(name, value)
-    assert said(root) is None
+def test_what_decides_which_code_runs_is_seen(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("MUJOCO_GL", "PYTHONPATH"):
+        assert keep(root)
+        monkeypatch.setenv(name, "/elsewhere")
+        assert said(root) is None, name
 
 
 def test_what_is_no_part_of_the_course_is_not_looked_at(root: Path) -> None:
@@ -150,61 +146,39 @@ def test_what_is_no_part_of_the_course_is_not_looked_at(root: Path) -> None:
     (root / "content/__pycache__").mkdir()
     (root / "README.md").touch()
     (root / ".git").mkdir()
-    assert said(root) == "all is well\n"
+    assert said(root) == WELL
 
 
-@pytest.mark.parametrize("change", [add, remove, rewrite("models/m.xml")])
+@pytest.mark.parametrize("change", [add, remove, rewrite(MODEL), rewrite("data/d.csv")])
 def test_what_changes_during_the_work_is_not_kept(
     root: Path, change: Callable[[Path], None]
 ) -> None:
-    watcher = Watcher(str(root), COMMAND)
-    change(root)
-    assert not watcher.keep("all is well\n", [], ["public"])
+    assert not keep(root, during=change)
     assert said(root) is None
 
 
-def test_a_file_read_by_a_script_that_changes_during_the_work_is_not_kept(root: Path) -> None:
-    watcher = Watcher(str(root), COMMAND)
-    (root / "data/d.csv").write_text("other")
-    assert not watcher.keep("all is well\n", ["data/d.csv"], ["public"])
-
-
 def test_what_the_work_writes_may_be_new(root: Path) -> None:
-    watcher = Watcher(str(root), COMMAND)
-    (root / "public/index.html").write_text("new")
-    assert watcher.keep("all is well\n", [], ["public"])
-    assert said(root) == "all is well\n"
+    assert keep(root, during=rewrite("public/index.html"))
+    assert said(root) == WELL
 
 
 def test_a_file_whose_time_says_nothing_is_not_kept(root: Path) -> None:
     """Changed just before the work began, or where the clock is coarse, or in the future."""
-    for before, coarse, kept in (
-        (1_000_000_000, False, True),
-        (-10_000_000_000, False, False),
-        (1_000_000_000, True, False),
-        (3_000_000_000, True, True),
-    ):
-        then = time.time_ns() - before
-        then = then - then % 1_000_000 + (0 if coarse else 123_457)
-        os.utime(root / "models/m.xml", ns=(then, then))
-        assert keep(root) is kept, (before, coarse)
+    cases = (1, False, True), (-10, False, False), (1, True, False), (3, True, True)
+    for seconds, coarse, kept in cases:
+        age(root / MODEL, seconds=seconds, coarse=coarse)
+        assert keep(root) is kept, (seconds, coarse)
 
 
-def test_a_linked_folder_is_not_kept(root: Path) -> None:
-    """What changes behind it is not looked at."""
+def test_a_link_to_a_file_is_followed_and_one_to_a_folder_is_not_kept(root: Path) -> None:
+    (root / "content/linked.csv").symlink_to(root / "data/other.csv")
+    for _ in range(2):
+        assert keep(root)  # also where it leads nowhere
+        (root / "data/other.csv").write_text("1")
+        assert said(root) is None
+        age(root / "data/other.csv")
     (root / "content/linked").symlink_to(root / "data")
     assert not keep(root)
-
-
-def test_a_link_to_a_file_is_followed(root: Path) -> None:
-    (root / "content/linked.csv").symlink_to(root / "data/other.csv")
-    assert keep(root)  # also one that leads nowhere
-    (root / "data/other.csv").write_text("1")
-    assert said(root) is None
-    age(root)
-    assert keep(root)
-    (root / "data/other.csv").write_text("2")
-    assert said(root) is None
 
 
 def test_a_damaged_note_is_not_believed(root: Path) -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.files import examples
 from coursebuild.core.files.errors import EffectError, OutsideProjectError
 from coursebuild.core.files.examples import (
     MANIFEST,
@@ -23,78 +22,63 @@ from coursebuild.core.files.examples import (
 
 A = ("examples/a.py", b"print(1)\n")
 B = ("examples/sub/deep/b.py", b"print(2)\n")
+NEXT = (A[0], b"next\n")
+Summary = tuple[tuple[str, ...], ...]
 
 
-def listing(root: Path) -> list[str]:
-    folder = root / "examples"
-    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*"))
-
-
-def summary(report: ExamplesReport) -> tuple[tuple[str, ...], ...]:
+def summary(report: ExamplesReport) -> Summary:
     return report.written, report.unchanged, report.removed, tuple(b.path for b in report.blocked)
 
 
-def test_no_scripts_no_folder(tmp_path: Path) -> None:
-    assert summary(write_examples(tmp_path, [])) == ((), (), (), ())
+def write(root: Path, *scripts: tuple[str, bytes]) -> Summary:
+    return summary(write_examples(root, scripts))
+
+
+def test_files_are_written_once_and_without_scripts_nothing_is_there(tmp_path: Path) -> None:
+    assert write(tmp_path) == ((), (), (), ())
     assert list(tmp_path.iterdir()) == []
-
-
-def test_unchanged_files_are_not_touched(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A, B])
+    assert write(tmp_path, A, B) == ((A[0], B[0]), (), (), ())
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "examples").rglob("*")}
-    assert summary(write_examples(tmp_path, [A, B])) == ((), (A[0], B[0]), (), ())
+    assert write(tmp_path, A, B) == ((), (A[0], B[0]), (), ())
     assert {p: p.stat().st_mtime_ns for p in (tmp_path / "examples").rglob("*")} == before
 
 
 def test_edited_by_hand(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A, B])
+    write(tmp_path, A, B)
     (tmp_path / A[0]).write_bytes(b"print(1)\nprint('mine')")
-    for wanted in (A[1], b"print(3)\n"):
+    for wanted, diverged in ((A, False), (NEXT, True)):
         for _ in range(2):  # it stays so until somebody decides
-            report = write_examples(tmp_path, [(A[0], wanted), B])
+            report = write_examples(tmp_path, [wanted, B])
             assert summary(report) == ((), (B[0],), (), (A[0],))
             (blocked,) = report.blocked
-            assert blocked.obstacle is Obstacle.EDITED
+            assert (blocked.obstacle, blocked.diverged) == (Obstacle.EDITED, diverged)
             assert blocked.current == "print(1)\nprint('mine')"
             assert blocked.diff.endswith("+print('mine')\n\\ No newline at end of file\n")
             assert (tmp_path / A[0]).read_bytes() == b"print(1)\nprint('mine')"
 
 
-def test_the_edit_was_brought_into_the_lesson(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A])
+def test_edit_that_was_brought_into_the_lesson_or_taken_back(tmp_path: Path) -> None:
+    write(tmp_path, A)
     (tmp_path / A[0]).write_bytes(b"mine\n")
-    write_examples(tmp_path, [A])
-    assert summary(write_examples(tmp_path, [(A[0], b"mine\n")])) == ((), (A[0],), (), ())
-    assert summary(write_examples(tmp_path, [(A[0], b"next\n")])) == ((A[0],), (), (), ())
-
-
-def test_the_edit_was_taken_back(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A])
+    write(tmp_path, A)
+    assert write(tmp_path, (A[0], b"mine\n")) == ((), (A[0],), (), ())
+    (tmp_path / A[0]).write_bytes(b"edited again\n")
+    assert write(tmp_path, NEXT) == ((), (), (), (A[0],))
     (tmp_path / A[0]).write_bytes(b"mine\n")
-    write_examples(tmp_path, [(A[0], b"next\n")])
-    (tmp_path / A[0]).write_bytes(A[1])
-    assert summary(write_examples(tmp_path, [(A[0], b"next\n")])) == ((A[0],), (), (), ())
+    assert write(tmp_path, NEXT) == ((A[0],), (), (), ())
 
 
-def test_scripts_that_no_lesson_has_go(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A, B])
+def test_scripts_that_no_lesson_has_go_unless_they_were_edited(tmp_path: Path) -> None:
+    write(tmp_path, A, B)
+    (tmp_path / A[0]).write_bytes(b"mine\n")
     (tmp_path / "examples/sub/own.txt").write_text("the author's")
-    assert summary(write_examples(tmp_path, [])) == ((), (), (A[0], B[0]), ())
-    assert listing(tmp_path) == [".extracted.json", "sub", "sub/own.txt"]
-    assert summary(write_examples(tmp_path, [])) == ((), (), (), ())
-
-
-def test_edited_scripts_that_no_lesson_has_stay(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A, B])
-    (tmp_path / A[0]).write_bytes(b"mine\n")
-    for _ in range(2):
-        report = write_examples(tmp_path, [B])
-        assert summary(report) == ((), (B[0],), (), (A[0],))
-        assert report.blocked[0].obstacle is Obstacle.ORPHAN
-        assert "+mine" in report.blocked[0].diff
-        assert (tmp_path / A[0]).read_bytes() == b"mine\n"
+    assert write(tmp_path) == ((), (), (B[0],), (A[0],))
+    assert sorted(p.name for p in (tmp_path / "examples/sub").iterdir()) == ["own.txt"]
+    (blocked,) = write_examples(tmp_path, []).blocked
+    assert blocked.obstacle is Obstacle.ORPHAN and "+mine" in blocked.diff
+    assert (tmp_path / A[0]).read_bytes() == b"mine\n"
     (tmp_path / A[0]).unlink()
-    assert summary(write_examples(tmp_path, [B])) == ((), (B[0],), (), ())
+    assert write(tmp_path) == ((), (), (), ())
 
 
 def test_the_authors_own_files_are_left_alone(tmp_path: Path) -> None:
@@ -103,55 +87,49 @@ def test_the_authors_own_files_are_left_alone(tmp_path: Path) -> None:
     (tmp_path / A[0]).write_bytes(b"own too\n")
     report = write_examples(tmp_path, [A, B])
     assert summary(report) == ((B[0],), (), (), (A[0],))
-    assert report.blocked == (
-        Blocked(
-            A[0],
-            Obstacle.FOREIGN,
-            "own too\n",
-            "--- examples/a.py (in the lesson)\n+++ examples/a.py (on the disk)\n"
-            "@@ -1 +1 @@\n-print(1)\n+own too\n",
-        ),
+    diff = (
+        "--- examples/a.py (in the lesson)\n+++ examples/a.py (on the disk)\n"
+        "@@ -1 +1 @@\n-print(1)\n+own too\n"
     )
+    assert report.blocked == (Blocked(A[0], Obstacle.FOREIGN, "own too\n", diff),)
     assert (tmp_path / "examples/own.py").read_bytes() == b"own\n"
     assert (tmp_path / A[0]).read_bytes() == b"own too\n"
 
 
-@pytest.mark.parametrize(
-    "manifest",
-    [
-        None,
-        b"",
-        b"{",
-        b"[]",
-        b"null",
-        b"\xff",
-        b'{"files": 3}',
-        b'{"files": {"examples/a.py": 3}}',
-        b'{"files": {"examples/a.py": [3]}}',
-        b'{"files": {"../secret": ["x"]}}',
-        b'{"files": {"examples/../../secret": ["x"]}}',
-    ],
-)
+DAMAGED = [
+    *(b"", b"{", b"[]", b"null", b"\xff", b'{"files": 3}'),
+    b'{"files": {"examples/a.py": 3}}',
+    b'{"files": {"examples/a.py": [3]}}',
+    b'{"files": {"../secret": ["x"]}}',
+    b'{"files": {"examples/../../secret": ["x"]}}',
+]
+
+
+@pytest.mark.parametrize("manifest", [None, *DAMAGED])
 def test_a_lost_manifest_makes_it_careful(tmp_path: Path, manifest: bytes | None) -> None:
-    write_examples(tmp_path, [A, B])
-    path = tmp_path / MANIFEST
+    root = tmp_path / "course"
+    root.mkdir()
+    write(root, A, B)
+    path = root / MANIFEST
     path.unlink() if manifest is None else path.write_bytes(manifest)
-    (tmp_path.parent / "secret").write_bytes(b"x")
-    report = write_examples(tmp_path, [(A[0], b"next\n"), B])
+    (tmp_path / "secret").write_bytes(b"x")
+    report = write_examples(root, [NEXT, B])
     assert summary(report) == ((), (B[0],), (), (A[0],))
     assert report.blocked[0].obstacle is Obstacle.FOREIGN
-    assert (tmp_path.parent / "secret").exists()
+    assert (tmp_path / "secret").exists()
     assert json.loads(path.read_bytes())["files"].keys() == {B[0]}
 
 
-def test_what_a_power_cut_emptied_is_written_again(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A])
+def test_what_a_power_cut_emptied_is_written_again_with_its_permissions(tmp_path: Path) -> None:
+    write(tmp_path, A)
     (tmp_path / A[0]).write_bytes(b"")
-    assert summary(write_examples(tmp_path, [A])) == ((A[0],), (), (), ())
+    (tmp_path / A[0]).chmod(0o755)
+    assert write(tmp_path, A) == ((A[0],), (), (), ())
+    assert stat.S_IMODE((tmp_path / A[0]).stat().st_mode) == 0o755
 
 
 def test_files_that_are_not_text(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A])
+    write(tmp_path, A)
     (tmp_path / A[0]).write_bytes(b"a\xffb\r\n\x0cc\n")
     (blocked,) = write_examples(tmp_path, [A]).blocked
     assert blocked.current == "a\\xffb\r\n\x0cc\n"
@@ -167,78 +145,76 @@ def test_links_and_folders_in_the_way(tmp_path: Path) -> None:
     (root / "examples/link.py").symlink_to("../../outside/x.py")
     (root / "examples/inner.py").symlink_to("file")
     (root / "examples/out").symlink_to("../../outside")
-    paths = ["examples/folder.py", "examples/file/x.py", "examples/link.py", "examples/out/x.py"]
-    paths.append("examples/inner.py")
-    report = write_examples(root, [(p, b"new\n") for p in paths] + [A])
-    assert report.written == (A[0],)
-    assert {b.path: b.obstacle for b in report.blocked} == {
+    obstacles = {
         "examples/file/x.py": Obstacle.FOLDER,
         "examples/folder.py": Obstacle.FOLDER,
         "examples/inner.py": Obstacle.LINK,
         "examples/link.py": Obstacle.LINK,
         "examples/out/x.py": Obstacle.LINK,
     }
+    report = write_examples(root, [*((path, b"new\n") for path in obstacles), A])
+    assert report.written == (A[0],)
+    assert {b.path: b.obstacle for b in report.blocked} == obstacles
     assert (tmp_path / "outside/x.py").read_bytes() == b"outside"
     assert (root / "examples/file").read_bytes() == b"own"
 
 
-def test_folder_leads_out(tmp_path: Path) -> None:
+def test_folder_that_leads_out_or_is_a_file(tmp_path: Path) -> None:
     root = tmp_path / "course"
-    root.mkdir()
-    (tmp_path / "outside").mkdir()
+    for path in (root, tmp_path / "outside"):
+        path.mkdir()
     (root / "examples").symlink_to("../outside")
     with pytest.raises(OutsideProjectError):
-        write_examples(root, [A])
+        write(root, A)
     assert list((tmp_path / "outside").iterdir()) == []
-
-
-def test_folder_is_a_file(tmp_path: Path) -> None:
-    (tmp_path / "examples").write_bytes(b"own")
+    (root / "examples").unlink()
+    (root / "examples").write_bytes(b"own")
     with pytest.raises(EffectError):
-        write_examples(tmp_path, [A])
-    assert (tmp_path / "examples").read_bytes() == b"own"
+        write(root, A)
+    assert (root / "examples").read_bytes() == b"own"
 
 
-def test_saved_while_we_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write_examples(tmp_path, [A, B])
-    really = examples._save_manifest
+class Scripts(dict[str, bytes]):
+    """Scripts with which something happens once the disk was looked at."""
 
-    def save(root: Path, manifest: dict[str, tuple[str, ...]]) -> None:
-        really(root, manifest)
-        (root / A[0]).write_bytes(b"mine\n")
-        (root / B[0]).write_bytes(b"mine too\n")
+    def __init__(self, scripts: list[tuple[str, bytes]], asked: int, happens: object) -> None:
+        super().__init__(scripts)
+        self.asked, self.happens = asked, happens
 
-    monkeypatch.setattr(examples, "_save_manifest", save)
-    report = write_examples(tmp_path, [(A[0], b"next\n")])
+    def __getitem__(self, path: str) -> bytes:
+        self.asked -= 1
+        if self.asked == 0 and callable(self.happens):
+            self.happens()
+        return super().__getitem__(path)
+
+
+def test_saved_while_we_work(tmp_path: Path) -> None:
+    write(tmp_path, A, B)
+
+    def save() -> None:
+        for path, _ in (A, B):
+            (tmp_path / path).write_bytes(b"mine\n")
+
+    report = write_examples(tmp_path, Scripts([NEXT], 2, save))
     assert {b.path: b.obstacle for b in report.blocked} == {
         A[0]: Obstacle.EDITED,
         B[0]: Obstacle.ORPHAN,
     }
     assert summary(report)[:3] == ((), (), ())
-    assert (tmp_path / A[0]).read_bytes() == b"mine\n"
-    assert (tmp_path / B[0]).read_bytes() == b"mine too\n"
+    assert [(tmp_path / path).read_bytes() for path, _ in (A, B)] == [b"mine\n"] * 2
 
 
 def test_two_runs_at_once_write_the_same(tmp_path: Path) -> None:
     """As they do where a file system has no locks: nobody edited anything."""
-    other: list[ExamplesReport] = []
-
-    class Scripts(dict[str, bytes]):
-        asked = 0
-
-        def __getitem__(self, path: str) -> bytes:
-            self.asked += 1
-            if self.asked == 3:  # both files were looked at, and the first is about to be written
-                other.append(write_examples(tmp_path, [A, B]))
-            return super().__getitem__(path)
-
-    report = write_examples(tmp_path, Scripts([A, B]))
-    assert [summary(one) for one in (report, *other)] == [((A[0], B[0]), (), (), ())] * 2
-    assert summary(write_examples(tmp_path, [A, B])) == ((), (A[0], B[0]), (), ())
+    other: list[Summary] = []
+    scripts = Scripts([A, B], 3, lambda: other.append(write(tmp_path, A, B)))
+    found = summary(write_examples(tmp_path, scripts))
+    assert [found, *other] == [((A[0], B[0]), (), (), ())] * 2
+    assert write(tmp_path, A, B) == ((), (A[0], B[0]), (), ())
 
 
 def test_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write_examples(tmp_path, [A])
+    write(tmp_path, A)
 
     def fail(*_: object) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -246,26 +222,17 @@ def test_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", fail)
         with pytest.raises(EffectError, match="no space left on device"):
-            write_examples(tmp_path, [(A[0], b"next\n")])
+            write(tmp_path, NEXT)
     assert (tmp_path / A[0]).read_bytes() == A[1]
-    assert summary(write_examples(tmp_path, [(A[0], b"next\n")])) == ((A[0],), (), (), ())
+    assert write(tmp_path, NEXT) == ((A[0],), (), (), ())
 
 
-def test_permissions_that_somebody_gave_stay(tmp_path: Path) -> None:
-    write_examples(tmp_path, [A])
-    (tmp_path / A[0]).chmod(0o755)
-    write_examples(tmp_path, [(A[0], b"next\n")])
-    assert stat.S_IMODE((tmp_path / A[0]).stat().st_mode) == 0o755
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "diff"),
-    [
+def test_unified_diff() -> None:
+    head = "--- o\n+++ n\n"
+    for old, new, diff in (
         ("a\n", "a\n", ""),
-        ("a\n", "a", "--- o\n+++ n\n@@ -1 +1 @@\n-a\n+a\n\\ No newline at end of file\n"),
-        ("", "a\n", "--- o\n+++ n\n@@ -0,0 +1 @@\n+a\n"),
-        ("a\x0cb\u2028c\n", "d\n", "--- o\n+++ n\n@@ -1 +1 @@\n-a\x0cb\u2028c\n+d\n"),
-    ],
-)
-def test_unified_diff(old: str, new: str, diff: str) -> None:
-    assert unified_diff(old, new, "o", "n") == diff
+        ("a\n", "a", f"{head}@@ -1 +1 @@\n-a\n+a\n\\ No newline at end of file\n"),
+        ("", "a\n", f"{head}@@ -0,0 +1 @@\n+a\n"),
+        ("a\x0cb\u2028c\n", "d\n", f"{head}@@ -1 +1 @@\n-a\x0cb\u2028c\n+d\n"),
+    ):
+        assert unified_diff(old, new, "o", "n") == diff

@@ -14,10 +14,6 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run import versions
 
 
-def test_the_templates_are_there() -> None:
-    assert (resources.templates_dir() / "base.html").is_file()
-
-
 @pytest.mark.parametrize("ask", [resources.assets_dir, resources.templates_dir])
 def test_installed_before_source_tree_before_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ask: object
@@ -36,33 +32,22 @@ def test_installed_before_source_tree_before_nothing(
     assert ask().parent == package
 
 
-def test_everything_is_read_by_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bundle_and_templates_are_read_by_their_paths(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(resources, "_PACKAGE", tmp_path)
-    files = {
-        "assets/js/a.js": b"a",
-        "assets/fonts/b.woff2": b"\xff\x00",
-        "templates/page.html": "é\n".encode(),
-        "templates/.page.html.swp": b"\xff",
-    }
-    for path, data in files.items():
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_bytes(data)
-    assert resources.bundled_files() == (("fonts/b.woff2", b"\xff\x00"), ("js/a.js", b"a"))
-    assert resources.template_texts() == (("page.html", "é\n"),)
-
-
-def test_the_bundle_is_read_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(resources, "_PACKAGE", tmp_path)
-    for path in ("js/b.js", "js-a/a.js", "stamp.json", "a.css"):
+    for path in ("js/b.js", "js-a/a.js", "stamp.json", "a.css", "../templates/.a.html.swp"):
         (tmp_path / "assets" / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / "assets" / path).write_bytes(path.encode())
+        (tmp_path / "assets" / path).write_bytes(b"\xff\x00")
+    (tmp_path / "templates").mkdir(exist_ok=True)
+    (tmp_path / "templates/page.html").write_text("é\n")
+    assert resources.template_texts() == (("page.html", "é\n"),)
     bundle = resources.Bundle()
-    assert bundle["js/b.js"] == b"js/b.js"
+    assert bundle["js/b.js"] == b"\xff\x00"
     for missing in ("js/c.js", "js", "a.css/b", "none/a.js"):
         with pytest.raises(KeyError):
             bundle[missing]
     # By the names of folders, as paths are sorted.
-    assert tuple(bundle.items()) == resources.bundled_files()
     assert list(bundle) == ["a.css", "js/b.js", "js-a/a.js"]
     assert len(bundle) == 3
 

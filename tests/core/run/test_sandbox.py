@@ -70,208 +70,183 @@ def neighbour() -> Iterator[int]:
         process.kill()
 
 
-class TestAttempts:
-    def test_the_network_by_address_and_by_name(self, confine: Confine) -> None:
-        with (
-            socket.create_server(("127.0.0.1", 0)) as tcp,
-            socket.socket(socket.AF_UNIX) as abstract,
-        ):
-            name = f"\0coursebuild-{os.getpid()}"
-            abstract.bind(name)
-            abstract.listen()
-            port = tcp.getsockname()[1]
-            (run,) = confine(
-                "import socket\n"
-                f"attempt(lambda: socket.create_connection(('127.0.0.1', {port}), 5))\n"
-                "attempt(lambda: socket.create_connection(('192.0.2.1', 80), 5))\n"
-                f"attempt(lambda: socket.create_connection(('localhost', {port}), 5))\n"
-                "attempt(lambda: socket.getaddrinfo('example.org', 80))\n"
-                f"attempt(lambda: socket.socket(socket.AF_UNIX).connect({name!r}))\n"
-            )
-            tcp.setblocking(False)
-            with pytest.raises(BlockingIOError):
-                tcp.accept()
-        said = run.stdout.splitlines()
-        assert [line.split()[0] for line in said] == [
-            "ConnectionRefusedError",
-            "OSError",
-            said[2].split()[0],
-            "gaierror",
-            "ConnectionRefusedError",
-        ]
-        assert said[2].split()[0] in ("ConnectionRefusedError", "gaierror", "OSError")
-        assert run.trace is not None
-        assert [each.what for each in run.trace.effects] == [
-            *("127.0.0.1", "192.0.2.1", "localhost", "example.org"),
-        ]
+DENIED = ("OSError [Errno", "FileNotFound", "Permission")
+ATTEMPTS: dict[str, str | tuple[str, ...]] = {
+    # the course
+    "open('lesson.md', 'a')": "OSError [Errno ",
+    "open('new', 'w')": "OSError [Errno ",
+    "os.mkdir('folder')": "OSError [Errno ",
+    "os.remove('lesson.md')": "OSError [Errno ",
+    "os.rename('lesson.md', '/tmp/moved')": "OSError [Errno ",
+    "os.chmod('lesson.md', 0o777)": "OSError [Errno ",
+    "os.symlink('/etc/passwd', 'examples/y.py')": "OSError [Errno ",
+    "libc.mount(b'', os.fsencode(os.getcwd()), b'', 4128, None)": "-1",
+    "libc.umount2(os.fsencode(os.getcwd()), 2)": "-1",
+    # the system
+    "open('/proc/sys/kernel/core_pattern', 'w')": DENIED,
+    "open('/proc/sysrq-trigger', 'w')": DENIED,
+    "open('/usr/evil', 'w')": DENIED,
+    "open(sys.executable, 'a')": DENIED,
+    "open('/dev/evil', 'w')": DENIED,
+    "open('/etc/shadow').read()": DENIED,
+    "os.listdir('/run')": DENIED,
+    "libc.unshare(0x10000000)": "-1",
+    # the folder of the user, where what is written is gone afterwards
+    "open(os.path.expanduser('~/secret')).read()": "FileNotFoundError",
+    "os.mkdir(os.path.expanduser('~/.config'))": "None",
+    "open(os.path.expanduser('~/.profile'), 'w').write('evil')": "4",
+    # other processes
+    "os.kill(OTHER, 9)": "ProcessLookupError",
+    "libc.ptrace(16, OTHER, 0, 0)": "-1",
+    "os.sched_setaffinity(OTHER, {0})": "ProcessLookupError",
+    "os.kill(TESTS, 9)": "ProcessLookupError",
+    "all(int(name) < 9 for name in os.listdir('/proc') if name.isdigit())": "True",
+}
+"""What a script tries, and how what comes of it begins."""
 
-    def test_writing_to_the_course(self, confine: Confine, root: Path) -> None:
-        (root / "lesson.md").write_text("as it was")
+
+def test_attempts_fail_and_change_nothing(
+    confine: Confine, root: Path, home: Path, neighbour: int
+) -> None:
+    (root / "lesson.md").write_text("as it was")
+    code = "import ctypes\nlibc = ctypes.CDLL(None)\n"
+    code += f"OTHER, TESTS = {neighbour}, {os.getpid()}\n"
+    (run,) = confine(code + "".join(f"attempt(lambda: {each})\n" for each in ATTEMPTS))
+    for (each, expected), said in zip(ATTEMPTS.items(), run.stdout.splitlines(), strict=True):
+        assert said.startswith(expected), each
+    assert (root / "lesson.md").read_text() == "as it was"
+    assert sorted(path.name for path in root.iterdir()) == ["examples", "lesson.md"]
+    assert [path.name for path in home.iterdir()] == ["secret"]
+    assert Path(f"/proc/{neighbour}").exists()
+
+
+def test_the_network_by_address_and_by_name(confine: Confine) -> None:
+    name = f"\0coursebuild-{os.getpid()}"
+    with socket.create_server(("127.0.0.1", 0)) as tcp, socket.socket(socket.AF_UNIX) as abstract:
+        abstract.bind(name)
+        abstract.listen()
+        port = tcp.getsockname()[1]
         (run,) = confine(
-            "attempt(lambda: open('lesson.md', 'a'))\n"
-            "attempt(lambda: open('new', 'w'))\n"
-            "attempt(lambda: os.mkdir('folder'))\n"
-            "attempt(lambda: os.remove('lesson.md'))\n"
-            "attempt(lambda: os.rename('lesson.md', '/tmp/moved'))\n"
-            "attempt(lambda: os.chmod('lesson.md', 0o777))\n"
-            "attempt(lambda: os.symlink('/etc/passwd', 'examples/y.py'))\n"
-            "import ctypes\n"
-            "libc = ctypes.CDLL(None)\n"
-            "attempt(lambda: libc.mount(b'', os.fsencode(os.getcwd()), b'', 4128, None))\n"
-            "attempt(lambda: libc.umount2(os.fsencode(os.getcwd()), 2))\n"
+            "import socket\n"
+            f"attempt(lambda: socket.create_connection(('127.0.0.1', {port}), 5))\n"
+            "attempt(lambda: socket.create_connection(('192.0.2.1', 80), 5))\n"
+            f"attempt(lambda: socket.create_connection(('localhost', {port}), 5))\n"
+            "attempt(lambda: socket.getaddrinfo('example.org', 80))\n"
+            f"attempt(lambda: socket.socket(socket.AF_UNIX).connect({name!r}))\n"
         )
-        said = run.stdout.splitlines()
-        assert [line for line in said if not line.startswith("OSError [Errno ")] == ["-1", "-1"]
-        assert len(said) == 9
-        assert (root / "lesson.md").read_text() == "as it was"
-        assert sorted(path.name for path in root.iterdir()) == ["examples", "lesson.md"]
+        tcp.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            tcp.accept()
+    refused, unreachable, by_name, unknown, abstract_one = run.stdout.splitlines()
+    assert refused.startswith("ConnectionRefusedError")
+    assert unreachable.startswith("OSError")
+    assert by_name.startswith(("ConnectionRefusedError", "gaierror", "OSError"))
+    assert unknown.startswith("gaierror")
+    assert abstract_one.startswith("ConnectionRefusedError")
+    assert run.trace is not None
+    asked = ["127.0.0.1", "192.0.2.1", "localhost", "example.org"]
+    assert [each.what for each in run.trace.effects] == asked
 
-    def test_the_folder_of_the_user(self, confine: Confine, home: Path) -> None:
-        (run,) = confine(
-            "attempt(lambda: open(os.path.expanduser('~/secret')).read())\n"
-            "os.makedirs(os.path.expanduser('~/.config'), exist_ok=True)\n"
-            "open(os.path.expanduser('~/.profile'), 'w').write('evil')\n"
-        )
-        assert run.outcome is Outcome.OK, run.stderr
-        assert run.stdout.startswith("FileNotFoundError")
-        assert [path.name for path in home.iterdir()] == ["secret"]
 
-    def test_other_processes_and_their_environments(
-        self, confine: Confine, neighbour: int, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setenv("GITHUB_TOKEN", "hush")
+@pytest.mark.usefixtures("neighbour")
+def test_environments_and_files_of_other_processes(
+    confine: Confine, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_TOKEN", "hush")
+    with (home / "secret").open() as held:
+        os.set_inheritable(held.fileno(), True)
         (run,) = confine(
             "import glob\n"
-            "for path in glob.glob('/proc/[0-9]*/environ') + glob.glob('/proc/[0-9]*/cmdline'):\n"
-            "    attempt(lambda: open(path).read())\n"
             "attempt(lambda: sorted(os.environ))\n"
-            "attempt(lambda: all(int(n) < 9 for n in os.listdir('/proc') if n.isdigit()))\n"
+            "for name in ('environ', 'cmdline'):\n"
+            "    for path in glob.glob(f'/proc/[0-9]*/{name}'):\n"
+            "        attempt(lambda: open(path).read())\n"
+            "for path in glob.glob('/proc/[0-9]*/fd/*'):\n"
+            "    attempt(lambda: os.readlink(path))\n"
         )
-        assert "hush" not in run.stdout
-        assert "GITHUB_TOKEN" not in run.stdout
-        assert run.stdout.endswith("True\n")
+    assert not any(word in run.stdout for word in ("hush", "GITHUB_TOKEN", "secret"))
+    assert "/dev/null" in run.stdout
 
-    def test_signals_and_tracing(self, confine: Confine, neighbour: int) -> None:
-        code = (
-            f"others = {neighbour}, {os.getpid()}\n"
-            "import ctypes\n"
-            "libc = ctypes.CDLL(None)\n"
-            "for pid in others:\n"
-            "    attempt(lambda: os.kill(pid, 9))\n"
-            "    attempt(lambda: libc.ptrace(16, pid, 0, 0))\n"
-            "    attempt(lambda: os.sched_setaffinity(pid, {0}))\n"
-            "sys.stdout.flush()\n"
-            "os.kill(os.getppid(), 15)\n"
-            "os.kill(-1, 9)\n"
-        )
-        first, second = confine(code, "print('as before')")
-        assert first.outcome is Outcome.KILLED
-        assert (second.outcome, second.stdout) == (Outcome.OK, "as before\n")
-        (run,) = confine(code.partition("sys.stdout")[0])
-        for one, two, three in zip(*[iter(run.stdout.splitlines())] * 3, strict=True):
-            assert (one.split()[0], two, three.split()[0]) == (
-                "ProcessLookupError",
-                "-1",
-                "ProcessLookupError",
-            )
-        assert Path(f"/proc/{neighbour}").exists()
 
-    def test_descriptors(self, confine: Confine, home: Path) -> None:
-        with (home / "secret").open() as held:
-            os.set_inheritable(held.fileno(), True)
-            (run,) = confine(
-                "import glob\n"
-                "for path in glob.glob('/proc/[0-9]*/fd/*'):\n"
-                "    attempt(lambda: os.readlink(path))\n"
-            )
-        assert "secret" not in run.stdout and "/dev/null" in run.stdout
+def test_script_that_kills_all_it_can_ends_alone(confine: Confine, neighbour: int) -> None:
+    first, second = confine("os.kill(os.getppid(), 15)\nos.kill(-1, 9)\n", "print('as before')")
+    assert first.outcome is Outcome.KILLED
+    assert (second.outcome, second.stdout) == (Outcome.OK, "as before\n")
+    assert Path(f"/proc/{neighbour}").exists()
 
-    def test_speaking_for_another_script(self, confine: Confine) -> None:
-        forge = (
-            "import glob\n"
-            "parent = os.getppid()\n"
-            "for path in glob.glob(f'/proc/{parent}/fd/*'):\n"
-            "    try:\n"
-            "        with open(path, 'wb', buffering=0) as pipe: pipe.write(%r)\n"
-            "    except OSError: pass\n"
-        )
-        texts = (b"\xff" * 64, b"\0\0\0\2{}", b'\0\0\0\x0e{"lengths":[]}' + b"x" * 9)
-        *forged, last = confine(*(forge % text for text in texts), "print('mine')")
-        assert all(run.outcome in (Outcome.KILLED, Outcome.OK) for run in forged)
-        assert (last.outcome, last.stdout) == (Outcome.OK, "mine\n")
 
-    def test_a_process_that_stays(self, confine: Confine) -> None:
-        mark = f"600.{os.getpid()}"
-        (run,) = confine(
-            "if not os.fork():\n"
-            "    os.setsid()\n"
-            "    if os.fork(): os._exit(0)\n"
-            "    null = os.open('/dev/null', os.O_RDWR)\n"
-            "    for fd in 0, 1, 2: os.dup2(null, fd)\n"
-            f"    os.execv('/bin/sleep', ['sleep', '{mark}'])\n"
-            "os.wait()\n"
-        )
-        assert run.outcome is Outcome.OK, run.stderr
-        for path in Path("/proc").glob("[0-9]*/cmdline"):
-            try:
-                found = mark.encode() in path.read_bytes()
-            except OSError:
-                continue
-            assert not found or gone(int(path.parent.name))
+def test_speaking_for_another_script(self, confine: Confine) -> None:
+    forge = (
+        "import glob\n"
+        "parent = os.getppid()\n"
+        "for path in glob.glob(f'/proc/{parent}/fd/*'):\n"
+        "    try:\n"
+        "        with open(path, 'wb', buffering=0) as pipe: pipe.write(%r)\n"
+        "    except OSError: pass\n"
+    )
+    texts = (b"\xff" * 64, b"\0\0\0\2{}", b'\0\0\0\x0e{"lengths":[]}' + b"x" * 9)
+    *forged, last = confine(*(forge % text for text in texts), "print('mine')")
+    assert all(run.outcome in (Outcome.KILLED, Outcome.OK) for run in forged)
+    assert (last.outcome, last.stdout) == (Outcome.OK, "mine\n")
 
-    def test_filling_the_disk(self, confine: Confine, root: Path) -> None:
-        (run,) = confine(
-            "home = os.path.expanduser('~')\n"
-            "for folder in os.environ['TMPDIR'], home, '/dev/shm', 'runs', '/':\n"
-            "    os.makedirs(folder, exist_ok=True)\n"
-            "    with open(folder + '/large', 'wb') as file:\n"
-            "        attempt(lambda: os.posix_fallocate(file.fileno(), 0, 2 << 30))\n",
-            writes=("runs",),
-        )
-        assert run.stdout.splitlines() == ["OSError [Errno 28] No space left on device"] * 5
-        assert not list(root.glob("runs/*"))
 
-    def test_links_that_the_tool_would_follow(
-        self, confine: Confine, root: Path, home: Path
-    ) -> None:
-        secret = str(home / "secret")
-        (root / "linked").symlink_to(home)
-        (run,) = confine(
-            "folder = os.environ['TMPDIR'] + '/figures-of-this-script'\n"
-            f"os.symlink({secret!r}, folder + '/a.csv')\n"
-            "os.mkfifo(folder + '/b.csv')\n"
-            f"os.symlink({secret!r}, 'runs/c.csv')\n"
-            "attempt(lambda: os.listdir('linked'))\n",
-            figures=("a.csv", "b.csv"),
-            writes=("runs", "linked"),
-        )
-        assert run.outcome is Outcome.OK, run.stderr
-        assert run.figures == ()
-        assert run.stdout.startswith("FileNotFoundError")
-        assert not list(root.glob("runs/*"))
-        assert [path.name for path in home.iterdir()] == ["secret"]
+def test_a_process_that_stays(self, confine: Confine) -> None:
+    mark = f"600.{os.getpid()}"
+    (run,) = confine(
+        "if not os.fork():\n"
+        "    os.setsid()\n"
+        "    if os.fork(): os._exit(0)\n"
+        "    null = os.open('/dev/null', os.O_RDWR)\n"
+        "    for fd in 0, 1, 2: os.dup2(null, fd)\n"
+        f"    os.execv('/bin/sleep', ['sleep', '{mark}'])\n"
+        "os.wait()\n"
+    )
+    assert run.outcome is Outcome.OK, run.stderr
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found = mark.encode() in path.read_bytes()
+        except OSError:
+            continue
+        assert not found or gone(int(path.parent.name))
 
-    def test_the_system(self, confine: Confine) -> None:
-        (run,) = confine(
-            "attempt(lambda: open('/proc/sys/kernel/core_pattern', 'w'))\n"
-            "attempt(lambda: open('/proc/sysrq-trigger', 'w'))\n"
-            "attempt(lambda: open('/usr/evil', 'w'))\n"
-            "attempt(lambda: open(sys.executable, 'a'))\n"
-            "attempt(lambda: open('/dev/evil', 'w'))\n"
-            "attempt(lambda: open('/etc/shadow').read())\n"
-            "attempt(lambda: os.listdir('/run'))\n"
-            "import ctypes\n"
-            "attempt(lambda: ctypes.CDLL(None).unshare(0x10000000))\n"
-        )
-        said = run.stdout.splitlines()
-        assert len(said) == 8 and said.pop() == "-1"
-        assert all(line.startswith(("OSError", "FileNotFound", "Permission")) for line in said)
 
-    @pytest.mark.slow
-    def test_stopping_who_supervises(self, confine: Confine) -> None:
-        first, second = confine("os.kill(os.getppid(), 19)\n" * 3, "print('as before')")
-        assert first.outcome is Outcome.KILLED
-        assert second.stdout == "as before\n"
+def test_filling_the_disk(self, confine: Confine, root: Path) -> None:
+    (run,) = confine(
+        "home = os.path.expanduser('~')\n"
+        "for folder in os.environ['TMPDIR'], home, '/dev/shm', 'runs', '/':\n"
+        "    os.makedirs(folder, exist_ok=True)\n"
+        "    with open(folder + '/large', 'wb') as file:\n"
+        "        attempt(lambda: os.posix_fallocate(file.fileno(), 0, 2 << 30))\n",
+        writes=("runs",),
+    )
+    assert run.stdout.splitlines() == ["OSError [Errno 28] No space left on device"] * 5
+    assert not list(root.glob("runs/*"))
+
+
+def test_links_that_the_tool_would_follow(self, confine: Confine, root: Path, home: Path) -> None:
+    secret = str(home / "secret")
+    (root / "linked").symlink_to(home)
+    (run,) = confine(
+        "folder = os.environ['TMPDIR'] + '/figures-of-this-script'\n"
+        f"os.symlink({secret!r}, folder + '/a.csv')\n"
+        "os.mkfifo(folder + '/b.csv')\n"
+        f"os.symlink({secret!r}, 'runs/c.csv')\n"
+        "attempt(lambda: os.listdir('linked'))\n",
+        figures=("a.csv", "b.csv"),
+        writes=("runs", "linked"),
+    )
+    assert run.outcome is Outcome.OK, run.stderr
+    assert run.figures == ()
+    assert run.stdout.startswith("FileNotFoundError")
+    assert not list(root.glob("runs/*"))
+    assert [path.name for path in home.iterdir()] == ["secret"]
+
+
+@pytest.mark.slow
+def test_stopping_who_supervises(self, confine: Confine) -> None:
+    first, second = confine("os.kill(os.getppid(), 19)\n" * 3, "print('as before')")
+    assert first.outcome is Outcome.KILLED
+    assert second.stdout == "as before\n"
 
 
 class TestResults:
