@@ -19,8 +19,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.prepared import (
-    prepared_copy,
-    prepared_cut,
+    prepared_file,
     prepared_folder,
 )
 from coursebuild.core.engine.tool import step_key
@@ -164,7 +163,7 @@ class SiteMaker:
         """Compressed copies."""
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return prepared_copy(key) or self.store.get_or_create("compressed", key, make)
+            return prepared_file("copies", key) or self.store.get_or_create("compressed", key, make)
 
         return compressed_files(files, keep)
 
@@ -196,7 +195,7 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
 
         return subset_font(job)
 
-    return prepared_cut(job.key) or store.get_or_create("fonts", job.key, make)
+    return prepared_file("fonts", job.key) or store.get_or_create("fonts", job.key, make)
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:

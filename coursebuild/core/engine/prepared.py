@@ -1,8 +1,8 @@
 """What comes with the tool made ahead: fonts cut to what is always kept, templates, copies.
 
-Entry points: `prepared_cut`, by the key of its job; `prepared_copy`; `prepared_folder`. The modules
-`site/prepare_*.py` make the files when site/dist is made. What is not there under its key, since it
-was changed since, is made again.
+Entry points: `prepared_file`, by its key; `prepared_folder`. The modules `site/prepare_*.py` make
+the files when site/dist is made. What is not there under its key, since it was changed since, is
+made again.
 """
 
 from __future__ import annotations
@@ -23,15 +23,9 @@ def prepared_folder() -> Path:
     return assets_dir() / FOLDER
 
 
-def prepared_cut(key: str) -> bytes | None:
-    """The result of a job, by its key."""
-    file: str | None = _made_ahead("fonts.json").get(key)
-    return None if file is None else (prepared_folder() / file).read_bytes()
-
-
-def prepared_copy(key: str) -> bytes | None:
-    """A compressed copy, by the key that `render.compressed` gives it."""
-    file: str | None = _made_ahead("copies.json").get(key)
+def prepared_file(kind: str, key: str) -> bytes | None:
+    """A result of a kind by its key: of `fonts` that of a job, of `copies` a compressed file."""
+    file: str | None = _made_ahead(f"{kind}.json").get(key)
     return None if file is None else (prepared_folder() / file).read_bytes()
 
 

@@ -38,7 +38,7 @@ _AHEAD = 32
 
 def can_fork() -> bool:
     """Whether this process can be copied: it has one thread, and nothing that a copy breaks."""
-    if not hasattr(os, "fork") or sys.platform == "darwin":
+    if sys.platform == "darwin":
         return False
     # Threads do not come along into a copy, and MuJoCo has some of its own.
     return threading.active_count() == 1 and "mujoco" not in sys.modules

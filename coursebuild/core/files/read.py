@@ -28,7 +28,6 @@ from coursebuild.core.model import MjcfModel
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.source import Source
 
-_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks."""
 _STRAY = 0.1
@@ -250,7 +249,7 @@ class _Reader:
         if path not in self.plain:
             return None
         try:
-            return _read_regular(f"{self.root}/{path}", _NO_LINK)
+            return _read_regular(f"{self.root}/{path}", os.O_NOFOLLOW)
         except OSError:  # told by who looks closer
             return None
 
@@ -288,7 +287,7 @@ class _Reader:
 
 def _read_regular(path: Path | str, flags: int = 0) -> bytes:
     """The bytes of a regular file; never waits, whatever stands at the path."""
-    fd = os.open(path, flags | os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    fd = os.open(path, flags | os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     try:
         status = os.fstat(fd)
         if not stat.S_ISREG(status.st_mode):

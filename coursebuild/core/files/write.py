@@ -113,7 +113,7 @@ def remove_leftovers(folders: Iterable[Path]) -> None:
 
 def _remove_if_abandoned(path: Path) -> None:
     with contextlib.suppress(OSError):
-        fd = os.open(path, os.O_RDWR | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0))
+        fd = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
         try:
             if is_abandoned(fd):
                 path.unlink()

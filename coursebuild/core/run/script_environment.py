@@ -128,7 +128,7 @@ def conditions(
 def _c_library() -> str:
     """Whose mathematical functions Python's are."""
     try:
-        return (os.confstr("CS_GNU_LIBC_VERSION") or "") if hasattr(os, "confstr") else ""
+        return os.confstr("CS_GNU_LIBC_VERSION") or ""
     except (OSError, ValueError):
         return ""
 

@@ -52,20 +52,16 @@ def test_a_damaged_record_is_not_believed(root: Path, pages: Pages) -> None:
             assert written == ("a.html", "b.html"), where
 
 
-def test_a_project_that_moves_with_its_site_keeps_it(tmp_path: Path, pages: Pages) -> None:
-    (tmp_path / "one").mkdir()
-    publish(tmp_path / "one", tmp_path / "one/public", pages(a="1"))
-    (tmp_path / "one").rename(tmp_path / "two")
-    assert publish(tmp_path / "two", tmp_path / "two/public", pages(a="1")) == ()
-    assert pages.made == ["a.html"]
-
-
-def test_a_site_that_was_copied_is_made_again(tmp_path: Path, pages: Pages) -> None:
+def test_a_project_that_moves_keeps_its_site_and_a_copy_makes_it_again(
+    root: Path, tmp_path: Path, pages: Pages
+) -> None:
     """A copy's files are others, which nobody has looked at."""
-    (tmp_path / "one").mkdir()
-    publish(tmp_path / "one", tmp_path / "one/public", pages(a="1"))
-    shutil.copytree(tmp_path / "one", tmp_path / "two")
-    assert publish(tmp_path / "two", tmp_path / "two/public", pages(a="1")) == ("a.html",)
+    publish(root, root / "public", pages(a="1"))
+    moved, copy = root.rename(tmp_path / "moved"), tmp_path / "copy"
+    assert publish(moved, moved / "public", pages(a="1")) == ()
+    assert pages.made == ["a.html"]
+    shutil.copytree(moved, copy)
+    assert publish(copy, copy / "public", pages(a="1")) == ("a.html",)
 
 
 def test_two_places_have_a_record_each(root: Path, tmp_path: Path, pages: Pages) -> None:

@@ -1,4 +1,4 @@
-"""Several files changed together: all of them or none. Killed midway: `core/run/test_crash.py`."""
+"""Several files changed together: all of them or none; killed: `pipeline/test_killing.py`."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -46,37 +47,31 @@ def line(process: subprocess.Popen[str]) -> str:
 def test_free_lock_says_nothing(tmp_path: Path) -> None:
     with project_lock(tmp_path, pytest.fail):
         pass
-    with project_lock(tmp_path, pytest.fail):
-        pass
     assert (tmp_path / ".coursebuild/.gitignore").read_bytes() == b"*\n"
+    with pytest.raises(KeyboardInterrupt), project_lock(tmp_path, pytest.fail):
+        raise KeyboardInterrupt
+    with project_lock(tmp_path, pytest.fail):  # freed by the exception
+        pass
+    with project_lock(tmp_path / ".coursebuild/lock", pytest.fail):  # which is no folder
+        pass
 
 
 @pytest.mark.site
-def test_second_run_says_so_and_waits(tmp_path: Path) -> None:
+@pytest.mark.parametrize("removed", [False, True])
+def test_second_run_says_so_and_waits(tmp_path: Path, removed: bool) -> None:
+    """Also where somebody removes the lock meanwhile; a lock dies with its holder."""
     with holder(tmp_path) as first:
         assert line(first) == "held"
         with holder(tmp_path) as second:
             who = f"another coursebuild (process {first.pid})"
             assert line(second) == f"{who} is at work on this course; waiting for it"
             assert second.poll() is None
-            first.send_signal(signal.SIGKILL)  # a lock dies with its holder
-            assert line(second) == "held"
-            assert second.communicate()[0] == "done\n"
-
-
-@pytest.mark.site
-def test_lock_file_deleted_while_waiting(tmp_path: Path) -> None:
-    with holder(tmp_path) as first:
-        assert line(first) == "held"
-        with holder(tmp_path) as second:
-            assert "waiting" in line(second)
-            (tmp_path / ".coursebuild/lock").unlink()
-            (tmp_path / ".coursebuild/.gitignore").unlink()
-            (tmp_path / ".coursebuild").rmdir()
-            first.kill()
+            if removed:
+                shutil.rmtree(tmp_path / ".coursebuild")
+            first.send_signal(signal.SIGKILL)
             assert line(second) == "held"
             assert (tmp_path / ".coursebuild/lock").read_text() == f"{second.pid}\n"
-            second.communicate()
+            assert second.communicate()[0] == "done\n"
 
 
 def test_a_thread_does_not_wait_for_itself(tmp_path: Path) -> None:
@@ -98,19 +93,6 @@ def test_another_thread_waits(tmp_path: Path) -> None:
         order.append("first")
     thread.join()
     assert order == ["waits", "first", "second"]
-
-
-def test_freed_by_an_exception(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), project_lock(tmp_path):
-        raise KeyboardInterrupt
-    with project_lock(tmp_path, pytest.fail):
-        pass
-
-
-def test_where_nothing_can_be_written_the_work_goes_on(tmp_path: Path) -> None:
-    (tmp_path / ".coursebuild").touch()  # in the way
-    with project_lock(tmp_path, pytest.fail):
-        pass
 
 
 def test_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

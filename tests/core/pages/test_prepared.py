@@ -12,7 +12,7 @@ from typing import Any
 import brotli
 import pytest
 
-from coursebuild.core.engine.prepared import FOLDER, prepared_copy, prepared_cut
+from coursebuild.core.engine.prepared import FOLDER, prepared_file
 from coursebuild.core.files.resources import assets_dir, template_texts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.assets import SCRIPTS, Assets, page_script
@@ -38,9 +38,9 @@ def test_the_fonts_that_most_courses_need_are_cut(assets: Assets) -> None:
     faces = read_faces(assets.file("fonts/fonts.json"))
     given = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
     for job in font_jobs(given, "".join(BASE), "x"):
-        made = prepared_cut(job.key)
+        made = prepared_file("fonts", job.key)
         assert made == (None if job.face.family == MATH else subset_font(job))
-    assert prepared_cut("0" * 64) is None
+    assert prepared_file("fonts", "0" * 64) is None
 
 
 def test_copies_are_up_to_date() -> None:
@@ -55,7 +55,7 @@ def test_a_copy_is_that_of_the_script_as_it_is_published(assets: Any) -> None:
     asked: dict[str, bytes | None] = {}
 
     def keep(key: str, make: Callable[[], bytes]) -> bytes:
-        asked[key] = prepared_copy(key)
+        asked[key] = prepared_file("copies", key)
         return asked[key] or make()
 
     names = [name for name in SCRIPTS if name != "theme.js"]  # which is too small
@@ -68,7 +68,7 @@ def test_a_copy_is_that_of_the_script_as_it_is_published(assets: Any) -> None:
         path, _, suffix = copy.path.rpartition(".")
         undo = brotli.decompress if suffix == "br" else gzip.decompress
         assert undo(copy.data) == whole[path]
-    assert prepared_copy("0" * 64) is None
+    assert prepared_file("copies", "0" * 64) is None
 
 
 def test_templates_are_up_to_date(tmp_path: Path) -> None:

@@ -38,18 +38,17 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def make(
-    tmp_path: Path, text: str = SERVE, seconds: float = 120.0, patience: float = 10.0
-) -> JsonChild:
+def make(tmp_path: Path) -> JsonChild:
     script = tmp_path / "worker.py"
-    script.write_text(text)
-    return JsonChild(str(script), seconds, patience=patience)
+    script.write_text(SERVE)
+    return JsonChild(str(script), 120.0)
 
 
 def test_questions_and_answers(tmp_path: Path, temporary: Path) -> None:
     with make(tmp_path) as one:
         assert list(temporary.iterdir()) == [], "nothing before it is asked"
-        asked = [None, [1.5, "ü\n\u2028"], {"a": True}, "x" * 3_000_000]
+        beside = {"do": "sys.stderr.write('x' * 1_000_000); sys.stderr.flush()"}
+        asked = [None, [1.5, "ü\n\u2028"], {"a": True}, "x" * 3_000_000, beside]
         replies = [one.ask(question) for question in asked]
         assert [reply["got"] for reply in replies] == asked
         pids = {reply["pid"] for reply in replies}
@@ -57,12 +56,6 @@ def test_questions_and_answers(tmp_path: Path, temporary: Path) -> None:
         assert Path(replies[0]["cwd"]).parent == temporary
     assert list(temporary.iterdir()) == []
     assert not alive(pids.pop())
-
-
-def test_what_it_prints_beside_its_answers_fills_no_pipe(tmp_path: Path) -> None:
-    with make(tmp_path) as one:
-        act = "sys.stderr.write('x' * 1_000_000); sys.stderr.flush()"
-        assert one.ask({"do": act})["got"] == {"do": act}
 
 
 def test_an_interrupt_from_another_thread(tmp_path: Path, temporary: Path) -> None:

@@ -93,7 +93,7 @@ ATTEMPTS: dict[str, str | tuple[str, ...]] = {
     "libc.unshare(0x10000000)": "-1",
     # the folder of the user, where what is written is gone afterwards
     "open(os.path.expanduser('~/secret')).read()": "FileNotFoundError",
-    "os.mkdir(os.path.expanduser('~/.config'))": "None",
+    "os.makedirs(os.path.expanduser('~/.config'))": "None",
     "open(os.path.expanduser('~/.profile'), 'w').write('evil')": "4",
     # other processes
     "os.kill(OTHER, 9)": "ProcessLookupError",
@@ -175,7 +175,7 @@ def test_script_that_kills_all_it_can_ends_alone(confine: Confine, neighbour: in
     assert Path(f"/proc/{neighbour}").exists()
 
 
-def test_speaking_for_another_script(self, confine: Confine) -> None:
+def test_speaking_for_another_script(confine: Confine) -> None:
     forge = (
         "import glob\n"
         "parent = os.getppid()\n"
@@ -190,7 +190,7 @@ def test_speaking_for_another_script(self, confine: Confine) -> None:
     assert (last.outcome, last.stdout) == (Outcome.OK, "mine\n")
 
 
-def test_a_process_that_stays(self, confine: Confine) -> None:
+def test_a_process_that_stays(confine: Confine) -> None:
     mark = f"600.{os.getpid()}"
     (run,) = confine(
         "if not os.fork():\n"
@@ -210,7 +210,7 @@ def test_a_process_that_stays(self, confine: Confine) -> None:
         assert not found or gone(int(path.parent.name))
 
 
-def test_filling_the_disk(self, confine: Confine, root: Path) -> None:
+def test_filling_the_disk(confine: Confine, root: Path) -> None:
     (run,) = confine(
         "home = os.path.expanduser('~')\n"
         "for folder in os.environ['TMPDIR'], home, '/dev/shm', 'runs', '/':\n"
@@ -223,7 +223,7 @@ def test_filling_the_disk(self, confine: Confine, root: Path) -> None:
     assert not list(root.glob("runs/*"))
 
 
-def test_links_that_the_tool_would_follow(self, confine: Confine, root: Path, home: Path) -> None:
+def test_links_that_the_tool_would_follow(confine: Confine, root: Path, home: Path) -> None:
     secret = str(home / "secret")
     (root / "linked").symlink_to(home)
     (run,) = confine(
@@ -243,7 +243,7 @@ def test_links_that_the_tool_would_follow(self, confine: Confine, root: Path, ho
 
 
 @pytest.mark.slow
-def test_stopping_who_supervises(self, confine: Confine) -> None:
+def test_stopping_who_supervises(confine: Confine) -> None:
     first, second = confine("os.kill(os.getppid(), 19)\n" * 3, "print('as before')")
     assert first.outcome is Outcome.KILLED
     assert second.stdout == "as before\n"

@@ -422,12 +422,7 @@ class TestLife:
             "from coursebuild.core.model.results import Formula\n"
             "engine = MathEngine()\nprint(len(engine.typeset([Formula('x', False)])))\n"
         )
-        for _ in range(3):
-            done = subprocess.run(
-                [sys.executable, "-c", code],
-                capture_output=True,
-                text=True,
-                cwd=ROOT,
-                timeout=300,
-            )
-            assert (done.stdout, done.stderr, done.returncode) == ("1\n", "", 0)
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=300
+        )
+        assert (done.stdout, done.stderr, done.returncode) == ("1\n", "", 0)
