@@ -24,12 +24,16 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
     top = root.rstrip("/")
     found: dict[str, list[str]] = defaultdict(list)
     effects: list[Effect] = []
+    divergences: list[Divergence] = []
     for record in records.decode("utf-8", "surrogateescape").split("\0"):
         kind, about = record[:1], record[1:]
         found[kind].append(about)
-        if kind in ("w", "c"):
-            what, file, line = about.rsplit("\t", 2)
-            effects.append(Effect(EffectKind(kind), what, file, int(line)))
+        with contextlib.suppress(ValueError):  # half of one, by a script that was killed
+            if kind in ("w", "c"):
+                what, file, line = about.rsplit("\t", 2)
+                effects.append(Effect(EffectKind(kind), what, file, int(line)))
+            elif kind == "d":
+                divergences.append(_divergence(about))
     files = {_resolved(path, top) for path in found["r"]}
     inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
     return Trace(
@@ -38,7 +42,7 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         outside=tuple(sorted(path for path in files if not path.startswith(f"{top}/"))),
         modules=tuple(sorted(set(found["m"]))),
         opaque=next(iter(found["o"]), ""),
-        divergences=tuple(dict.fromkeys(map(_divergence, found["d"]))),
+        divergences=tuple(dict.fromkeys(divergences)),
         effects=tuple(effects),
         moved=bool(found["p"]),
         states=tuple(found["s"]),
