@@ -19,8 +19,9 @@ import enum
 import hashlib
 import json
 import os
+import re
 import stat
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
@@ -260,14 +261,7 @@ def unified_diff(old: str, new: str, old_name: str, new_name: str) -> str:
 
 def _lines(text: str) -> list[str]:
     """Split at LF alone, ends kept: a form feed in a script is no line end."""
-    return [line for line in _split(text) if line]
-
-
-def _split(text: str) -> Iterator[str]:
-    *lines, last = text.split("\n")
-    for line in lines:
-        yield f"{line}\n"
-    yield last
+    return re.findall(r"[^\n]*\n|[^\n]+", text)
 
 
 def _decode(data: bytes) -> str:

@@ -109,7 +109,11 @@ def read_bytes(root: Path, path: str) -> bytes:
         OutsideProjectError: it lies outside the project, or a link leads there.
         EffectError: it cannot be read.
     """
-    root = root.resolve()
+    return _read_inside(root.resolve(), path)
+
+
+def _read_inside(root: Path, path: str) -> bytes:
+    """As `read_bytes`, of a root without links."""
     if "\0" in path:
         raise EffectError("a path holds a null character")
     if not Path(os.path.realpath(root / path)).is_relative_to(root):
@@ -143,8 +147,6 @@ class _Reader:
         self.open_texts = open_texts
         self.diagnostics: list[Diagnostic] = []
         self.unreadable: list[str] = []
-        self.plain: set[str] = set()
-        """Files that were reached through no link."""
 
     def map(self) -> Source | None:
         """The course map; that it is missing is a mistake already here."""
@@ -170,11 +172,9 @@ class _Reader:
         elif not folder.is_dir():
             self._refuse(top, "is not a folder")
         else:
-            yield from self._walk(top, frozenset(), plain=not folder.is_symlink())
+            yield from self._walk(top, frozenset())
 
-    def _walk(
-        self, folder: str, above: frozenset[tuple[int, int]], *, plain: bool
-    ) -> Iterator[str]:
+    def _walk(self, folder: str, above: frozenset[tuple[int, int]]) -> Iterator[str]:
         try:
             status = (self.root / folder).stat()
             with os.scandir(self.root / folder) as entries:
@@ -193,12 +193,9 @@ class _Reader:
                 or name == "__pycache__"
             ):
                 continue
-            plainly = plain and not is_link
-            yield from self._entry(f"{folder}/{name}", is_link, above | {here}, plain=plainly)
+            yield from self._entry(f"{folder}/{name}", is_link, above | {here})
 
-    def _entry(
-        self, path: str, is_link: bool, above: frozenset[tuple[int, int]], *, plain: bool
-    ) -> Iterator[str]:
+    def _entry(self, path: str, is_link: bool, above: frozenset[tuple[int, int]]) -> Iterator[str]:
         if not _is_text(path):
             self._refuse(path, "has a name that is not UTF-8")
             return
@@ -216,10 +213,8 @@ class _Reader:
             self._refuse(path, f"cannot be read: {reason(error)}")
             return
         if stat.S_ISDIR(mode) and not path.endswith((".md", ".xml", ".toml")):
-            yield from self._walk(path, above, plain=plain)
+            yield from self._walk(path, above)
         elif stat.S_ISREG(mode):
-            if plain:
-                self.plain.add(path)
             yield path
         else:
             self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
@@ -234,7 +229,7 @@ class _Reader:
                 found.append(Source(path, self.open_texts[path]))
                 continue
             try:
-                data = self._plainly_read(path) or read_bytes(self.root, path)
+                data = _read_inside(self.root, path)
             except OutsideProjectError:
                 self._refuse(path, _OUTSIDE)
             except EffectError as error:
@@ -243,15 +238,6 @@ class _Reader:
                 source = self._decode(path, data)
                 found += [] if source is None else [source]
         return tuple(found)
-
-    def _plainly_read(self, path: str) -> bytes | None:
-        """The bytes of a file of which it need not be found out where it lies."""
-        if path not in self.plain:
-            return None
-        try:
-            return _read_regular(f"{self.root}/{path}", os.O_NOFOLLOW)
-        except OSError:  # told by who looks closer
-            return None
 
     def _decode(self, path: str, data: bytes) -> Source | None:
         """The text of a file; `None` where it holds none."""
@@ -285,9 +271,9 @@ class _Reader:
         self.diagnostics.append(diagnose("file-unreadable", span, f"{shown} {why}"))
 
 
-def _read_regular(path: Path | str, flags: int = 0) -> bytes:
+def _read_regular(path: Path) -> bytes:
     """The bytes of a regular file; never waits, whatever stands at the path."""
-    fd = os.open(path, flags | os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     try:
         status = os.fstat(fd)
         if not stat.S_ISREG(status.st_mode):
