@@ -14,6 +14,8 @@ The text is scanned, not parsed: what is no XML to MuJoCo gives its own file and
 
 from __future__ import annotations
 
+import functools
+import html
 import posix
 import re
 from collections.abc import Callable, Collection, Iterator
@@ -54,14 +56,15 @@ class ModelFiles:
     def of_spec(self, spec: Any, given: Collection[str] = ()) -> None:
         """The assets of an `MjSpec`, which are read when it is compiled."""
         given = frozenset(_last(name) for name in (*given, *spec.assets))
-        folder = spec.modelfiledir
-        places = _Places(folder, spec.meshdir, spec.texturedir, strip=bool(spec.strippath))
+        strip = bool(spec.strippath)
+        mesh = functools.partial(_places, spec.modelfiledir, spec.meshdir, strip=strip)
+        texture = functools.partial(_places, spec.modelfiledir, spec.texturedir, strip=strip)
         for kind in ("meshes", "hfields", "skins"):
             for each in getattr(spec, kind):
-                self._asset(places.mesh(each.file), given)
+                self._asset(mesh(each.file), given)
         for each in spec.textures:
             for file in (each.file, *each.cubefiles):
-                self._asset(places.texture(file), given)
+                self._asset(texture(file), given)
 
     def _model(self, path: str, given: frozenset[str], assets: bool, depth: int) -> None:
         if _last(path) in given:
@@ -82,21 +85,18 @@ class ModelFiles:
             if tag == "compiler":
                 compiler |= attributes
         both = compiler.get("assetdir", "")
-        places = _Places(
-            folder,
-            compiler.get("meshdir", both),
-            compiler.get("texturedir", both),
-            strip=compiler.get("strippath") == "true",
-        )
+        strip = compiler.get("strippath") == "true"
+        mesh = functools.partial(_places, folder, compiler.get("meshdir", both), strip=strip)
+        texture = functools.partial(_places, folder, compiler.get("texturedir", both), strip=strip)
         for tag, attributes in tags:
             file = attributes.get("file", "")
             if tag in _MESH:
-                self._asset(places.mesh(file or attributes.get("filename", "")), given)
+                self._asset(mesh(file or attributes.get("filename", "")), given)
             elif tag == "texture":
                 for name in ("file", *_CUBE):
-                    self._asset(places.texture(attributes.get(name, "")), given)
+                    self._asset(texture(attributes.get(name, "")), given)
             elif tag == "flexcomp":
-                self._asset([*_join(folder, file), *places.mesh(file)], given)
+                self._asset([*_join(folder, file), *mesh(file)], given)
             elif tag == "model" and file and depth < _DEEPEST:
                 found = self._asset([*_join("", file), *_join(folder, file)], given)
                 if found:
@@ -109,7 +109,7 @@ class ModelFiles:
         for tag in _TAGS.finditer(_COMMENTS.sub(b"", data)):
             name = _decode(tag[1])
             attributes = {
-                _decode(key): _entities(_decode(one or two))
+                _decode(key): html.unescape(_decode(one or two))
                 for key, one, two in _ATTRIBUTES.findall(tag[2])
             }
             if name != "include":
@@ -139,31 +139,15 @@ class ModelFiles:
         return ""
 
 
-class _Places:
-    """Where the assets of a model are looked for."""
-
-    def __init__(self, folder: str, meshes: str, textures: str, *, strip: bool) -> None:
-        self._folder = folder
-        self._meshes = meshes
-        self._textures = textures
-        self._strip = strip
-
-    def mesh(self, file: str) -> list[str]:
-        """Where a mesh, height field or skin is; empty where there is no name."""
-        return self._in(self._meshes, file)
-
-    def texture(self, file: str) -> list[str]:
-        """Where a texture is; empty where there is no name."""
-        return self._in(self._textures, file)
-
-    def _in(self, folder: str, file: str) -> list[str]:
-        if not file:
-            return []
-        if self._strip:
-            file = _last(file)
-        if folder and not folder.endswith("/"):
-            folder += "/"
-        return _join(self._folder, folder + file if not file.startswith("/") else file)
+def _places(folder: str, inner: str, file: str, *, strip: bool) -> list[str]:
+    """Where an asset is looked for, whose kind has a folder of its own; nowhere without a name."""
+    if not file:
+        return []
+    if strip:
+        file = _last(file)
+    if inner and not inner.endswith("/"):
+        inner += "/"
+    return _join(folder, inner + file if not file.startswith("/") else file)
 
 
 def _join(folder: str, file: str) -> list[str]:
@@ -196,11 +180,3 @@ def _contents(path: str) -> bytes | None:
 
 def _decode(data: bytes) -> str:
     return data.decode("utf-8", "surrogateescape")
-
-
-def _entities(text: str) -> str:
-    if "&" not in text:
-        return text
-    for name, letter in (("lt", "<"), ("gt", ">"), ("quot", '"'), ("apos", "'"), ("amp", "&")):
-        text = text.replace(f"&{name};", letter)
-    return text
