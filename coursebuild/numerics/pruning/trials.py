@@ -32,15 +32,8 @@ from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock, Timing, scenario_job, timed
 
 _T = TypeVar("_T")
-_KEY_NUMBERS = {
-    "qpos": ("nq", 1),
-    "qvel": ("nv", 1),
-    "act": ("na", 1),
-    "ctrl": ("nu", 1),
-    "mpos": ("nmocap", 3),
-    "mquat": ("nmocap", 4),
-}
-"""Of each attribute of a keyframe, what it has numbers for, and how many for each."""
+_KEY_NUMBERS = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
+"""Of each attribute of a keyframe, what it has numbers for; a mocap body never goes."""
 _DRAWS = 2
 """Random states in which two models are compared."""
 
@@ -209,9 +202,8 @@ def _keyframes(text: ModelText, gone: Gone, removed: Collection[Element]) -> Ite
     if not (gone.bodies or gone.actuators):
         return
     left = index_map(text.model, gone)
-    for name, (size, width) in _KEY_NUMBERS.items():
+    for name, size in _KEY_NUMBERS.items():
         lost = set(range(getattr(text.model, size))) - set(left[size].tolist())
-        places = {width * thing + k for thing in lost for k in range(width)}
         for key in text.elements:
             if key.tag == "key" and key not in removed:
-                yield from drop_numbers(key, name, places)
+                yield from drop_numbers(key, name, lost)

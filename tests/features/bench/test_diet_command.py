@@ -150,9 +150,10 @@ def test_sensor_that_a_lesson_reads_is_no_finding(
     lesson = lessons / "1.1-one.md"
     lesson.write_text(LESSON.replace("SCRIPT", 'print("another model")'))
     assert run(course) == 1
-    use = 'model_path("swing")\nprint(data.sensor("time").data)'
-    lesson.write_text(LESSON.replace("SCRIPT", use))
-    assert run(course) == 0
+    for name in ('"sw" + "ing"', '"swing"'):
+        use = f'model_path({name})\nprint(data.sensor("time").data)'
+        lesson.write_text(LESSON.replace("SCRIPT", use))
+        assert run(course) == 0
     _, value = values(course, capsys)
     assert value["models"][0]["readers"] == ["examples/a.py"]
     # A lab's own code may read for the lesson.

@@ -15,7 +15,7 @@ from coursebuild.numerics.pruning.compare import (
     compare,
     pruning_scenes,
 )
-from coursebuild.numerics.pruning.index_map import Gone, IndexMap, index_map
+from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
 from support.surveys import declared
 
@@ -72,6 +72,28 @@ def test_contacts_count_though_nothing_moves() -> None:
     assert compare(one, one, same(one), [scene]).identical
     found = compare(one, other, same(one), [scene])
     assert not found.identical
+
+
+FULL = """<mujoco><worldbody><body name="m" mocap="true"/>
+  <body name="a"><freejoint/><geom size=".1"/>
+    <body><joint type="ball"/><geom size=".1"/></body></body>
+  <body name="b"><joint name="j"/><geom size=".1"/></body></worldbody>
+  <actuator><motor joint="j"/><general joint="j" dyntype="integrator"/></actuator></mujoco>"""
+
+
+def test_a_state_is_brought_over() -> None:
+    model, spec = mujoco.MjModel.from_xml_string(FULL), mujoco.MjSpec.from_string(FULL)
+    spec.delete(spec.body("a"))
+    other = spec.compile()
+    left = index_map(model, Gone(frozenset({model.body("a").id})))
+    assert fits(left, model, other)
+    data, into = mujoco.MjData(model), mujoco.MjData(other)
+    data.qpos[:], data.qvel[:] = range(12), range(10)
+    data.time, data.act[:], data.ctrl[:], data.mocap_pos[0] = 3.0, [1], [4, 5], 7
+    transfer(model, data, left, other, into)
+    assert (into.time, into.qpos.tolist(), into.qvel.tolist()) == (3.0, [11.0], [9.0])
+    assert (into.act.tolist(), into.ctrl.tolist()) == ([1], [4, 5])
+    assert into.mocap_pos[0].tolist() == [7] * 3
 
 
 def test_scenarios_as_the_author_wrote_them() -> None:
