@@ -52,7 +52,7 @@ SUMMARIES, PAGES = "summaries", "pages"
 _MATHML, _CODE = "mathml", "code"
 """Likewise. One has the formulas of a text: one for each formula would take as long to write as to
 make."""
-_ROOM = 6_000_000
+ROOM = 6_000_000
 """Characters of documents that wait to be drawn, some eight bytes each. Further ones are parsed
 again, so that memory does not grow with the course."""
 
@@ -166,7 +166,7 @@ class PageReader:
         self._engine: MathEngine | None = None
         self._waiting: dict[str, tuple[SourceText, _Whole]] = {}
         """Documents that were read and not drawn yet, by path."""
-        self._room = _ROOM
+        self._room = ROOM
         self._renderers: dict[tuple[str, Texts], Renderer] = {}
 
     def close(self) -> None:
