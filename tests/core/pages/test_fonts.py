@@ -77,7 +77,7 @@ def test_no_character_is_in_two_files_of_a_face(assets: Assets) -> None:
 def test_the_math_font_keeps_its_table_variants_and_italics(mathematical: TTFont) -> None:
     font = mathematical
     cmap = font.getBestCmap()
-    wanted = set(FORMULAS) | {italic_letter(c) for c in "IVrdmkcω"} | {"ℎ", "𝜕", "𝛻"}
+    wanted = set(FORMULAS) | {italic_letter(c) for c in "IVrdmkcω"} | {"ℎ", "𝐻", "𝜕", "𝛻"}
     assert {c for c in wanted if ord(c) not in cmap} == set()
     table = font["MATH"].table
     assert table.MathConstants.AxisHeight.Value > 0

@@ -112,7 +112,7 @@ NAMES = st.lists(
 ).map("".join)
 
 
-@given(st.lists(NAMES, max_size=6))
+@given(st.lists(NAMES | st.sampled_from(["a.L1", "a.L2", "a.L9", "b.c.L4", "a.out"]), max_size=6))
 def test_of_the_lines_of_a_listing_the_last_is_kept(ids: list[str]) -> None:
     known = {name: linked_lines(name) for name in ids}
     last: dict[str, int] = {}
