@@ -3,7 +3,7 @@ from __future__ import annotations
 from decimal import ROUND_HALF_EVEN, Decimal
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import (
@@ -228,6 +228,7 @@ def test_who_leans_on_what_changed() -> None:
         assert found == [("+6.6 %", "+6.641", "+6.702")]
 
 
+@settings(max_examples=50)
 @given(st.floats(-1e9, 1e9), st.integers(0, 8), st.integers(0, 8))
 def test_fewer_digits_of_what_was_printed_always_hold(
     value: float, printed: int, fewer: int

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from decimal import Decimal
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
@@ -31,6 +31,7 @@ FILTERS = st.lists(
 MODES = st.sampled_from([EXACT, DIGITS, within("0.1", "0.1"), ELLIPSIS, DIGITS_ELLIPSIS])
 
 
+@settings(max_examples=50)
 @given(OUTPUTS, OUTPUTS, MODES, FILTERS)
 def test_changes_have_true_places(
     recorded: str, printed: str, comparison: Comparison, filters: tuple[Filter, ...]
@@ -43,6 +44,7 @@ def test_changes_have_true_places(
         assert found.recording.body_span.contains(change.span)
 
 
+@settings(max_examples=50)
 @given(OUTPUTS, OUTPUTS)
 def test_ellipsis_takes_what_a_regular_expression_takes(recorded: str, printed: str) -> None:
     def bare(text: str) -> list[str]:
@@ -59,6 +61,7 @@ def test_ellipsis_takes_what_a_regular_expression_takes(recorded: str, printed: 
     assert matches(recorded, printed, ELLIPSIS) == expected
 
 
+@settings(max_examples=50)
 @given(st.integers(-(10**6), 10**6), st.integers(1, 6))
 def test_the_border_of_digits_is_exact(value: int, places: int) -> None:
     number = Decimal(value).scaleb(-places)

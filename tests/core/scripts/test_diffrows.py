@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.scripts.compare import compare
@@ -48,6 +48,7 @@ def test_of_a_table_the_cells_that_changed() -> None:
 LINES = st.lists(st.text("ab1 ", max_size=6).map(str.rstrip), min_size=1, max_size=6)
 
 
+@settings(max_examples=50)
 @given(LINES, LINES)
 def test_the_rows_are_both_texts(recorded: list[str], ran: list[str]) -> None:
     """Without those that came they are what was recorded, without those that went what ran."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
@@ -45,6 +45,7 @@ def assume_writable(recorded: str, printed: str) -> None:
     assume(printed.strip() and not any(re.match(r" {0,3}```", line) for line in lines))
 
 
+@settings(max_examples=50)
 @given(
     OUTPUTS,
     OUTPUTS,
@@ -78,6 +79,7 @@ ELLIPTIC = st.lists(
 ).map("\n".join)
 
 
+@settings(max_examples=50)
 @given(ELLIPTIC, OUTPUTS, st.sampled_from([ELLIPSIS, DIGITS_ELLIPSIS]), PREFIXES, EOLS)
 def test_an_update_with_ellipses_is_right_or_refused(
     recorded: str, printed: str, comparison: Comparison, prefix: str, eol: str
@@ -92,6 +94,7 @@ def test_an_update_with_ellipses_is_right_or_refused(
         assert "..." in recorded
 
 
+@settings(max_examples=50)
 @given(OUTPUTS, OUTPUTS, OUTPUTS)
 def test_what_two_runs_disagree_on_is_never_written(recorded: str, first: str, second: str) -> None:
     assume_writable(recorded, first)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
@@ -46,6 +46,7 @@ def test_lines_that_no_row_shows_may_differ_between_runs() -> None:
 CELLS = st.sampled_from(["Euler", "`RK4`", "**1.5 %**", "−2.50", "3.9e-11", "4", "x 7"])
 
 
+@settings(max_examples=50)
 @given(
     st.lists(st.tuples(CELLS, CELLS, CELLS), min_size=1, max_size=4),
     st.lists(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import ScriptRun
@@ -191,6 +191,7 @@ def test_where_nothing_is_known_of_before(
 NUMBER = st.integers(1000, 9999).map(lambda n: f"{n / 100:.2f}")
 
 
+@settings(max_examples=50)
 @given(
     st.lists(NUMBER, min_size=2, max_size=6, unique=True), st.randoms(use_true_random=False),
     st.data(),
