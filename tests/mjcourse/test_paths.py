@@ -1,6 +1,5 @@
 import multiprocessing
 import os
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -171,14 +170,6 @@ def test_a_linked_script_belongs_where_it_lies_or_where_it_leads(
     inside = course / "examples" / "linked.py"
     inside.symlink_to(write(tmp_path / "elsewhere" / "y.py"))
     assert ask(inside) == course / "models" / "box.xml"
-
-
-def test_the_error_survives_pickling(course: Path) -> None:
-    with pytest.raises(ModelNotFoundError) as caught:
-        ask(course / "x.py", "nothing_like_it")
-    again = pickle.loads(pickle.dumps(caught.value))
-    assert type(again) is ModelNotFoundError
-    assert str(again) == str(caught.value)
 
 
 def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path: Path) -> None:

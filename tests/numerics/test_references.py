@@ -12,11 +12,7 @@ from msgspec.structs import replace
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.engine import EngineStates
-from coursebuild.numerics.forward import forward_states, tends_to
-from coursebuild.numerics.integrate import bulirsch_stoer
 from coursebuild.numerics.pilot import pilot
-from coursebuild.numerics.problem import Scenario, Setup
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.references import Known, know
 from coursebuild.numerics.scene import SceneError, scenes
@@ -184,31 +180,3 @@ def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else(
         assert caught.value.message.startswith(message)
         assert caught.value.span is not None
         assert caught.value.span.text.startswith('"closed:')
-
-
-# ----------------------------------------------------------------------- what the engine tends to
-
-
-def arm(damping: float, more: str = "") -> Any:
-    return mujoco.MjModel.from_xml_string(
-        f"<mujoco><worldbody><body><joint axis='0 1 0' damping='{damping}' {more}/>"
-        "<geom size='0.05' mass='1' pos='1 0 0'/></body></worldbody></mujoco>"
-    )
-
-
-def tends(model: Any, other: Any, step: float = 0.004) -> bool:
-    """Whether one model in small steps does what another's accelerations say."""
-    setup = Setup(scenario=Scenario(2.0, 0.1))
-    states: EngineStates = forward_states(
-        other, setup.scenario, setup.scenario.times, lambda r, y, t: bulirsch_stoer(r, y, t, 1e-12)
-    )
-    return tends_to(model, setup, states, step, 0.01)
-
-
-def test_an_engine_tends_to_its_own_accelerations_and_to_no_others() -> None:
-    for step in (0.1, 0.02, 0.001):
-        assert tends(arm(0.1), arm(0.1), step), step
-    for damping in (0.1001, 0.5):
-        assert not tends(arm(damping), arm(0.1)), damping
-    stiff = "stiffness='40000' springref='3'"
-    assert tends(arm(1, stiff), arm(1, stiff), 0.02), "no long step is stable"

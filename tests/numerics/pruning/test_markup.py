@@ -10,7 +10,7 @@ from coursebuild.numerics.pruning.edits import (
     drop_numbers,
     remove,
 )
-from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup, place_of
+from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup
 
 
 def document(text: str) -> Markup:
@@ -52,25 +52,6 @@ def test_places_in_an_odd_text() -> None:
     assert found.position(found.root.start) == (3, 1)
     start, end = elements[4].attribute("name").inner  # type: ignore[union-attr]
     assert found.data[start:end].decode() == "🎈"
-
-
-def test_ways_to_elements() -> None:
-    found = document(
-        '<mujoco><default><default class="c"/></default><worldbody><body><geom/><geom name="g"/>'
-        "<geom/></body></worldbody><worldbody/></mujoco>"
-    )
-    places = [place_of(one) for one in found.root.walk()]
-    assert places == [
-        "mujoco",
-        "mujoco/default",
-        'mujoco/default/default[@class="c"]',
-        "mujoco/worldbody[1]",
-        "mujoco/worldbody[1]/body",
-        "mujoco/worldbody[1]/body/geom[1]",
-        'mujoco/worldbody[1]/body/geom[@name="g"]',
-        "mujoco/worldbody[1]/body/geom[3]",
-        "mujoco/worldbody[2]",
-    ]
 
 
 @pytest.mark.parametrize(
