@@ -149,7 +149,7 @@ npm: $(VENV)/.dev
 # The browser, the Java runtime (for the HTML checker) and the sandbox that tests use.
 system:
 	@missing=''; \
-	command -v chromium >/dev/null || missing='chromium'; \
+	command -v chromium-headless-shell >/dev/null || missing='chromium-headless-shell'; \
 	java -version >/dev/null 2>&1 || missing="$$missing default-jre-headless"; \
 	command -v bwrap >/dev/null || missing="$$missing bubblewrap"; \
 	[ -n "$$missing" ] || exit 0; \
@@ -160,6 +160,6 @@ system:
 	  $$root apt-get update -qq && $$root apt-get install -y -qq --no-install-recommends $$missing; \
 	else \
 	  echo "the tests need Debian's packages (or the like of your system): $$missing" >&2; \
-	  echo "install them, with the commands chromium, java and bwrap on PATH, and run make test again" >&2; \
+	  echo "install them, with the commands chromium-headless-shell, java and bwrap on PATH, and run make test again" >&2; \
 	  exit 1; \
 	fi

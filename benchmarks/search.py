@@ -255,8 +255,8 @@ def searching(work: Path, pagefind: Path | None, rounds: int) -> dict[str, Any]:
     """Both in the same browser."""
     from playwright.sync_api import sync_playwright
 
-    chromium = shutil.which("chromium")
-    assert chromium is not None, "no chromium on PATH"
+    chromium = shutil.which("chromium-headless-shell")
+    assert chromium is not None, "install Debian's package `chromium-headless-shell`"
     site, result = work / "with" / "public", {}
     if pagefind is not None:
         result["pagefind_indexing"] = peer_index(site, work / "peer", pagefind)

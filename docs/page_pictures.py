@@ -1,8 +1,8 @@
 """Pictures of every kind of page of a built site, to look at; none is kept in the repository.
 
 Entry point: run it as a file, after `make site`: `.venv/bin/python docs/page_pictures.py FOLDER`.
-The packages are those of the tests (`make test` installs them), the browser is the system's
-Chromium.
+The packages are those of the tests, the browser is Debian's headless Chromium: `make test`
+installs both.
 
 1. The site is served on this machine. Its kinds of pages are those that its pages say they are of;
    of each kind the largest page is taken, which has most to it.
@@ -136,9 +136,9 @@ def main() -> int:
     parser.add_argument("--site", type=Path, default=ROOT / "public", help="a built site")
     parser.add_argument("--kind", action="append", help="only pages of this kind; may be repeated")
     arguments = parser.parse_args()
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    chromium = shutil.which("chromium-headless-shell")
     if chromium is None:
-        print("there is no chromium on PATH", file=sys.stderr)
+        print("there is no chromium-headless-shell on PATH", file=sys.stderr)
         return 1
     try:
         chosen = kinds(arguments.site.resolve())

@@ -1,7 +1,8 @@
 """The pictures in docs/images, made from the built course.
 
 Entry point: run it as a file, after `make site`: `.venv/bin/python docs/screenshots.py`. The
-packages are those of the tests (`make test` installs them), the browser is the system's Chromium.
+packages are those of the tests, the browser is Debian's headless Chromium: `make test` installs
+both.
 
 1. A page of `public/` is opened from the disk, in a window of a fixed size and in light colours.
 2. What the picture is about is scrolled into sight, and the window is saved as a PNG.
@@ -80,9 +81,9 @@ def main() -> int:
     parser.add_argument("--site", type=Path, default=ROOT / "public", help="a built site")
     parser.add_argument("--images", type=Path, default=IMAGES, help="where the pictures go")
     arguments = parser.parse_args()
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    chromium = shutil.which("chromium-headless-shell")
     if chromium is None:
-        print("there is no chromium on PATH", file=sys.stderr)
+        print("there is no chromium-headless-shell on PATH", file=sys.stderr)
         return 1
     arguments.images.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as playwright:

@@ -158,9 +158,6 @@ ADVICE: dict[Rule, str] = {
     patches_of_private_names: "test what can be seen, or give the product a parameter",
 }
 TO_MEND: dict[Rule, str] = {
-    assertions_that_look_once: (
-        "browser/test_offline.py browser/test_quiz_pages.py browser/test_touch.py"
-    ),
     waits_for_time: "core/engine/test_workers.py",
     patches_of_private_names: "core/files/test_resources.py",
 }

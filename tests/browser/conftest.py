@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext
+from playwright.sync_api import Browser, BrowserContext, Page
 
 from support.built_sites import BuiltCourses, Site, Sites, course_copy
+from support.lab_page import watched
 
 
 @pytest.fixture(scope="session")
@@ -40,15 +41,9 @@ def quizzes(sites: Sites) -> str:
 
 
 @pytest.fixture(scope="session")
-def reader(sites: Sites) -> Site:
-    """A course with questions, and a reader's way through it."""
-    return sites["reader"]
-
-
-@pytest.fixture(scope="session")
-def site(reader: Site) -> str:
-    """The address of its site."""
-    return reader.url()
+def site(sites: Sites) -> str:
+    """The address of a site with questions, and a reader's way through it."""
+    return sites["reader"].url()
 
 
 @pytest.fixture(scope="session")
@@ -72,5 +67,27 @@ def context(browsers: Mapping[str, Browser]) -> Iterator[BrowserContext]:
 def calm(browsers: Mapping[str, Browser]) -> Iterator[BrowserContext]:
     """A window without a service worker, which would keep pages that a test changes."""
     size = {"width": 1000, "height": 800}
-    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:
+    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:  # type: ignore[arg-type]
         yield context
+
+
+OURS = ("blocked by Playwright", "/assets/icon.")
+"""What tests bring about themselves: there is no service worker, and an icon may still be loading
+when the next page is opened.
+"""
+
+
+@pytest.fixture
+def opened(calm: BrowserContext) -> Iterator[Callable[[str], Page]]:
+    """Opens pages, in which nothing may go wrong."""
+    said: list[list[str]] = []
+
+    def opened(address: str) -> Page:
+        page, lines = watched(calm)
+        said.append(lines)
+        page.goto(address)
+        return page
+
+    yield opened
+    wrong = [line for lines in said for line in lines]
+    assert [line for line in wrong if not any(part in line for part in OURS)] == []

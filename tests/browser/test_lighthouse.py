@@ -35,8 +35,8 @@ FLAGS = "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage"
 
 
 def lighthouse(url: str, folder: Path, *options: str) -> dict[str, Any]:
-    chromium = shutil.which("chromium")
-    assert chromium is not None, "no chromium: install Debian's package `chromium`"
+    chromium = shutil.which("chromium-headless-shell")
+    assert chromium is not None, "install Debian's package `chromium-headless-shell`"
     assert LIGHTHOUSE.is_file(), "no lighthouse: run python site/bundle.py packages"
     out = folder / "report.json"
     quiet = ("--quiet", "--no-enable-error-reporting", "--output=json", f"--output-path={out}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from http import HTTPStatus
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from support.built_sites import Site
 from support.lab_course import PAGE
-from support.lab_page import comes, lab, until, watched
+from support.lab_page import becomes, comes, lab, until, watched
 from support.scratch_course import Folder
 from support.static_host import Host
 
@@ -101,7 +101,7 @@ def settle(page: Page, keep: str = "auto", look: bool = False) -> None:
     page.evaluate(asked)
 
 
-def opened(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, list[str]]:
+def settled_page(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, list[str]]:
     """A page whose worker has kept what it keeps."""
     page, said = watched(context)
     page.goto(host.url + path)
@@ -144,7 +144,7 @@ def kept(browsers: Mapping[str, Browser], made: Folder) -> Iterator[tuple[Page, 
         Host(made.root / "first", "/course/") as host,
         browsers["plain"].new_context() as context,
     ):
-        page, said = opened(context, host)
+        page, said = settled_page(context, host)
         assert said == []
         yield page, host
 
@@ -217,7 +217,7 @@ def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
 def test_new_build_costs_what_has_changed(
     context: BrowserContext, host: Host, made: Folder
 ) -> None:
-    page, said = opened(context, host)
+    page, said = settled_page(context, host)
     before = page.evaluate(KEPT)
     edited(made, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text."))
     host.since()
@@ -227,7 +227,7 @@ def test_new_build_costs_what_has_changed(
     page.goto(host.url + SECOND)
     settle(page, look=True)
     settle(page)
-    assert page.evaluate(KEPT) == before, "what is no more in use is gone"
+    becomes(page, lambda: page.evaluate(KEPT), before)  # what is no more in use is gone
     with host.away():
         page.goto(host.url + FIRST)
         see(page, "Other text.")
@@ -237,7 +237,7 @@ def test_new_build_costs_what_has_changed(
 def test_page_that_was_kept_says_when_there_is_a_newer_one(
     context: BrowserContext, host: Host, made: Folder
 ) -> None:
-    page, _ = opened(context, host)
+    page, _ = settled_page(context, host)
     with host.away():
         visited(page, host, FIRST)  # which hears of no newer list
         edited(made, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text."))
@@ -255,8 +255,8 @@ def test_several_courses_on_one_origin(
     shutil.copytree(made.root / "first", tmp_path / "both")
     shutil.copytree(made.root / "first", tmp_path / "both" / "inner")
     with Host(tmp_path / "both") as host:
-        opened(context, host)
-        page, _ = opened(context, host, "inner/")
+        settled_page(context, host)
+        page, _ = settled_page(context, host, "inner/")
         names = page.evaluate("caches.keys()")
         assert sorted(names) == [f"coursebuild 1 {host.url}", f"coursebuild 1 {host.url}inner/"]
         page.goto(f"{host.url}inner/offline/")
@@ -283,8 +283,7 @@ def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> Non
     page.clock.install()
     page.goto(host.url + FIRST)
     page.clock.run_for(10_000)  # a page's own visit would have come by then
-    assert page.evaluate("caches.keys()") == []
-    assert page.evaluate("navigator.serviceWorker.getRegistrations()") == []
+    becomes(page, lambda: page.evaluate(NOTHING_KEPT), [0, 0])
     page.goto(f"{host.url}offline/")
     page.get_by_label("what you have read").check()
     see(page, "files of the course are here.")
@@ -302,20 +301,14 @@ def test_last_report_stands_where_the_store_opens_after_it(
     assert said == []
 
 
-def test_page_on_keeping_says_what_is_so_without_scripts_and_without_workers(
-    browsers: Mapping[str, Browser], host: Host
+def test_browser_that_lets_no_worker_keep_files_is_no_matter(
+    opened: Callable[[str], Page], host: Host
 ) -> None:
-    with browsers["plain"].new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(f"{host.url}offline/")
-        see(page, "This browser keeps nothing now.")
-    with browsers["plain"].new_context(service_workers="block") as context:
-        page, said = watched(context)
-        page.clock.install()
-        page.goto(host.url + FIRST)
-        page.clock.run_for(10_000)
-        assert page.evaluate("caches.keys()") == []
-        assert [text for text in said if "blocked by Playwright" not in text] == []
+    page = opened(f"{host.url}404.html")
+    page.clock.install()
+    page.goto(host.url + FIRST)
+    page.clock.run_for(10_000)
+    becomes(page, lambda: page.evaluate(NOTHING_KEPT), [0, 0])
 
 
 def test_site_can_be_installed(kept: tuple[Page, Host]) -> None:
@@ -339,6 +332,9 @@ def test_site_can_be_installed(kept: tuple[Page, Host]) -> None:
         assert icon["sizes"] in ("any", sides)
 
 
+NOTHING_KEPT = """async () => [
+  (await caches.keys()).length, (await navigator.serviceWorker.getRegistrations()).length
+]"""
 HAS_ENGINE = f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))"
 
 
@@ -347,7 +343,7 @@ def test_labs_run_without_a_network_once_they_were_used(
 ) -> None:
     shutil.copytree(course.public, tmp_path / "site")
     with Host(tmp_path / "site") as host:
-        page, _ = opened(context, host, PAGE)
+        page, _ = settled_page(context, host, PAGE)
         assert not page.evaluate(HAS_ENGINE)
         lab(page)
         settle(page)
@@ -402,7 +398,7 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     """Either of two things sees the worker off: the page's script, and the worker in its place."""
     shutil.copytree(made.root / "first", tmp_path / "site")
     host = Host(tmp_path / "site")
-    page, _ = opened(context, host)
+    page, _ = settled_page(context, host)
     host.stop()
     session = Previewed(Options(host.folder, 1, True))
     preview = PreviewServer("127.0.0.1", int(host.url.split(":")[2].strip("/")), session)
@@ -417,7 +413,7 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
         page.clock.install()
         page.goto(host.url + SECOND)
         page.clock.run_for(10_000)
-        assert page.evaluate(left), "a page of a preview registers nothing"
-        assert page.evaluate("navigator.serviceWorker.controller") is None
+        until(page, left)  # a page of a preview registers nothing
+        until(page, "navigator.serviceWorker.controller === null")
     finally:
         preview.stop()

@@ -34,9 +34,9 @@ def nasty(sites: Mapping[str, Site]) -> str:
     return sites["nasty"].url(LESSON)
 
 
-def printed(page: Page, paper: str = "A4") -> list[str]:
+def printed(page: Page) -> list[str]:
     """The text of each sheet."""
-    reader = PdfReader(io.BytesIO(page.pdf(format=paper)))
+    reader = PdfReader(io.BytesIO(page.pdf(format="A4")))
     return [sheet.extract_text() for sheet in reader.pages]
 
 
@@ -56,18 +56,14 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
     )
     assert len(headings) > 20
     known = {words(heading).casefold() for heading in headings}
-    for paper in ("A4", "Letter"):
-        is_a_handout(printed(page, paper), known)
-
-
-def is_a_handout(sheets: list[str], headings: set[str]) -> None:
+    sheets = printed(page)
     assert 10 < len(sheets) < 35, "of text, five drawings and four labs"
     for number, sheet in enumerate(sheets, 1):
         assert f"{number} / {len(sheets)}" in sheet
         assert ("Mass and inertia · Simulation with MuJoCo" in sheet) == (number > 1)
         lines = [line.strip() for line in sheet.splitlines()]
         lines = [line for line in lines if not FURNITURE.fullmatch(line)]
-        assert words(lines[-1]).casefold() not in headings, f"a heading ends sheet {number}"
+        assert words(lines[-1]).casefold() not in known, f"a heading ends sheet {number}"
     text = words(" ".join(sheets))
     address = "example.org/mujoco-course/lessons/4.2-mass-and-inertia.html"
     for lab in (1, 2, 3):

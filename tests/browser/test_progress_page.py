@@ -1,30 +1,20 @@
-"""The page of a reader's progress: saving, forgetting, bringing in, keys alone, no scripts."""
+"""The page of a reader's progress: saving, forgetting, bringing in, and keys alone."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from support.reader_page import (
-    FALL_PAGE,
-    KEY,
-    PUSH_PAGE,
-    SAID,
-    choose,
-    kept,
-    opened,
-    put,
-    question,
-    quiet,
-)
+from support.lab_page import becomes, until
+from support.reader_page import FALL_PAGE, OVERALL, PUSH_PAGE, WAY, choose, kept, put, question
 
 pytestmark = pytest.mark.browser
 
-OVERALL = '[data-progress="overall"]'
+Opened = Callable[[str], Page]
 TOLD = '[data-control="import"] [role=status]'
 """What the page says of a file that was brought in."""
 
@@ -33,11 +23,13 @@ def focus_on(page: Page, text: str) -> None:
     expect(page.locator(":focus")).to_have_text(text)
 
 
-def test_saving_forgetting_and_bringing_in(calm: BrowserContext, site: str, tmp_path: Path) -> None:
-    lesson = opened(calm, site + FALL_PAGE)
-    choose(lesson, question(lesson, "way"), "Up")
+def test_saving_forgetting_and_bringing_in(
+    opened: Opened, browsers: Mapping[str, Browser], site: str, tmp_path: Path
+) -> None:
+    lesson = opened(site + FALL_PAGE)
+    choose(question(lesson, "way"), "Up")
     lesson.get_by_role("button", name="Mark as read").click()
-    page = opened(calm, site + "progress/")
+    page = opened(site + "progress/")
     overall = page.locator(OVERALL)
     expect(overall).to_contain_text("1 of 3 lessons read")
     expect(overall).to_contain_text("0 of 8 tasks done")
@@ -54,10 +46,6 @@ def test_saving_forgetting_and_bringing_in(calm: BrowserContext, site: str, tmp_
     page.get_by_role("button", name="Forget everything").click()
     ask = page.get_by_role("dialog", name="Forget everything?")
     expect(ask).to_contain_text("1 answer and 1 lesson are forgotten")
-    focus_on(page, "Cancel")
-    page.keyboard.press("Escape")
-    expect(ask).to_be_hidden()
-    page.get_by_role("button", name="Forget everything").click()
     ask.get_by_role("button", name="Forget", exact=True).click()
     expect(overall).to_contain_text("Nothing yet.")
     expect(lesson.get_by_role("button", name="Mark as read")).to_be_visible()
@@ -72,35 +60,14 @@ def test_saving_forgetting_and_bringing_in(calm: BrowserContext, site: str, tmp_
     expect(overall).to_contain_text("1 of 3 lessons read")
     page.locator("input[type=file]").set_input_files(file)
     expect(told).to_have_text("Everything in the file was here already.")
-    assert quiet(page, lesson)
 
-
-def test_forgetting_can_be_undone(calm: BrowserContext, site: str) -> None:
-    page = opened(calm, site)
-    put(page, {"quiz": "fall", "key": "way", "lesson": "1.2", "right": True})
-    page.goto(site + "progress/")
-    page.get_by_role("button", name="Forget everything").click()
-    page.get_by_role("dialog").get_by_role("button", name="Forget", exact=True).click()
-    expect(page.locator(OVERALL)).to_contain_text("Nothing yet.")
-    page.get_by_role("button", name="Undo").click()
-    expect(page.locator(OVERALL)).to_contain_text("1 of 8 tasks done")
-    focus_on(page, "Forget everything")
-
-
-def test_file_goes_to_another_device(
-    calm: BrowserContext, browsers: Mapping[str, Browser], site: str, tmp_path: Path
-) -> None:
-    page = opened(calm, site + PUSH_PAGE)
-    page.get_by_role("button", name="Mark as read").click()
-    expect(page.get_by_role("button", name="Mark as not read")).to_be_visible()
-    file = tmp_path / "desk.json"
-    file.write_text(page.evaluate("key => localStorage.getItem(key)", KEY), "utf-8")
     with browsers["plain"].new_context() as other:
-        phone = opened(other, site + FALL_PAGE)
+        phone = other.new_page()
+        phone.goto(site + PUSH_PAGE)
         phone.get_by_role("button", name="Mark as read").click()
         phone.goto(site + "progress/")
         phone.locator("input[type=file]").set_input_files(file)
-        expect(phone.locator(TOLD)).to_contain_text("Imported: 0 answers and 1 lesson ")
+        expect(phone.locator(TOLD)).to_contain_text("Imported: 1 answer and 1 lesson ")
         expect(phone.locator(OVERALL)).to_contain_text("2 of 3 lessons read")
 
 
@@ -121,28 +88,27 @@ WRONG_FILES = (
 )
 
 
-def test_wrong_files_change_nothing(calm: BrowserContext, site: str, tmp_path: Path) -> None:
-    page = opened(calm, site)
-    put(page, {"quiz": "fall", "key": "way", "lesson": "1.2"})
+def test_wrong_files_change_nothing(opened: Opened, site: str, tmp_path: Path) -> None:
+    page = opened(site)
+    put(page, WAY)
     page.goto(site + "progress/")
     before = kept(page)
     for data, message in WRONG_FILES:
         (tmp_path / "wrong.json").write_bytes(data)
         page.locator("input[type=file]").set_input_files(tmp_path / "wrong.json")
         expect(page.locator(TOLD)).to_contain_text(message)
-        assert kept(page) == before
-    assert quiet(page), SAID[page]
+        becomes(page, lambda: kept(page), before)
 
 
 def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
-    calm: BrowserContext, site: str
+    opened: Opened, site: str
 ) -> None:
-    page = opened(calm, site)
+    page = opened(site)
     put(
         page,
         {"quiz": "<i>gone", "key": "x", "lesson": "7.7", "number": 3},
-        {"quiz": "fall", "key": "was", "lesson": "1.2", "number": 9},
-        {"quiz": "fall", "key": "way", "lesson": "1.2"},
+        {**WAY, "key": "was", "number": 9},
+        WAY,
     )
     page.goto(site + "progress/")
     orphans = page.locator('[data-progress="orphans"]')
@@ -159,54 +125,30 @@ def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
     expect(orphans).to_be_hidden()
 
 
-def test_pages_without_a_script_say_so_and_are_complete(
-    browsers: Mapping[str, Browser], site: str
-) -> None:
-    with browsers["plain"].new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(site + "progress/")
-        said = page.locator("noscript")
-        expect(said).to_contain_text("Progress is kept by a script", use_inner_text=True)
-        page.locator("main summary").first.click()
-        expect(page.get_by_role("link", name="Push & <em>pull</em>")).to_be_visible()
-        page.goto(site + "review/")
-        expect(said).to_contain_text("scripts are switched off here", use_inner_text=True)
-        lessons = [
-            "1.1 Push & <em>pull</em> 3 tasks",
-            "1.2 Free fall, from a height that is not small 4 tasks",
-            "About 1 task",
-        ]
-        expect(page.locator(".asking li")).to_have_text(lessons)
-        page.goto(site)
-        expect(page.locator(".start a")).to_contain_text("Start with 1.1")
-
-
-def test_everything_works_from_the_keyboard(calm: BrowserContext, site: str) -> None:
-    page = opened(calm, site)
-    put(page, {"quiz": "fall", "key": "way", "lesson": "1.2"})
+def test_everything_works_from_the_keyboard(opened: Opened, site: str) -> None:
+    page = opened(site)
+    put(page, WAY)
     page.goto(site + "review/")
-    tab_to(page, "Begin")
-    page.keyboard.press("Enter")
+    press(page, "Begin")
     expect(question(page, "way").locator(".quiz-check")).to_be_visible()
     tab_to(page, "Up", property="labels?.[0]?.innerText")
     page.keyboard.press("ArrowDown")
-    tab_to(page, "Check")
-    page.keyboard.press("Enter")
+    press(page, "Check")
     expect(page.locator(".verdict")).to_contain_text("Right")
-    tab_to(page, "Next question")
-    page.keyboard.press("Enter")
+    press(page, "Next question")
     focus_on(page, "Done: 1 of 1 right.")
     page.goto(site + "progress/")
     expect(page.locator(OVERALL)).to_contain_text("1 of 8 tasks done")
-    tab_to(page, "Forget everything")
-    page.keyboard.press("Space")
+    press(page, "Forget everything")
     focus_on(page, "Cancel")
-    tab_to(page, "Forget")
+    page.keyboard.press("Escape")
+    focus_on(page, "Forget everything")
     page.keyboard.press("Enter")
+    press(page, "Forget")
     expect(page.locator(OVERALL)).to_contain_text("Nothing yet.")
-    tab_to(page, "Undo")
-    page.keyboard.press("Enter")
+    press(page, "Undo")
     expect(page.locator(OVERALL)).to_contain_text("1 of 8 tasks done")
+    focus_on(page, "Forget everything")
 
 
 def tab_to(page: Page, text: str, property: str = "innerText") -> None:
@@ -218,9 +160,19 @@ def tab_to(page: Page, text: str, property: str = "innerText") -> None:
     raise AssertionError(f"Tab does not come to {text!r}")
 
 
-def test_what_can_be_pressed_is_large_enough(calm: BrowserContext, site: str) -> None:
-    page = opened(calm, site)
-    put(page, {"quiz": "gone", "key": "x", "lesson": "7.7"})
+def press(page: Page, text: str) -> None:
+    tab_to(page, text)
+    page.keyboard.press("Enter")
+
+
+SMALLEST = """(part) => Math.min(...[...part.querySelectorAll('button, input[type=file], summary')]
+  .filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect())
+  .map(({ width, height }) => Math.min(width, height)))"""
+
+
+def test_what_can_be_pressed_is_large_enough(opened: Opened, site: str) -> None:
+    page = opened(site)
+    put(page, {**WAY, "quiz": "gone"})
     page.set_viewport_size({"width": 320, "height": 640})
     for path, part, button in (
         ("progress/", "main", "Forget all of these"),
@@ -228,12 +180,5 @@ def test_what_can_be_pressed_is_large_enough(calm: BrowserContext, site: str) ->
     ):
         page.goto(site + path)
         expect(page.get_by_role("button", name=button)).to_be_visible()
-        sizes = page.locator(part).evaluate(
-            "(part) => [...part.querySelectorAll('button, input[type=file], summary')]"
-            ".filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect())"
-            ".map(({ width, height }) => Math.min(width, height))"
-        )
-        assert sizes
-        assert min(sizes) >= 24
-        room = "() => document.documentElement.scrollWidth - innerWidth"
-        assert page.evaluate(room) <= 0
+        becomes(page, lambda: page.locator(part).evaluate(SMALLEST) >= 24, True)  # noqa: B023
+        until(page, "document.documentElement.scrollWidth <= innerWidth")

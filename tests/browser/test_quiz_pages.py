@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import BrowserContext, Page, expect
 
 from support.axe import violations
 from support.built_sites import Site, course_copy
-from support.lab_page import comes, until, watched
+from support.lab_page import becomes, until
 from support.preview_process import serving
 from support.quiz_page import (
     ANGLE,
@@ -26,6 +26,7 @@ from support.quiz_page import (
     QUESTIONS,
     SEVERAL,
     answer_all,
+    answer_field,
     clean_page,
     items,
     kept,
@@ -39,10 +40,20 @@ pytestmark = pytest.mark.browser
 
 
 @pytest.fixture
-def page(context: BrowserContext, quizzes: str) -> Iterator[Page]:
-    yield from clean_page(context, quizzes)
+def page(calm: BrowserContext, quizzes: str) -> Iterator[Page]:
+    """The lesson, whose lab has no picture here."""
+    yield from clean_page(calm, quizzes)
 
 
+REFERENCES = """() => {
+  const ids = [...document.querySelectorAll('[id]')].map((element) => element.id)
+  const twice = ids.filter((id, i) => ids.indexOf(id) !== i)
+  const named = ['for', 'aria-describedby', 'aria-labelledby'].flatMap((name) =>
+    [...document.querySelectorAll(`[${name}]`)].flatMap((element) =>
+      element.getAttribute(name).split(' ')))
+  return [twice, named.filter((id) => !ids.includes(id))]
+}"""
+"""Ids that are there twice, and references to none."""
 CAN_BE_PRESSED = ".quiz :is(button, input, summary):not(.lab *):visible"
 TOO_SMALL = """elements => elements.filter((element) => {
   const box = (element.closest('label') ?? element).getBoundingClientRect()
@@ -54,152 +65,94 @@ def test_axe_finds_nothing_in_any_state(page: Page) -> None:
     for answered in (False, True):
         if answered:
             answer_all(page)
+        assert violations(page, ".quiz") == []
+        becomes(page, lambda: page.evaluate(REFERENCES), [[], []])
         for width in (320, 1440):
             page.set_viewport_size({"width": width, "height": 800})
-            assert violations(page, ".quiz") == [], (answered, width)
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-            assert page.locator(CAN_BE_PRESSED).evaluate_all(TOO_SMALL) == []
+            until(page, "document.documentElement.scrollWidth <= innerWidth")
+            pressed = page.locator(CAN_BE_PRESSED)
+            becomes(page, lambda: pressed.evaluate_all(TOO_SMALL), [])  # noqa: B023
 
 
 # ----------------------------------------------------------------------- what is kept of it
 
+MISFITS = ('["gone"]', '"text"', "null", "{}", '[["a"]]', '[null,{"a":1}]')
+MISFIT = f"""(given) => {{
+  const key = ({KEY})()
+  const state = JSON.parse(localStorage[key])
+  for (const entry of Object.values(state.answers.check)) entry.answer.given = JSON.parse(given)
+  localStorage[key] = JSON.stringify(state)
+}}"""
 
-def test_answers_are_there_again_when_the_page_is_loaded_again(page: Page) -> None:
+
+def test_answers_are_there_again_and_those_that_do_not_fit_are_left_out(page: Page) -> None:
     question(page, MCQ).locator(".hint").nth(0).locator("summary").click()
     order = shifted(page)
     answer_all(page)
     visit(page, page.url)
     expect(question(page, MCQ).get_by_role("radio").first).to_be_checked()
     expect(question(page, MCQ).locator(".hint").nth(1)).to_be_visible()
-    expect(verdict(page, MCQ)).to_contain_text("Not the same.")
-    expect(verdict(page, SEVERAL)).to_contain_text("Right.")
-    expect(question(page, NUMBER).get_by_label("Your answer")).to_have_value("")
-    expect(question(page, ANGLE).get_by_label("Your answer")).to_have_value("pi/2")
-    expect(verdict(page, PREDICT)).to_contain_text("Something else happens.")
+    for number, text in (
+        (MCQ, "Not the same."),
+        (SEVERAL, "Right."),
+        (PREDICT, "Something else happens."),
+        (OPEN, "Marked as right in part."),
+        (OPEN, "Since so."),
+        (OUTPUT, "Not right."),
+    ):
+        expect(verdict(page, number)).to_contain_text(text)
+    for number, entered in ((NUMBER, ""), (ANGLE, "pi/2"), (OPEN, "So.")):
+        expect(answer_field(page, number)).to_have_value(entered)
     chosen = question(page, PREDICT).get_by_role("radio", name="it rests")
     expect(chosen).to_be_checked()
     expect(chosen).to_be_disabled()  # there is no way back
     expect(question(page, PREDICT).locator(".lab")).to_be_visible()
-    expect(question(page, OPEN).get_by_label("Your answer")).to_have_value("So.")
     expect(question(page, OPEN).get_by_role("radio", name="In part")).to_be_checked()
-    expect(verdict(page, OPEN)).to_contain_text("Marked as right in part.")
-    expect(verdict(page, OPEN)).to_contain_text("Since so.")
-    expect(verdict(page, OUTPUT)).to_contain_text("Not right.")
-    assert items(page) == order
-    # Loading a page answers nothing again.
-    answer = kept(page, MCQ)
-    assert answer is not None and answer["tries"] == 1
-
-
-def test_event_tells_of_each_answer(page: Page) -> None:
-    page.evaluate(
-        """() => {
-          window.told = []
-          document.addEventListener('coursebuild:answered', ({ detail }) => told.push(detail))
-        }"""
-    )
-    question(page, NUMBER).get_by_label("Your answer").fill("0.08")
-    press(page, NUMBER)
-    until(page, "window.told.length > 0")
-    told = page.evaluate("told")
-    assert [(one["quiz"], one["key"], one["answer"]["right"]) for one in told] == [
-        ("check", "inertia", True)
-    ]
-
-
-def test_another_tab_follows(page: Page, context: BrowserContext) -> None:
-    other = context.new_page()
-    visit(other, page.url)
-    other.get_by_label("Your answer").nth(1).fill("half")
-    question(page, NUMBER).get_by_label("Your answer").fill("0.08")
-    press(page, NUMBER)
-    expect(verdict(other, NUMBER)).to_contain_text("Right.")
-    expect(question(other, ANGLE).get_by_label("Your answer")).to_have_value("half")
-
-
-CLOSED = """Object.defineProperty(window, 'localStorage', {
-  get() { throw new DOMException('closed', 'SecurityError') }
-})"""
-FULL = "Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError') }"
-
-
-@pytest.mark.parametrize("broken", [CLOSED, FULL])
-def test_quizzes_work_where_nothing_can_be_kept(
-    context: BrowserContext, quizzes: str, broken: str
-) -> None:
-    page, said = watched(context)
-    page.add_init_script(broken)
-    visit(page, quizzes + PATH)
-    answer_all(page)
-    expect(verdict(page, SEVERAL)).to_contain_text("Right.")
-    assert said == []
-
-
-def test_quizzes_work_from_a_disk(
-    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
-) -> None:
-    with browsers["plain"].new_context() as context:
-        page = context.new_page()
-        visit(page, f"file://{sites['quizzes'].public / PATH}")
-        question(page, NUMBER).get_by_label("Your answer").fill("0.08")
-        press(page, NUMBER)
-        expect(verdict(page, NUMBER)).to_contain_text("Right.")
-        question(page, PREDICT).get_by_role("radio").last.check()
-        press(page, PREDICT, "Commit to this answer")
-        expect(verdict(page, PREDICT)).to_contain_text("It happens as you predicted.")
-        expect(question(page, PREDICT).locator(".lab-message")).to_be_visible()
-        visit(page, page.url)
-        expect(verdict(page, NUMBER)).to_contain_text("Right.")
-
-
-MISFITS = (
-    *('["gone"]', '"text"', "null", "{}", "5"),
-    *('[["a"]]', '{"text":5,"mark":"x"}', '[null,{"a":1}]'),
-)
-
-
-def test_answers_that_do_not_fit_their_question_are_left_out(page: Page) -> None:
-    answer_all(page)
+    becomes(page, lambda: items(page), order)
+    becomes(page, lambda: (kept(page, MCQ) or {})["tries"], 1)  # loading answers nothing again
     for given in MISFITS:
-        page.evaluate(
-            f"""() => {{
-              const key = ({KEY})()
-              const state = JSON.parse(localStorage[key])
-              for (const entry of Object.values(state.answers.check)) entry.answer.given = {given}
-              localStorage[key] = JSON.stringify(state)
-            }}"""
-        )
+        page.evaluate(MISFIT, given)
         visit(page, page.url)
         expect(question(page, MCQ).get_by_role("radio")).to_have_count(4)
         expect(verdict(page, MCQ)).to_be_empty()
-        assert sorted(items(page)) == ["1 m", "2 m", "3 m", "4 m"]
-    question(page, MCQ).get_by_role("radio").nth(1).check()
-    press(page, MCQ)
-    expect(verdict(page, MCQ)).to_contain_text("Right.")
+        becomes(page, lambda: sorted(items(page)), ["1 m", "2 m", "3 m", "4 m"])
 
 
-# -------------------------------------------------------------- without a script, on paper
-
-
-def test_without_javascript_everything_is_there(
-    browsers: Mapping[str, Browser], quizzes: str
+def test_each_answer_is_told_to_scripts_and_to_another_tab(
+    page: Page, calm: BrowserContext
 ) -> None:
-    with browsers["plain"].new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(quizzes + PATH)
-        quiz = page.locator(".quiz")
-        expect(quiz.locator("form, fieldset, input, button, textarea")).to_have_count(0)
-        folds = quiz.locator("details.answer")
-        expect(folds).to_have_count(QUESTIONS)
-        for number in range(QUESTIONS):
-            folds.nth(number).locator("> summary").click()
-        for text in (
-            "B. twice as long, 2T", "Since", "If you chose A", "A. length", "C. gravity",
-            "0.08 kg m2", "it swings", "Since so.", "T = 2.0061 s", "The right order", "By length.",
-        ):  # fmt: skip
-            expect(quiz.get_by_text(text).first).to_be_visible()
-        expect(quiz.locator(".lab")).to_be_visible()
-        expect(quiz.locator(".hint")).to_have_count(3)
+    other = calm.new_page()
+    visit(other, page.url)
+    answer_field(other, ANGLE).fill("half")
+    page.evaluate(
+        """() => {
+          window.told = []
+          document.addEventListener('coursebuild:answered', ({ detail }) => told.push(
+            [detail.quiz, detail.key, detail.answer.right]))
+        }"""
+    )
+    answer_field(page, NUMBER).fill("0.08")
+    press(page, NUMBER)
+    becomes(page, lambda: page.evaluate("told"), [["check", "inertia", True]])
+    expect(verdict(other, NUMBER)).to_contain_text("Right.")
+    expect(answer_field(other, ANGLE)).to_have_value("half")
+
+
+def test_quizzes_work_from_a_disk(sites: Mapping[str, Site], calm: BrowserContext) -> None:
+    page = calm.new_page()
+    visit(page, (sites["quizzes"].public / PATH).as_uri())
+    answer_field(page, NUMBER).fill("0.08")
+    press(page, NUMBER)
+    expect(verdict(page, NUMBER)).to_contain_text("Right.")
+    question(page, PREDICT).get_by_role("radio").last.check()
+    press(page, PREDICT, "Commit to this answer")
+    expect(verdict(page, PREDICT)).to_contain_text("It happens as you predicted.")
+    expect(question(page, PREDICT).locator(".lab-message")).to_be_visible()
+    visit(page, page.url)
+    expect(verdict(page, NUMBER)).to_contain_text("Right.")
+
+
+# ------------------------------------------------------------------------------- on paper
 
 
 def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> None:
@@ -218,66 +171,65 @@ def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> 
 
 
 def test_script_of_quizzes_comes_when_a_quiz_comes_near(
-    browsers: Mapping[str, Browser], sites: Mapping[str, Site], tmp_path: Path
+    sites: Mapping[str, Site], calm: BrowserContext, tmp_path: Path
 ) -> None:
-    far = tmp_path / "far"
-    shutil.copytree(sites["quizzes"].public, far)
-    page_file = far / PATH
-    text = page_file.read_text(encoding="utf-8")
-    page_file.write_text(text.replace("<section class=", "<p>Much.</p>" * 400 + "<section class="))
-    with browsers["plain"].new_context() as context:
-        page = context.new_page()
-        asked: list[str] = []
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(f"file://{page_file}", wait_until="networkidle")
-        assert not any("/quiz." in url for url in asked)
-        page.locator(".question").first.scroll_into_view_if_needed()
-        expect(page.locator(".question.is-live")).to_have_count(QUESTIONS)
-        assert sum("/quiz." in url for url in asked) == 1
+    shutil.copytree(sites["quizzes"].public, tmp_path / "far")
+    file = tmp_path / "far" / PATH
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("<section class=", "<p>Much.</p>" * 400 + "<section class="))
+    page = calm.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri(), wait_until="networkidle")
+    assert not any("/quiz." in url for url in asked)
+    page.locator(".question").first.scroll_into_view_if_needed()
+    expect(page.locator(".question.is-live")).to_have_count(QUESTIONS)
+    assert sum("/quiz." in url for url in asked) == 1
 
 
 # ------------------------------------------------------------------------------ the preview
 
 
 def test_half_typed_answer_survives_the_author(
-    tmp_path: Path, stores: Path, browsers: Mapping[str, Browser]
+    tmp_path: Path, stores: Path, calm: BrowserContext
 ) -> None:
     folder = course_copy("quizzes", tmp_path / "course", stores)
     with serving(folder) as preview:
         preview.heard("checked: ")
-        with browsers["plain"].new_context() as context:
-            page = context.new_page()
-            visit(page, f"http://127.0.0.1:{preview.port}/{PATH}")
-            page.evaluate("window.same = true")
-            field = question(page, NUMBER).get_by_label("Your answer")
-            field.fill("half of")
-            field.focus()
-            question(page, MCQ).get_by_role("radio").nth(2).check()
-            order = shifted(page)
-            field.focus()
-            folder.replace(folder.lesson(), "After it.", "After it, more.")
-            expect(page.locator("main")).to_contain_text("After it, more.")
-            expect(field).to_have_value("half of")
-            expect(field).to_be_focused()
-            comes(page, lambda: items(page) == order)
-            # Another question changes, and this one's explanation: what was entered stays.
-            folder.replace(folder.lesson(), "Not mass.", "No, not mass.")
-            folder.replace(folder.lesson(), "So much.", "So much, then.")
-            expect(page.locator(".explain").nth(2)).to_contain_text("then")
-            expect(field).to_have_value("half of")
-            expect(question(page, MCQ).get_by_role("radio").nth(2)).to_be_checked()
-            field.fill("0.08")
-            press(page, NUMBER)
-            expect(verdict(page, NUMBER)).to_contain_text("So much, then.")
-            # What is entered after that has no verdict yet, and gets none by itself.
-            field.fill("0.081")
-            folder.replace(folder.lesson(), "So much, then.", "So much, at last.")
-            expect(page.locator(".explain").nth(2)).to_contain_text("last")
-            expect(field).to_have_value("0.081")
-            expect(verdict(page, NUMBER)).to_be_empty()
-            assert page.evaluate("window.same")
+        page = calm.new_page()
+        visit(page, f"http://127.0.0.1:{preview.port}/{PATH}")
+        page.evaluate("window.same = true")
+        field, explained = answer_field(page, NUMBER), page.locator(".explain").nth(2)
+        question(page, MCQ).get_by_role("radio").nth(2).check()
+        order = shifted(page)
+        field.fill("half of")
+        folder.replace(folder.lesson(), "After it.", "After it, more.")
+        expect(page.locator("main")).to_contain_text("After it, more.")
+        expect(field).to_have_value("half of")
+        expect(field).to_be_focused()
+        becomes(page, lambda: items(page), order)
+        # Another question changes, and this one's explanation: what was entered stays.
+        folder.replace(folder.lesson(), "Not mass.", "No, not mass.")
+        folder.replace(folder.lesson(), "So much.", "So much, then.")
+        expect(explained).to_contain_text("then")
+        expect(field).to_have_value("half of")
+        expect(question(page, MCQ).get_by_role("radio").nth(2)).to_be_checked()
+        field.fill("0.08")
+        press(page, NUMBER)
+        expect(verdict(page, NUMBER)).to_contain_text("So much, then.")
+        # What is entered after that has no verdict yet, and gets none by itself.
+        field.fill("0.081")
+        folder.replace(folder.lesson(), "So much, then.", "So much, at last.")
+        expect(explained).to_contain_text("last")
+        expect(field).to_have_value("0.081")
+        expect(verdict(page, NUMBER)).to_be_empty()
+        assert page.evaluate("window.same")
 
 
 def shifted(page: Page) -> list[str]:
+    """The order after its first item was moved."""
+    before = items(page)
     question(page, ORDER).get_by_role("button", name="Move down").first.click()
-    return items(page)
+    after = [before[1], before[0], *before[2:]]
+    becomes(page, lambda: items(page), after)
+    return after

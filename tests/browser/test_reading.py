@@ -31,8 +31,7 @@ def open_page(browsers: Mapping[str, Browser], sites: Mapping[str, Site]) -> Ite
             made = browsers["plain"].new_context(viewport=viewport, **options)
             page = stack.enter_context(made).new_page()
             page.goto(sites[name].url(LESSON) + at)
-            if options.get("java_script_enabled", True):
-                settled(page)
+            settled(page)
             return page
 
         yield open_page
@@ -141,27 +140,19 @@ def test_a_long_line_is_shown_from_its_beginning(open_page: OpenPage) -> None:
     becomes(page, lambda: box.evaluate(shown), [True, 0])
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [("Callouts", "text=Of the kind established."), ("Links lead in here", "#inside")],
-)
 def test_a_link_opens_the_section_that_it_leads_into(
-    browsers: Mapping[str, Browser], sites: Mapping[str, Site], name: str, text: str
+    sites: Mapping[str, Site], open_page: OpenPage
 ) -> None:
-    page = browsers["plain"].new_page(viewport={"width": 1440, "height": 900})
+    page = open_page()
     page.goto(sites["full"].url("lessons/1.1-text.html") + "#prose")
-    inside = page.locator(text)
-    expect(inside).not_to_be_visible()
-    page.locator(".toc").get_by_role("link", name=name, exact=True).click()
-    expect(inside).to_be_in_viewport()
-    page.close()
-
-
-def test_a_line_is_reached_without_scripts(open_page: OpenPage) -> None:
-    page = open_page(at="#sub/wide.L60", java_script_enabled=False)
-    line = page.locator("[id='sub/wide.L60']")
-    expect(line).to_be_visible()  # the browser opens the fold
-    expect(line).not_to_have_css("background-color", "rgba(0, 0, 0, 0)")
+    for name, text in (
+        ("Callouts", "text=Of the kind established."),
+        ("Links lead in here", "#inside"),
+    ):
+        inside = page.locator(text)
+        expect(inside).not_to_be_visible()
+        page.locator(".toc").get_by_role("link", name=name, exact=True).click()
+        expect(inside).to_be_in_viewport()
 
 
 def test_an_address_of_no_line_does_no_harm(open_page: OpenPage) -> None:

@@ -203,7 +203,7 @@ def test_two_fingers_zoom_and_move(phone: Phone, sideways: bool) -> None:
     assert moved["distance"] == pytest.approx(wide["distance"], rel=0.02)
     assert (moved["azimuth"], moved["elevation"]) == (before["azimuth"], before["elevation"])
     assert scrolled(page) == scroll
-    assert page.evaluate("() => window.visualViewport.scale") == 1
+    until(page, "window.visualViewport.scale === 1")
 
 
 def test_finger_that_rests_on_a_body_pulls_it(phone: Phone) -> None:

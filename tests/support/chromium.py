@@ -47,8 +47,8 @@ class Browsers(Mapping[str, Browser]):
 
 def launch(playwright: Playwright, *arguments: str) -> Browser:
     """Debian's Chromium without a window; whatever is done in it may take `SLOW`."""
-    program = shutil.which("chromium")
-    assert program is not None, "no chromium: install Debian's package `chromium`"
+    program = shutil.which("chromium-headless-shell")
+    assert program is not None, "install Debian's package `chromium-headless-shell`"
     browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", *arguments])
     make = browser.new_context
 
