@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Browser, Page, Route
 
 from support.built_sites import Site
 from support.lab_page import becomes, until
@@ -126,35 +126,6 @@ def test_everything_that_folds_opens_by_key(
         summary.focus()
         page.keyboard.press(key)
         becomes(page, partial(summary.evaluate, "s => s.parentElement.open"), not was)
-
-
-def test_colours_search_and_a_question_by_key(sites: Mapping[str, Site], page: Page) -> None:
-    opened(page, sites["full"])
-    page.get_by_label("Colours").focus()
-    page.keyboard.press("ArrowDown")
-    page.keyboard.press("ArrowDown")
-    page.keyboard.press("Tab")
-    expect(page.locator("html")).to_have_attribute("data-theme", re.compile("light|dark"))
-    page.locator(".search-open").wait_for(state="attached")
-    page.keyboard.press("Control+k")
-    dialog = page.locator("dialog[open]")
-    dialog.wait_for()
-    page.keyboard.type("number")
-    dialog.get_by_role("link").or_(dialog.get_by_role("option")).first.wait_for()
-    page.keyboard.press("Escape")
-    page.locator("dialog[open]").wait_for(state="detached")
-    question = page.locator(".question:has(input[type=radio])").first
-    question.locator("input[type=radio]").first.focus()
-    page.keyboard.press("Space")
-    expect(question.locator("input[type=radio]:checked")).to_have_count(1)
-    page.keyboard.press("ArrowDown")
-    expect(question.locator("input[type=radio]").first).not_to_be_checked()
-    for _ in range(5):
-        page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.localName") == "button":
-            break
-    page.keyboard.press("Enter")
-    expect(question.locator(".verdict")).to_have_text(re.compile(r"\S"))
 
 
 def test_the_focus_goes_on_in_a_lab_that_starts(sites: Mapping[str, Site], page: Page) -> None:

@@ -21,7 +21,6 @@ from support.lab_page import (
     parsed,
     press,
     reach,
-    readout,
     served,
     state_of,
     time_of,
@@ -86,19 +85,6 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
         other.goto(base + "progress/index.html")
         expect(other.locator('[data-progress="overall"]')).to_contain_text("1 of 1 task done")
         assert [*said, *also_said] == []
-
-
-def test_goal_that_was_shown_does_not_count(context: BrowserContext, base: str) -> None:
-    page, _ = watched(context)
-    page.goto(base + PAGE)
-    swing = lab(page)
-    goal = swing.locator(".lab-live .lab-goal")
-    press(swing, "Show me")
-    comes(page, lambda: float(readout(swing, "angle")) > 4)
-    expect(goal).to_contain_text("Not counted: this run")
-    press(swing, "Reset")
-    expect(goal).to_contain_text("0.00 s of 0.2 s")
-    expect(goal).not_to_contain_text("Reached")
 
 
 # ------------------------------------------------------------------------- what goes wrong

@@ -33,7 +33,9 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
 NEWTON = '[id="eq:newton"]'
 
 
-def test_the_anchor_of_a_formula_is_seen_when_it_is_pointed_at(page: Page, base: str) -> None:
+def test_the_anchor_of_a_formula_is_seen_when_it_is_pointed_at_or_focused(
+    page: Page, base: str
+) -> None:
     page.goto(base + FORMULAS)
     anchor = page.locator(f"{NEWTON} > .anchor")
     page.mouse.move(0, 0)
@@ -41,21 +43,18 @@ def test_the_anchor_of_a_formula_is_seen_when_it_is_pointed_at(page: Page, base:
     page.hover(NEWTON)
     expect(anchor).to_have_css("opacity", "1")
     comes(page, lambda: large_enough(anchor))
+    page.mouse.move(0, 0)
+    anchor.evaluate("node => node.focus({focusVisible: true})")
+    expect(anchor).to_have_css("opacity", "1")
+    page.keyboard.press("Enter")
+    expect(page).to_have_url(re.compile("#eq(:|%3A)newton$"))
+    expect(page.locator(f"{NEWTON}:target")).to_have_count(1)
 
 
 def large_enough(found: Locator) -> bool:
     """For a finger."""
     box = found.bounding_box()
     return box is not None and min(box["width"], box["height"]) >= 24
-
-
-def test_the_anchor_of_a_formula_is_reached_by_the_keyboard(page: Page, base: str) -> None:
-    page.goto(base + FORMULAS)
-    page.locator(f"{NEWTON} > .anchor").evaluate("node => node.focus({focusVisible: true})")
-    expect(page.locator(f"{NEWTON} > .anchor")).to_have_css("opacity", "1")
-    page.keyboard.press("Enter")
-    expect(page).to_have_url(re.compile("#eq(:|%3A)newton$"))
-    expect(page.locator(f"{NEWTON}:target")).to_have_count(1)
 
 
 def test_references_lead_to_their_formula(page: Page, base: str) -> None:
