@@ -133,9 +133,9 @@ test('marks keep the text whole', async () => {
 })
 
 test('actions are found by the beginnings of their words, lessons by number', () => {
-  const actions = [{ title: 'Print this page' }, { title: 'Colours: Dark', also: 'theme night' }, { title: 'Course map' }]
+  const actions = [{ title: 'Print this page' }, { title: 'Colours: Dark' }, { title: 'Course map' }]
   assert.deepEqual(matching(actions, 'pri pa'), [actions[0]])
-  assert.deepEqual(matching(actions, 'night'), [actions[1]])
+  assert.deepEqual(matching(actions, 'dark'), [actions[1]])
   assert.equal(matching(actions, '').length, 3)
   assert.deepEqual(numbered(source.listing, '4.', 9).map(([, , , name]) => name), ['4.2', '4.3', '4.4'])
   assert.deepEqual(numbered(source.listing, '4.3', 9).map(([, , , name]) => name), ['4.3'])

@@ -1,6 +1,5 @@
 import assert from 'node:assert/strict'
 import test from 'node:test'
-import { addCommand, currentCommands } from '../js/page/commands.js'
 import { meaning } from '../js/page/search.js'
 
 const key = (name, more = {}) => ({ key: name, ctrlKey: false, metaKey: false, altKey: false, isComposing: false, ...more })
@@ -29,17 +28,4 @@ test('on a Mac, Ctrl+K stays with a field that is written in', () => {
   assert.equal(meaning(key('k', { ctrlKey: true }), place({ mac: true, taken: true })), null)
   assert.equal(meaning(key('k', { metaKey: true }), place({ mac: true, taken: true })), 'open')
   assert.equal(meaning(key('k', { ctrlKey: true }), place({ mac: true })), 'open')
-})
-
-test('commands are those that can be done now, the newest of a name', () => {
-  let can = false
-  const remove = addCommand({ id: 'a', title: 'Old', run: () => {} })
-  addCommand({ id: 'b', title: 'B', when: () => can, run: () => {} })
-  addCommand({ id: 'a', title: 'New', run: () => {} })
-  const titles = () => currentCommands().map(({ title }) => title)
-  assert.deepEqual(titles(), ['New'])
-  can = true
-  assert.deepEqual(titles(), ['New', 'B'])
-  remove() // the old one is not there any more
-  assert.deepEqual(titles(), ['New', 'B'])
 })

@@ -28,17 +28,6 @@ PICTURE = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0
 TEXTS = ("## One\n\nText of one.\n\n![a sketch](s.svg)\n", "## Two\n\nText of two.\n")
 FIRST, SECOND = "lessons/1.1-one.html", "lessons/1.2-two.html"
 
-KEPT = """async () => {
-  const found = []
-  for (const name of await caches.keys()) {
-    for (const { url } of await (await caches.open(name)).keys()) {
-      const { pathname, search } = new URL(url)
-      const name = pathname.replace(/\\b[0-9a-f]{8,}\\b/, 'HASH')
-      found.push(name + search.replace(/[0-9a-f]{12}/, 'DIGEST'))
-    }
-  }
-  return found.sort()
-}"""
 TOLD = """
 window.toldOfVisits = 0
 const post = ServiceWorker.prototype.postMessage
@@ -70,7 +59,7 @@ QUIET = """async () => {
   const { active } = await navigator.serviceWorker.ready
   const { port1, port2 } = new MessageChannel()
   const done = new Promise((told) => { port1.onmessage = ({ data }) => data.end && told(data) })
-  const asked = { pages: [location.href], uses: [], keep: KEEP, sparing: false, look: LOOK }
+  const asked = { pages: [location.href], uses: [], keep: 'auto', sparing: false, look: false }
   active.postMessage({ coursebuild: 'visit', ...asked }, [port2])
   return done
 }"""
@@ -95,10 +84,9 @@ def host(made: Folder, tmp_path: Path) -> Iterator[Host]:
         yield host
 
 
-def settle(page: Page, keep: str = "auto", look: bool = False) -> None:
+def settle(page: Page) -> None:
     """Wait until the worker has done all it was told to, after one visit more."""
-    asked = QUIET.replace("KEEP", json.dumps(keep)).replace("LOOK", json.dumps(look))
-    page.evaluate(asked)
+    page.evaluate(QUIET)
 
 
 def settled_page(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, list[str]]:
@@ -182,14 +170,6 @@ def test_page_that_is_not_there_leads_back_when_there_is_a_network(
     expect(page.locator("h1")).to_have_text("Page not found")
 
 
-def test_slow_network_does_not_keep_back_a_page_that_is_here(kept: tuple[Page, Host]) -> None:
-    page, host = kept
-    host.answering.clear()
-    page.goto(host.url + SECOND)
-    see(page, "Text of two.")
-    host.answering.set()
-
-
 def test_no_way_back_leads_elsewhere(kept: tuple[Page, Host]) -> None:
     page, host = kept
     for from_ in ("https://example.com/x", "//example.com/", "/a/", "data:,"):
@@ -212,26 +192,6 @@ def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
     page.goto(host.url + SECOND)
     settle(page)
     assert host.since() == [SECOND]
-
-
-def test_new_build_costs_what_has_changed(
-    context: BrowserContext, host: Host, made: Folder
-) -> None:
-    page, said = settled_page(context, host)
-    before = page.evaluate(KEPT)
-    edited(made, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text."))
-    host.since()
-    settle(page, look=True)
-    assert FIRST in host.since()
-    expect(page.locator(".notice")).to_have_count(0)
-    page.goto(host.url + SECOND)
-    settle(page, look=True)
-    settle(page)
-    becomes(page, lambda: page.evaluate(KEPT), before)  # what is no more in use is gone
-    with host.away():
-        page.goto(host.url + FIRST)
-        see(page, "Other text.")
-    assert said == []
 
 
 def test_page_that_was_kept_says_when_there_is_a_newer_one(
@@ -335,27 +295,17 @@ def test_site_can_be_installed(kept: tuple[Page, Host]) -> None:
 NOTHING_KEPT = """async () => [
   (await caches.keys()).length, (await navigator.serviceWorker.getRegistrations()).length
 ]"""
-HAS_ENGINE = f"({KEPT})().then(all => all.some(path => path.endsWith('.wasm')))"
+HAS_ENGINE = """async () => {
+  const stores = await Promise.all((await caches.keys()).map((name) => caches.open(name)))
+  const kept = await Promise.all(stores.map((cache) => cache.keys()))
+  return kept.flat().some(({ url }) => url.endsWith('.wasm'))
+}"""
 
 
-def test_labs_run_without_a_network_once_they_were_used(
+def test_lab_that_was_used_runs_without_a_network(
     context: BrowserContext, tmp_path: Path, course: Site
 ) -> None:
-    shutil.copytree(course.public, tmp_path / "site")
-    with Host(tmp_path / "site") as host:
-        page, _ = settled_page(context, host, PAGE)
-        assert not page.evaluate(HAS_ENGINE)
-        lab(page)
-        settle(page)
-        until(page, HAS_ENGINE)
-        with host.away():
-            page.goto(host.url + PAGE)
-            lab(page)
-
-
-def test_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
-    context: BrowserContext, tmp_path: Path, course: Site
-) -> None:
+    """Also where it ran before there was a worker."""
     shutil.copytree(course.public, tmp_path / "site")
     with Host(tmp_path / "site") as host:
         page, _ = watched(context)
@@ -369,6 +319,9 @@ def test_lab_that_ran_before_there_was_a_worker_is_kept_as_well(
         lab(page)
         until(page, "navigator.serviceWorker.controller !== null")
         until(page, HAS_ENGINE)
+        with host.away():
+            page.goto(host.url + PAGE)
+            lab(page)
 
 
 class Previewed(Session):

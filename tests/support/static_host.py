@@ -27,9 +27,6 @@ class Host(contextlib.AbstractContextManager["Host"]):
         self.base = base
         self.asked: list[str] = []
         """Paths that were asked for, with their queries."""
-        self.answering = threading.Event()
-        """While it is not set, whoever asks waits."""
-        self.answering.set()
         self.fonts_delay = 0.0
         """Seconds before a font, which on this machine alone comes before anything is drawn."""
         self._server: http.server.ThreadingHTTPServer | None = None
@@ -125,7 +122,6 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         host = self.host
         host.asked.append(self.path.removeprefix(host.base))
         status, path = host.file(self.path)
-        host.answering.wait()
         time.sleep(host.fonts_delay if path.suffix == ".woff2" else 0.0)
         data = path.read_bytes() if path.is_file() else b""
         tag = f'"{hashlib.sha256(data).hexdigest()[:16]}"'

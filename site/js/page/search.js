@@ -3,8 +3,6 @@
  * What the search needs is loaded then, and never with a page; the page of the search loads it at once.
  */
 
-import { currentCommands } from './commands.js'
-
 const KEY = 'coursebuild.shortcuts'
 
 /** Whether single keys may do something (WCAG 2.1.4). */
@@ -95,7 +93,7 @@ async function start(document, words, how) {
   const { root = '', course = '' } = document.documentElement.dataset
   try {
     const search = await load(document, document.querySelector('[data-search]').dataset.search)
-    await search[how]({ root: new URL(root || './', document.baseURI).href, course, commands: currentCommands, singleKeys, setSingleKeys })
+    await search[how]({ root: new URL(root || './', document.baseURI).href, course, singleKeys, setSingleKeys })
   } catch {
     const button = document.querySelector('.search-open')
     button.textContent = words('search.failed')

@@ -1,14 +1,13 @@
 /**
- * What can be done on any page: commands that are made from what the page shows, those that other parts have added, and
- * lessons by their number.
+ * What can be done on any page: commands that are made from what the page shows, and lessons by their number.
  */
 
 import { termsOf } from './words.js'
 import { filled } from './view.js'
 
-/** The commands of a page, as `page/commands.js` describes them; those with `href` lead somewhere. */
-export function pageActions(document, strings, added) {
-  return [...ways(document, strings), ...doings(document, strings), ...added, ...places(document)]
+/** The commands of a page, each with a name and a title; `href` is where it leads, `run` does it and may give a text to say. */
+export function pageActions(document, strings) {
+  return [...ways(document, strings), ...doings(document, strings), ...places(document)]
 }
 
 function* ways(document, strings) {
@@ -65,8 +64,8 @@ export function hereAddress(document) {
 /** Actions whose title has every word that was typed, or its beginning; all of them where nothing was typed. */
 export function matching(actions, typed) {
   const wanted = termsOf(typed)
-  return actions.filter(({ title, also = '' }) => {
-    const has = termsOf(`${title} ${also}`)
+  return actions.filter(({ title }) => {
+    const has = termsOf(title)
     return wanted.every((word) => has.some((term) => term.startsWith(word)))
   })
 }

@@ -106,7 +106,7 @@ class SearchDialog {
     if (this.strings === null) return
     const asked = ++this.asked
     this.showing = typed
-    const actions = pageActions(document, this.strings, this.context.commands())
+    const actions = pageActions(document, this.strings)
     if (typed.trim() === '') return this.render(this.suggestions(actions), '')
     if (typed.trimStart().startsWith('>')) {
       const found = matching(actions, typed.trimStart().slice(1))
