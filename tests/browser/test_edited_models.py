@@ -15,8 +15,6 @@ from support.lab_page import EDITED, lab, press, until, watched
 pytestmark = pytest.mark.browser
 
 HOLDS = "([part, whole]) => document.querySelector(part).getBoundingClientRect().right <= whole"
-PATIENCE = 30_000
-"""Milliseconds in which a page gives up an engine that does not answer."""
 ENDLESS = '<option iterations="2000000000" tolerance="0" ls_iterations="9" solver="PGS"/>'
 
 
@@ -25,7 +23,6 @@ def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
     """A phone's window, in which the lab is near."""
     with browsers["webgl"].new_context(viewport={"width": 390, "height": 800}) as context:
         page, said = watched(context)
-        page.clock.install()
         page.goto(base + PAGE)
         lab(page, EDITED)
         yield page
@@ -101,7 +98,6 @@ def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:
     text.fill(endless)
     press(found, "Compile and run")
     expect(found).to_have_attribute("data-state", "loading")
-    page.clock.run_for(PATIENCE)
     expect(found.get_by_role("alert").filter(has_text="too long")).to_be_visible()
     expect(found).to_have_attribute("data-state", "ended")
     text.fill(endless.replace("0 0 0.02", "0 0 0.021"))

@@ -264,7 +264,7 @@ def test_last_report_stands_where_the_store_opens_after_it(
 def test_browser_that_lets_no_worker_keep_files_is_no_matter(
     opened: Callable[[str], Page], host: Host
 ) -> None:
-    page = opened(f"{host.url}404.html")
+    page = opened("about:blank")
     page.clock.install()
     page.goto(host.url + FIRST)
     page.clock.run_for(10_000)

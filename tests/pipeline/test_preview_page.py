@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from support.axe import violations
 from support.lab_page import comes
 from support.preview_page import LESSON, Open, lesson_page, see, texts
 from support.preview_process import serving
-from support.scratch_course import GOOD, Make
+from support.scratch_course import GOOD, ROOT, Make
 from support.static_host import Host
 
 pytestmark = pytest.mark.browser
@@ -233,11 +232,18 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
 
 
 def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> None:
-    """Where everything that it can show is shown at once."""
+    """Where everything that it can show is shown at once, light and dark."""
+    axe = (ROOT / "site/node_modules/axe-core/axe.min.js").read_text("utf-8")
+    rules = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice"]
     folder = make(GOOD.replace("3.14159\n```", "3\n```") + "`7`{out}\n", "[x](lesson:9.9)\n")
     with serving(folder) as preview:
         preview.heard("link-lesson")
         with Open(browser, preview, LESSON) as opened:
-            see(opened.page.get_by_role("button", name="Accept this output"))
-            see(opened.page.get_by_role("region", name="Problems"))
-            assert violations(opened.page) == []
+            page = opened.page
+            see(page.get_by_role("button", name="Accept this output"))
+            see(page.get_by_role("region", name="Problems"))
+            page.evaluate(axe)
+            for scheme in ("light", "dark"):
+                page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+                found = page.evaluate("rules => axe.run({ runOnly: rules })", rules)
+                assert [(v["id"], v["nodes"][0]["html"]) for v in found["violations"]] == []
