@@ -23,7 +23,7 @@ def options_of(arguments: argparse.Namespace) -> Options:
     store = None
     if hasattr(arguments, "cache"):
         fresh = arguments.no_cache
-        store = open_store(root, arguments.cache, arguments.cache_size, os.environ, fresh=fresh)
+        store = open_store(root, arguments.cache, arguments.cache_size, fresh=fresh)
     sandbox = None
     if getattr(arguments, "sandbox", False):
         from coursebuild.core.run.sandbox import find_sandbox

@@ -42,4 +42,4 @@ def run(arguments: argparse.Namespace) -> int:
 
         return build(options, Path(out))
 
-    return run_unless_unchanged(arguments, "build", ("examples", out), work)
+    return run_unless_unchanged(arguments, ("examples", out), work)

@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.format != "text" or parts or more:
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
-    return run_unless_unchanged(arguments, "check", ("examples",), work)
+    return run_unless_unchanged(arguments, ("examples",), work)
 
 
 def _against(arguments: argparse.Namespace) -> int:

@@ -64,7 +64,6 @@ def said_before(directory: str | None, words: Sequence[str]) -> str | None:
 
 def run_unless_unchanged(
     arguments: argparse.Namespace,
-    name: str,
     made: tuple[str, ...],
     work: Callable[[Options], Report],
 ) -> int:
@@ -84,7 +83,7 @@ def run_unless_unchanged(
         from coursebuild.core.registry import package_paths
         from coursebuild.report import unchanged_report
 
-        remark = f"nothing has changed since the last {name}"
+        remark = f"nothing has changed since the last {arguments.words[0]}"
         said = report_text(unchanged_report(report, remark), options)
         watcher.keep(said, (*report.depends, *package_paths()), made)
     return status

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -96,14 +95,7 @@ def check_path(root: Path) -> None:
         raise UsageError(f"the path of the course is not UTF-8: {shown}") from None
 
 
-def open_store(
-    root: Path,
-    where: str | None,
-    size: str | None,
-    environment: Mapping[str, str],
-    *,
-    fresh: bool = False,
-) -> Memo:
+def open_store(root: Path, where: str | None, size: str | None, *, fresh: bool = False) -> Memo:
     """The results made before: here, and at a shared place.
 
     What the command line does not say (`None`), the environment may: `COURSEBUILD_CACHE` a place,
@@ -115,10 +107,10 @@ def open_store(
     """
     said = "--cache-size"
     if size is None:
-        said, size = "COURSEBUILD_CACHE_SIZE", environment.get("COURSEBUILD_CACHE_SIZE") or None
+        said, size = "COURSEBUILD_CACHE_SIZE", os.environ.get("COURSEBUILD_CACHE_SIZE") or None
     limit = SIZE if size is None else _size(said, size)
     if where is None:
-        where = environment.get("COURSEBUILD_CACHE") or None
+        where = os.environ.get("COURSEBUILD_CACHE") or None
     elif not where:
         raise UsageError("--cache names no place")
     shared = None
@@ -126,7 +118,7 @@ def open_store(
         from coursebuild.core.engine.shared_cache import shared_cache
 
         try:
-            key = environment.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")
+            key = os.environ.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")
             shared = shared_cache(where, key)
         except EffectError as error:
             raise UsageError(error.message, help=error.help) from None

@@ -200,6 +200,9 @@ def test_explain_lessons_and_files_by_any_of_their_names(course: Folder) -> None
     done = course.main("explain", "data.txt", cwd=course.root / "models")
     assert (done.status, done.out.startswith("models/data.txt\n")) == (0, True)
     assert course.tree() == before, "nothing is written"
+    course.write("examples/pathlib.py", "")  # which scripts would import from now on
+    assert "  examples/reads.py would run again\n" in explained(course, "examples/pathlib.py")
+    (course.root / "examples/pathlib.py").unlink()
     course.write("models/data.txt", "changed")
     for name in ("1.1", "one", "1.1-one", "content/lessons/1.1-one.md"):
         assert explained(course, name) == (

@@ -119,15 +119,14 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     assert drawn(course.folder) == {lesson("1.3")}
     text = course.folder.text("content/course.toml")
     course.folder.write("content/course.toml", text.replace('"Tested"', '"Renamed"'))
-    for path, page in build(course).items():
+    assert course.folder.main("build", "--quiet").status == 0  # over the site of before
+    for path, page in course.folder.tree("public").items():
         if path.endswith(".html"):
             assert b"Renamed" in page and b"Tested" not in page
 
 
 JUNK = (
-    b"",
     b"null",
-    b"[[1]]",
     msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
     pickle.dumps(Trap()),
 )
@@ -214,7 +213,7 @@ def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path)
     sites = []
     for jobs in ("1", "3"):
         course = Course(Folder(tmp_path / f"jobs {jobs}"))
-        for n in range(6, 22):
+        for n in range(6, 14):
             id = f"1.{n}"
             course.ids.append(id)
             course.titles[id] = f"Title {n}"

@@ -41,7 +41,9 @@ def test_with_times_no_part_is_much_longer_than_it_must_be(
     assert max(loads) <= sum(seconds.values()) / count + (1 - 1 / count) * longest + 1e-9
 
 
-def test_a_name_without_a_time_counts_as_the_usual_one() -> None:
+def test_parts_take_equally_long_and_a_name_without_a_time_counts_as_the_usual_one() -> None:
+    parts = split("abcd", 2, {"a": 9.0, "b": 3.0, "c": 3.0, "d": 3.0})
+    assert [name for name in "abcd" if parts[name] == parts["a"]] == ["a"]
     parts = split(["a", "b", "new"], 2, {"a": 10.0, "b": 1.0})
     assert parts["b"] != parts["a"]
     assert parts["new"] != parts["a"] or parts["b"] != parts["new"]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -68,9 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("import takes no -C: the new course's folder is named by --out")
     source = Path(arguments.folder)
     out = Path(arguments.out or source.resolve().name).absolute()
-    store = open_store(
-        out, arguments.cache, arguments.cache_size, os.environ, fresh=arguments.no_cache
-    )
+    store = open_store(out, arguments.cache, arguments.cache_size, fresh=arguments.no_cache)
     options = Options(out, arguments.jobs or available_cores(), arguments.quiet, store)
     converted = convert(source)
     write_course(converted, out, source)
