@@ -151,16 +151,16 @@ def _languages() -> frozenset[str]:
 
 
 def _fence(segment: Segment, context: LessonContext) -> str:
-    kind, text = segment.head.partition(" ")[0], segment.text
+    head, text = segment.head, segment.text
+    kind = head.partition(" ")[0]
     if kind == "lab" and context.camera_is_position:
         text = _CAMERA.sub(_directed, text)
-    if kind in _KNOWN_FENCES:
-        return f"{segment.mark}{segment.head}\n{text}\n{segment.mark}"
-    name = segment.head.strip("{}. ").partition(" ")[0].rstrip(",}")
-    if name != "json" and _is_json(text):
-        context.leave(segment.place, f"a block `{name}`, which is shown as JSON")
-        name = "json"
-    return fence(name, text)
+    if kind not in _KNOWN_FENCES:
+        head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
+        if head != "json" and _is_json(text):
+            context.leave(segment.place, f"a block `{head}`, which is shown as JSON")
+            head = "json"
+    return fence(head, text)
 
 
 def _is_json(text: str) -> bool:

@@ -27,8 +27,8 @@ from coursebuild.features.importer.values import (
 
 _NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "code_of_conduct")
 _FIRST = ("index", "intro", "introduction", "about")
-
-
+_TITLED = ((), ("project",), ("book",), ("website",))
+"""Where settings have the title of the course."""
 _LISTS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
 _FILES = ("file", "href", "part")
 _TITLES = ("caption", "title", "section", "text", "part")
@@ -43,14 +43,16 @@ def read_contents(files: Files, folder: str) -> SourceCourse:
         UsageError: there is nothing to import.
     """
     names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
-    settings = [_settings(name, files) for name in names]
-    title = next((t for s in settings for t in [_title(s)] if t), "")
+    myst, quarto, _, mkdocs = settings = [_settings(name, files) for name in names]
+    titles = [_at(one, *path, "title") for one in settings for path in _TITLED]
+    titles.append(_at(mkdocs, "site_name"))
+    title = next((" ".join(one.split()) for one in titles if isinstance(one, str)), "")
     found = [
         *_parts(_settings("_toc.yml", files), files),
-        *_parts(settings[0].get("project"), files),
-        *_parts((settings[1].get("book") or {}).get("chapters"), files),
-        *_parts((settings[1].get("website") or {}).get("sidebar"), files),
-        *_nav(settings[3].get("nav"), str(settings[3].get("docs_dir", "docs")), files),
+        *_parts(_at(myst, "project"), files),
+        *_parts(_at(quarto, "book", "chapters"), files),
+        *_parts(_at(quarto, "website", "sidebar"), files),
+        *_nav(_at(mkdocs, "nav"), str(_at(mkdocs, "docs_dir") or "docs"), files),
     ] or [*_by_folder(files)]
     if not found:
         raise UsageError(
@@ -73,13 +75,11 @@ def _settings(name: str, files: Files) -> Mapping[str, Any]:
     return value if isinstance(value, dict) else {"chapters": value}
 
 
-def _title(settings: Mapping[str, Any]) -> str:
-    for where in (settings, *(settings.get(key) for key in ("project", "book", "website"))):
-        if isinstance(where, Mapping):
-            title = where.get("title", where.get("site_name"))
-            if isinstance(title, str):
-                return " ".join(title.split())
-    return ""
+def _at(settings: object, *path: str) -> object:
+    """What stands under a key of what stands under another; `None` where nothing does."""
+    for key in path:
+        settings = settings.get(key) if isinstance(settings, Mapping) else None
+    return settings
 
 
 def _parts(value: object, files: Files) -> Iterator[SourceLesson | SourceLevel]:

@@ -89,6 +89,7 @@ def test_folder_that_cannot_be_imported_is_refused(
         ("one.ipynb", '{"cells": 7}', "one.ipynb is no notebook of format 4"),
         ("one.ipynb", '{"cells": [7]}', "one.ipynb is no notebook of format 4"),
         ("_toc.yml", "a: [", "_toc.yml is no YAML"),
+        ("_quarto.yml", "book: 7\nwebsite: [x]", nothing),
     ]:
         (course / name).write_text(text)
         assert refused(capsys, "old") == f"coursebuild: {message}\n", name
@@ -147,6 +148,7 @@ REWRITTEN = {
     ),
     "```mermaid\ngraph LR\n```": "```mermaid\ngraph LR\n```",
     "~~~js\n1\n~~~": "```js\n1\n```",
+    "~~~text\n```\n~~~": "````text\n```\n````",
     "an open fence\n\n```text\nto the end": "an open fence\n\n```text\nto the end\n```",
 }
 
