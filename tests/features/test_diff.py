@@ -10,8 +10,6 @@ import pytest
 from support.scratch_course import Folder, block
 from support.workflows import commit, git
 
-pytestmark = pytest.mark.site
-
 LAB = """
 ```lab simlab
 {

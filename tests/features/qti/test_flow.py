@@ -42,37 +42,19 @@ def flow() -> Flow:
 
 def item(flow: Flow, html: str) -> bytes:
     """An item in which a text stands wherever one may stand."""
-    blocks = lambda: flow.blocks(html)  # noqa: E731
-    choice = element(
-        "choiceInteraction",
-        {"responseIdentifier": "RESPONSE", "shuffle": "false", "maxChoices": "1"},
-        element("simpleChoice", {"identifier": "A"}, *flow.line(html)),
-    )
-    response = {"identifier": "RESPONSE", "cardinality": "single", "baseType": "identifier"}
-    feedback = {"outcomeIdentifier": "F", "identifier": "A", "showHide": "show"}
-    root = element(
-        "assessmentItem",
-        {
-            "xmlns": QTI,
-            "xmlns:m": MATHML,
-            "identifier": "a",
-            "title": html,
-            "adaptive": "false",
-            "timeDependent": "false",
-        },
-        element("responseDeclaration", response),
-        element("outcomeDeclaration", response | {"identifier": "F"}),
-        element(
-            "itemBody",
-            {},
-            *blocks(),
-            element("infoControl", {"title": "Hint"}, *blocks()),
-            element("rubricBlock", {"view": "scorer"}, *blocks()),
-            choice,
-        ),
-        element("modalFeedback", feedback, *blocks()),
-    )
-    return markup([root]).encode()
+    blocks = [markup(flow.blocks(html)) for _ in range(4)]
+    choice = markup([element("simpleChoice", {"identifier": "A"}, *flow.line(html))])
+    return f"""\
+<assessmentItem xmlns="{QTI}" xmlns:m="{MATHML}" identifier="a" title="t" adaptive="false"
+ timeDependent="false">
+<responseDeclaration identifier="RESPONSE" cardinality="single" baseType="identifier"/>
+<outcomeDeclaration identifier="F" cardinality="single" baseType="identifier"/>
+<itemBody>{blocks[0]}<infoControl title="Hint">{blocks[1]}</infoControl>
+<rubricBlock view="scorer">{blocks[2]}</rubricBlock>
+<choiceInteraction responseIdentifier="RESPONSE" shuffle="false" maxChoices="1">{choice}
+</choiceInteraction></itemBody>
+<modalFeedback outcomeIdentifier="F" identifier="A" showHide="show">{blocks[3]}</modalFeedback>
+</assessmentItem>""".encode()
 
 
 def check(html: str) -> Flow:
