@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.marks import fence, quoted
+from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.features.importer.cells import shown_text
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.prose import displayed, rewrite
@@ -30,7 +31,6 @@ _CALLOUTS = {
 }
 _TITLED = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
 """Directives whose argument is a title, and not the first line."""
-_KNOWN_FENCES = ("python", "text", "io", "lab", "quiz", "mjcf", "bench")
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
 _TITLE = re.compile(r"title=(?:\"([^\"]*)\"|'([^']*)')")
 _OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
@@ -155,7 +155,7 @@ def _fence(segment: Segment, context: LessonContext) -> str:
     kind = head.partition(" ")[0]
     if kind == "lab" and context.camera_is_position:
         text = _CAMERA.sub(_directed, text)
-    if kind not in _KNOWN_FENCES:
+    if kind not in (*CORE_FENCES, *fence_names()):
         head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
         if head != "json" and _is_json(text):
             context.leave(segment.place, f"a block `{head}`, which is shown as JSON")
