@@ -38,11 +38,10 @@ class LabCode(Struct, frozen=True):
     """A piece of lab code."""
 
     entry: Entry
-    form: Literal["statements", "expression", "target"]
-    """Statements are run, an expression gives a value, a target is assigned to."""
+    form: Literal["statements", "setter", "expression", "target"]
+    """Statements are run, a setter's read `value`; an expression gives a value; a target is
+    assigned to."""
     code: str
-    takes_value: bool = False
-    """Whether it reads `value`."""
 
     @property
     def function(self) -> str:
@@ -53,9 +52,10 @@ class LabCode(Struct, frozen=True):
                 return f"({_NAMES}, value) => {{ ({self.code}\n) = value;\n}}"
             case "expression":
                 return f"({_NAMES}) => ({self.code}\n)"
+            case "setter":
+                return f"({_NAMES}, value) => {{ {self.code}\n}}"
             case "statements":
-                value = ", value" if self.takes_value else ""
-                return f"({_NAMES}{value}) => {{ {self.code}\n}}"
+                return f"({_NAMES}) => {{ {self.code}\n}}"
 
 
 class LabModule(Struct, frozen=True):
@@ -85,9 +85,9 @@ def _pieces(lab: Lab) -> Iterator[LabCode]:
             yield LabCode(("controls", i, "run"), "statements", control.run)
             continue
         if control.set is not None:
-            yield LabCode(("controls", i, "set"), "target", control.set, True)
+            yield LabCode(("controls", i, "set"), "target", control.set)
         if control.apply is not None:
-            yield LabCode(("controls", i, "apply"), "statements", control.apply, True)
+            yield LabCode(("controls", i, "apply"), "setter", control.apply)
     for i, readout in enumerate(lab.fields.readouts):
         yield LabCode(("readouts", i, "expr"), "expression", readout.expr)
     for i, plot in enumerate(lab.fields.plots):
@@ -141,24 +141,21 @@ def _control(functions: Mapping[Entry, str], i: int, control: Control) -> str:
 
 # --- data
 
+_FIELDS = (
+    *("title", "model", "key", "height", "camera", "toggles", "overlays", "forceScale"),
+    *("autoplay", "stopAt", "trail", "seed"),
+)
+"""What is said of a lab as the author says it, but that overlays become a list."""
+_PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")
+"""The same of a plot."""
+
 
 def config_json(lab: Lab, name: str) -> str:
     """What the page, the worker and the trial need to know besides code, as JSON."""
     fields = lab.fields
-    config: dict[str, Any] = {
-        "id": name,
-        "title": fields.title,
-        "model": fields.model,
-        "key": fields.key,
-        "height": fields.height,
-        "camera": fields.camera,
-        "toggles": fields.toggles,
+    config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
+    config |= {
         "overlays": _overlays(fields),
-        "forceScale": fields.forceScale,
-        "autoplay": fields.autoplay,
-        "stopAt": fields.stopAt,
-        "trail": fields.trail,
-        "seed": fields.seed,
         "controls": [_control_data(control) for control in fields.controls],
         "readouts": [{"label": r.label, "digits": r.digits} for r in fields.readouts],
         "plots": [_plot_data(plot) for plot in fields.plots],
@@ -209,13 +206,5 @@ def _control_data(control: Control) -> dict[str, Any]:
 
 
 def _plot_data(plot: Plot) -> dict[str, Any]:
-    return {
-        "ylabel": plot.ylabel,
-        "xlabel": plot.xlabel,
-        "window": plot.window,
-        "ymin": plot.ymin,
-        "ymax": plot.ymax,
-        "height": plot.height,
-        "refLines": plot.refLines,
-        "traces": [{"label": t.label, "dash": t.dash} for t in plot.traces],
-    }
+    traces = [{"label": trace.label, "dash": trace.dash} for trace in plot.traces]
+    return {name: getattr(plot, name) for name in _PLOT} | {"traces": traces}

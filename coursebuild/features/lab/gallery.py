@@ -75,7 +75,7 @@ def draw_model(renderer: Renderer, view: LabView) -> Markup:
         lab=view,
         docked=False,
         opens_page=True,
-        paper=None,
+        address="",
         source="",
         note="",
         goal="",

@@ -5,7 +5,6 @@ Entry points: `lab_trials(course)`, `trial_inputs(trial)`.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator
 from typing import Any
@@ -15,10 +14,10 @@ from coursebuild.core.model import Course
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.extract import owners
+from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab
-from coursebuild.features.lab.engines.files import engine_digest
-from coursebuild.features.lab.engines.native import native_digest
+from coursebuild.features.lab.engines.files import engine_digest, lab_digest
 from coursebuild.features.lab.gallery import own_labs
 from coursebuild.features.lab.model import TRIED, Lab
 
@@ -47,16 +46,15 @@ def trial_inputs(trial: Trial) -> Inputs | None:
 
 def inputs_of(lab: Lab, module: LabModule) -> Inputs:
     """What the trial of a lab depends on besides the files of its model."""
-    own = [
+    text = key_of(
         json.dumps(tried_data(module)),
         module.literal,
         f"{lab.verify.seconds}/{lab.verify.rtol is None}",
-    ]
-    own.append(lab.xml.text if lab.xml is not None else f"models/{lab.fields.model}.xml")
-    text = hashlib.sha256("\0".join(own).encode()).hexdigest()
+        lab.xml.text if lab.xml is not None else f"models/{lab.fields.model}.xml",
+    )
     around = (
         ("MuJoCo", engine_version()),
-        ("how a lab is repeated natively", native_digest()[:12]),
+        ("how a lab is repeated natively", lab_digest("engines/native_worker.py")[:12]),
         ("the browser's engine and its trial", engine_digest()[:12]),
     )
     return Inputs(f"lab {module.name}", text, (), SECONDS, (), around)

@@ -23,24 +23,15 @@ class UntranslatableError(Exception):
     """JavaScript that has no counterpart in Python here; the text says what."""
 
 
+def refusal(node: Node, what: str = "") -> UntranslatableError:
+    """The error of a piece of code, named by its first line."""
+    return UntranslatableError(f"{what}`{text_of(node).splitlines()[0]}`")
+
+
 _ESCAPE = re.compile(
     r"\\(?:u\{([0-9a-fA-F]+)\}|u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|([^ux1-9\r\n\u2028\u2029]))"
 )
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v", "0": "\0"}
-
-
-_KNOWN = frozenset(
-    """
-        program comment expression_statement lexical_declaration variable_declarator if_statement
-        else_clause while_statement for_statement statement_block empty_statement break_statement
-        continue_statement return_statement assignment_expression augmented_assignment_expression
-        update_expression sequence_expression parenthesized_expression unary_expression
-        binary_expression ternary_expression member_expression subscript_expression call_expression
-        arguments spread_element array identifier property_identifier number string string_fragment
-        escape_sequence template_string template_substitution true false null
-    """.split()
-)
-"""Kinds of nodes that have a counterpart in Python, at least somewhere."""
 
 
 @functools.cache
@@ -71,11 +62,6 @@ def parse_statements(code: str) -> list[Node]:
     root = parse(code)
     if root.has_error:
         raise UntranslatableError("code that cannot be read")
-    for node in walk(root):
-        if node.type not in _KNOWN:
-            # Named by what makes it what it is: `=>`, `new`, `switch`.
-            signs = (child.type for child in node.children if not child.is_named)
-            raise UntranslatableError(f"`{next(signs, text_of(node))}`")
     return children(root)
 
 

@@ -5,45 +5,29 @@ Entry points: `model_of_lab`, `model_of_course`, `saved_model`.
 
 from __future__ import annotations
 
-from msgspec import Struct
-
 from coursebuild.core.features import TrialContext
-from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.run.model_memory import model_key
+from coursebuild.core.text.source import Source
 from coursebuild.features.lab.engines.native import NativeEngine
 from coursebuild.features.lab.model import Lab
 
 
-class LabModel(Struct, frozen=True):
-    """A lab's model as text."""
-
-    path: str
-    """Where it stands, or would."""
-    text: str
-    files: tuple[str, ...]
-    """Other files that it may consist of."""
-
-
-def model_of_lab(context: TrialContext, lab: Lab) -> LabModel | None:
+def model_of_lab(context: TrialContext, lab: Lab) -> Source | None:
     """A lab's model; `None` for one that does not compile, as is told already."""
     if lab.xml is not None:
-        path = "models/.lab.xml"
-        return LabModel(path, lab.xml.text, model_files(context.root, path, lab.xml.text))
+        return Source("models/.lab.xml", lab.xml.text)
     compiled = context.models.get(lab.fields.model or "")
     if compiled is None or compiled.facts is None:
         return None
     return model_of_course(context, lab.fields.model or "")
 
 
-def model_of_course(context: TrialContext, name: str) -> LabModel | None:
+def model_of_course(context: TrialContext, name: str) -> Source | None:
     """A model of the course; `None` where there is none of this name."""
-    source = next((m.source for m in context.course.models if m.name == name), None)
-    if source is None:
-        return None
-    return LabModel(source.path, source.text, model_files(context.root, source.path, source.text))
+    return next((m.source for m in context.course.models if m.name == name), None)
 
 
-def saved_model(context: TrialContext, native: NativeEngine, model: LabModel) -> bytes:
+def saved_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
     """A model as an MJB file, from the store where nothing that it is made of has changed."""
     store, key = context.memory.store, model_key(context.root, model.path, model.text)
     saved = store.get("mjb", key, bytes)

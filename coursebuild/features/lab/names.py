@@ -56,7 +56,8 @@ def _references(code: Excerpt) -> Iterator[NamedPart]:
         parts = dotted_names(node) if node.type == "member_expression" else ()
         path = tuple(map(text_of, parts))
         outer = node.parent
-        if len(path) < 2 or path[0] in (*own, *_FREE) or _is_part(node, outer):
+        goes_on = outer is not None and outer.type == "member_expression"
+        if len(path) < 2 or path[0] in (*own, *_FREE) or goes_on:
             continue
         places = tuple(map(place, parts))
         index = outer.child_by_field_name("index") if outer is not None else None
@@ -74,11 +75,6 @@ def _declared(node: Node) -> Iterator[Node]:
         child = node.child_by_field_name(field)
         if child is not None and child.type == "identifier":
             yield child
-
-
-def _is_part(node: Node, outer: Node | None) -> bool:
-    """Whether a name goes on behind a dot."""
-    return outer is not None and outer.type == "member_expression"
 
 
 def name_diagnostics(

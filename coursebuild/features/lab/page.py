@@ -52,16 +52,6 @@ class RecordedView(Struct, frozen=True):
     proven: str
 
 
-class PaperView(Struct, frozen=True):
-    """What leads from paper to the lab."""
-
-    code: Markup
-    """A QR code of the address."""
-    address: str
-    text: str
-    """The address as one types it."""
-
-
 class PlotView(Struct, frozen=True):
     """A plot: its axes and the lines in it."""
 
@@ -94,16 +84,20 @@ class LabView(Struct, frozen=True):
 
 def draw_lab(page: PageContext, block: Lab) -> Markup:
     """A lab in its static form."""
-    live, model = shown_lab(page, block), block.fields.model
-    view = lab_view(page.renderer.words, page.place, block, live, page.shown.engine)
+    live, model, words = shown_lab(page, block), block.fields.model, page.renderer.words
+    view = lab_view(words, page.place, block, live, page.shown.engine)
     if model is not None:
         view = replace(view, model_href=page.href(ModelTarget(model)))
+    address = ""  # from paper to the lab, where it is known where the site will stand
+    if live is not None and page.shown.address:
+        address = f"{page.shown.address}#{quote(live.name)}"
     return page.template(
         "lab/lab.html",
         lab=replace(view, start=start_name(page, block)),
         docked=block.fields.dock,
         opens_page=page.document.blocks[:1] == (block,),
-        paper=_paper(page, live.name) if live is not None else None,
+        address=address,
+        code=qr_svg(address, words("lab.code")) if address else "",
         goal=page.inlines(block.goal),
         goal_key=(block.progress_keys() or ("",))[0],
         source=_source(page, block),
@@ -118,7 +112,7 @@ def lab_view(
     fields = block.fields
     return LabView(
         kind=block.kind,
-        title=fields.title or words("lab.untitled"),
+        title=title_of(words, block),
         key=live.name if live is not None else "",
         config=place.href(live.config) if live is not None else "",
         script=place.href(live.script) if live is not None else "",
@@ -129,7 +123,7 @@ def lab_view(
         controls=tuple(control_view(words, control) for control in fields.controls),
         readouts=tuple(readout.label for readout in fields.readouts),
         plots=tuple(plot_view(words, block, index) for index in range(len(fields.plots))),
-        overlays=tuple(overlay_name(words, name) for name in fields.toggles),
+        overlays=tuple(words(f"overlay.{name}") for name in fields.toggles),
         recorded=_recorded(words, place, block, live, engine),
     )
 
@@ -170,15 +164,6 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
         reader.add("code", lab.xml.text)
 
 
-def _paper(page: PageContext, name: str) -> PaperView | None:
-    """The way from paper to a lab; `None` where nobody knows where the site will stand."""
-    if not page.shown.address:
-        return None
-    address = f"{page.shown.address}#{quote(name)}"
-    code = qr_svg(address, page.renderer.words("lab.code"))
-    return PaperView(code, address, address.partition("://")[2])
-
-
 def _recorded(
     words: Strings, place: Place, block: Lab, live: ShownLab | None, engine: str
 ) -> RecordedView | None:
@@ -190,22 +175,13 @@ def _recorded(
         place.href(live.picture),
         record.size[0],
         record.size[1],
-        words(
-            "lab.picture",
-            title=block.fields.title or words("lab.untitled"),
-            t=number(record.time, 4),
-        ),
+        words("lab.picture", title=title_of(words, block), t=number(record.time, 4)),
         round(record.scale[1], 1),
         f"{number(record.scale[0])} m",
         record.readouts,
         tuple(Markup(svg) for svg in record.plots),
         words("lab.at", t=seconds(record.end)),
-        words(
-            "lab.proven",
-            engine=engine,
-            tried=str(live.tried),
-            parity=live.parity,
-        ),
+        words("lab.proven", engine=engine, tried=str(live.tried), parity=live.parity),
     )
 
 
@@ -214,9 +190,9 @@ def seconds(value: float) -> str:
     return number(round(value, 3))
 
 
-def title_of(page: PageContext, block: Lab) -> str:
+def title_of(words: Strings, block: Lab) -> str:
     """The title, or what a lab without one is called."""
-    return block.fields.title or page.renderer.words("lab.untitled")
+    return block.fields.title or words("lab.untitled")
 
 
 def start_name(page: PageContext, block: Lab) -> str | None:
@@ -259,8 +235,3 @@ def plot_view(words: Strings, block: Lab, index: int) -> PlotView:
     lines = ((line.label, number(line.y)) for line in plot.refLines)
     marks = tuple(f"{label} ({y})" if label else y for label, y in lines)
     return PlotView(title, tuple(trace.label for trace in plot.traces), marks)
-
-
-def overlay_name(words: Strings, name: str) -> str:
-    """What an overlay is called."""
-    return words(f"overlay.{name}") if words.has(f"overlay.{name}") else name

@@ -16,7 +16,6 @@ where nothing has changed neither engine is started.
 from __future__ import annotations
 
 import functools
-import hashlib
 import json
 import time
 from collections.abc import Iterator, Sequence
@@ -29,18 +28,22 @@ from coursebuild.core.features import Trial, TrialContext, Tried
 from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.run.child import MEMORY
 from coursebuild.core.run.dependencies import Inputs
+from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source, key_of
+from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
 from coursebuild.features.lab.custom import custom_lab
 from coursebuild.features.lab.engines.browser import LabEngine
+from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from coursebuild.features.lab.export import difference as export_check
 from coursebuild.features.lab.export.trial import LabExport, exported
 from coursebuild.features.lab.files import LabOutput, LabRecord
 from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
 from coursebuild.features.lab.model import MJCF, TRIED, Lab
-from coursebuild.features.lab.models import LabModel, model_of_lab, saved_model
+from coursebuild.features.lab.models import model_of_lab, saved_model
 from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
@@ -147,7 +150,7 @@ class _Attempt(Struct, frozen=True):
     seconds: float
     trial: Trial
     lab: Lab
-    model: LabModel
+    model: Source
 
     def run(self) -> tuple[TrialResult | None, list[Diagnostic]]:
         """What became of it, and what is wrong."""
@@ -172,10 +175,11 @@ class _Attempt(Struct, frozen=True):
         reply, parity = findings.reply, findings.parity
         found = [*findings.failures]
         offer = LabExport(None) if found else self._export(reply)
-        own = () if lab.xml is not None else (self.model.path,)
+        path, text = self.model.path, self.model.text
+        own = () if lab.xml is not None else (path,)
         self.context.memory.note_trial(
             inputs,
-            (*own, *self.model.files),
+            (*own, *model_files(self.context.root, path, text)),
             ok=not found,
             lasting=_is_lasting(reply),
             seconds=reply.seconds,
@@ -311,12 +315,9 @@ class _Attempt(Struct, frozen=True):
         """The start of the main run, drawn."""
         from coursebuild.features.lab.picture.static import draw_picture
 
-        text = f"{key}\0{self.lab.fields.height}\0{_drawing_digest()}"
-        return self.context.memory.store.get_or_create(
-            "pictures",
-            hashlib.sha256(text.encode()).hexdigest(),
-            lambda: draw_picture(self.lab, main),
-        )
+        drawn = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
+        store = self.context.memory.store
+        return store.get_or_create("pictures", drawn, lambda: draw_picture(self.lab, main))
 
 
 def _framed(config: str, main: MainRun | None) -> str:
@@ -338,15 +339,7 @@ def _is_lasting(reply: TrialReply) -> bool:
 
 def _key(inputs: Inputs, mjb: bytes) -> str:
     """What the reply of a trial is kept under."""
-    parts = (inputs.text, *(value for _, value in inputs.around))
-    return hashlib.sha256("\0".join(parts).encode() + mjb).hexdigest()
-
-
-@functools.lru_cache(maxsize=1)
-def _drawing_digest() -> str:
-    """A hash of how pictures are drawn."""
-    files = sorted(Path(__file__).with_name("picture").glob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+    return fingerprint((inputs.text, inputs.around, mjb))
 
 
 def _parity(reply: TrialReply) -> Parity | None:

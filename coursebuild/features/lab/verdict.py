@@ -107,6 +107,7 @@ _PYTHON_HELP = (
 )
 _HELP = {
     "statements": "",
+    "setter": "",
     "expression": "an expression has a value and no `;`, as in `data.qpos[0]`",
     "target": "it must be something that can be assigned to, as `model.opt.timestep`",
 }

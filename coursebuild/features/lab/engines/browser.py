@@ -62,10 +62,7 @@ class LabEngine:
     def mistakes(self, pieces: Sequence[LabCode]) -> list[str | None]:
         """For each piece of code: why it cannot be part of a lab, or `None`."""
         isolate = self._ready()
-        asked = [
-            {"code": p.code, "form": p.form, "text": p.function, "takesValue": p.takes_value}
-            for p in pieces
-        ]
+        asked = [{"code": p.code, "form": p.form, "text": p.function} for p in pieces]
         reply = isolate.call("parsePieces", json.dumps(asked), _START_SECONDS)
         found: list[str | None] = json.loads(reply)
         return found

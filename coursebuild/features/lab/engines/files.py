@@ -1,7 +1,7 @@
 """The files that a trial runs besides the lab itself.
 
-Entry points: `wasm_path`, `script_path`, `engine_digest`. They are apart from `browser`, as who
-only asks for the digest needs no V8.
+Entry points: `wasm_path`, `script_path`, `engine_digest`, `lab_digest`. They are apart from
+`browser`, as who only asks for a digest needs no V8.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import functools
 import hashlib
 from pathlib import Path
 
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.resources import assets_dir
 
 
@@ -23,9 +24,15 @@ def script_path() -> Path:
     return assets_dir() / "js" / "lab-trial.js"
 
 
-@functools.lru_cache(maxsize=1)
+@functools.cache
 def engine_digest() -> str:
     """A hash of both."""
     digest = hashlib.sha256(wasm_path().read_bytes())
     digest.update(script_path().read_bytes())
     return digest.hexdigest()
+
+
+@functools.cache
+def lab_digest(*parts: str) -> str:
+    """A hash of parts of this feature's code, such as `picture` or `engines/native_worker.py`."""
+    return code_digest(*(f"coursebuild/features/lab/{part}" for part in parts))

@@ -6,8 +6,6 @@ Entry point: `NativeEngine`, a context manager around a child process.
 from __future__ import annotations
 
 import base64
-import functools
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -78,9 +76,3 @@ class NativeEngine(JsonChild):
         if reply["error"]:
             raise NativeError(f"says: {reply['error'].strip()}")
         return reply
-
-
-@functools.lru_cache(maxsize=1)
-def native_digest() -> str:
-    """A hash of how a run is repeated and compared."""
-    return hashlib.sha256(Path(native_worker.__file__).read_bytes()).hexdigest()

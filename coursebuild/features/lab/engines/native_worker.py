@@ -85,10 +85,7 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
     for step in range(run["steps"]):
         writes.apply(step, data)
         mujoco.mj_step(model, data)
-        checksum = 0
-        for part in (data.qpos, data.qvel, data.act):
-            checksum = zlib.crc32(part.tobytes(), checksum)
-        if first is None and checksum != sums[step]:
+        if first is None and _checksum(data) != sums[step]:
             first = step + 1
         if first is None or (step + 1) % run["stride"] or step >= horizon:
             continue
@@ -103,6 +100,10 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
         "timestep": float(model.opt.timestep),
         "exact": _is_exact(mujoco, model),
     }
+
+
+def _checksum(data: Any) -> int:
+    return zlib.crc32(b"".join(part.tobytes() for part in (data.qpos, data.qvel, data.act)))
 
 
 def _is_exact(mujoco: Any, model: Any) -> bool:
@@ -172,10 +173,7 @@ def _observed(module: Any, near: int) -> dict[str, Any]:
         told["start"] = _shown(module, model, data, *rest)
         simulate(model, data, *rest)
         told["end"] = _shown(module, model, data, *rest)
-        checksum = 0
-        for part in (data.qpos, data.qvel, data.act):
-            checksum = zlib.crc32(part.tobytes(), checksum)
-        told["last"] = checksum
+        told["last"] = _checksum(data)
 
     module.step, module.simulate = counted, watched
     module.main()

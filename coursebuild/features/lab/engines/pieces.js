@@ -10,6 +10,7 @@
 const SEEN = ['model', 'data', 'mj', 'sim', 'ctx', 'lib']
 const BODIES = {
   statements: (code) => [code],
+  setter: (code) => [code],
   expression: (code) => [`return (${code}\n)`, `return [${code}\n]`],
   target: (code) => [`(${code}\n) = value`, `[${code}\n] = value`],
 }
@@ -20,8 +21,8 @@ const NOT_IN_MODULES = [
   [/<!--|^\s*-->/m, '`<!--` and `-->` begin a comment in some places only; put a space into it'],
 ]
 
-function mistake({ code, form, text, takesValue }) {
-  const names = takesValue ? [...SEEN, 'value'] : SEEN
+function mistake({ code, form, text }) {
+  const names = form === 'setter' || form === 'target' ? [...SEEN, 'value'] : SEEN
   try {
     for (const body of BODIES[form](code)) new Function(...names, `"use strict"; ${body}`)
     ;(0, eval)(`"use strict"; (${text})`)

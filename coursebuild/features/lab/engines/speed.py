@@ -5,21 +5,22 @@ Entry point: `real_time_factor`.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Any
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.v8 import StoppedError
 from coursebuild.core.text.source import Source
+from coursebuild.features.lab.compile import compile_lab
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
+from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.schema import SimLab
 
 _STEPS = 5000
 """Of a run, at most."""
 _RUNS = 8
 """The first of them compile; the fastest counts."""
-_LISTS = ("overlays", "controls", "readouts", "plots", "expect")
-_NOTHING = ("camera", "forceScale", "stopAt", "trail", "seed")
 
 
 def real_time_factor(
@@ -30,10 +31,11 @@ def real_time_factor(
     `run` is the simulated time and the timestep, s; each of several runs may take `seconds`.
     """
     duration, timestep = run
-    config: dict[str, Any] = {name: [] for name in _LISTS} | dict.fromkeys(_NOTHING)
+    place = source.span(0, 0)
+    module = compile_lab(Lab(place, SIMLAB, place, "", SimLab(key=key)), "speed")
     request = {
-        "config": {**config, "id": "speed", "title": "", "key": key, "autoplay": False},
-        "code": "({controls: [], readouts: [], plots: [], expect: []})",
+        "config": json.loads(module.config),
+        "code": module.literal,
         "seconds": min(duration, _STEPS * timestep),
         "parity": False,
     }

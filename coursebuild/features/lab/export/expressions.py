@@ -21,6 +21,7 @@ from coursebuild.features.lab.javascript import (
     children,
     dotted_name,
     field,
+    refusal,
     string_value,
     template_parts,
     text_of,
@@ -136,7 +137,7 @@ class Expressions:
                 )
                 return f"({first} if {self.part(node, 'condition')} else {second})"
             case _:
-                raise UntranslatableError(f"`{text_of(node)}`")
+                raise refusal(node)
 
     def binary(self, node: Node) -> str:
         """Two operands with an operator between them."""
@@ -189,7 +190,7 @@ class Expressions:
             return f"{self.part(node, 'object')}.size"
         if name in ("kinetic", "potential", "total") and not path:
             return f"{self.part(node, 'object')}.{name}"
-        raise UntranslatableError(f"`{'.'.join(path) or '.' + name}`")
+        raise refusal(node)
 
     def element(self, node: Node) -> str:
         """An element of an array; one with rows is counted through, as in JavaScript."""
@@ -241,7 +242,7 @@ class Expressions:
                 digits = self.all(given) or "0"
                 return f"format({self.part(function, 'object')}, '.{digits}f')"
             case _:
-                raise refused_call(path)
+                raise refusal(function, "a call of ")
 
 
 @functools.cache
@@ -315,8 +316,3 @@ def _is_text(node: Node) -> bool:
             return "member" in function.type and text_of(field(function, "property")) == "toFixed"
         case _:
             return False
-
-
-def refused_call(path: tuple[str, ...]) -> UntranslatableError:
-    """A call of something that has no counterpart."""
-    return UntranslatableError(f"a call of `{'.'.join(path)}`" if path else "a call")

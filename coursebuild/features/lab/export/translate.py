@@ -23,7 +23,6 @@ from coursebuild.features.lab.export.expressions import (
     engine_field,
     operator_of,
     python_name,
-    refused_call,
 )
 from coursebuild.features.lab.javascript import (
     UntranslatableError,
@@ -35,6 +34,7 @@ from coursebuild.features.lab.javascript import (
     field,
     parse_expression,
     parse_statements,
+    refusal,
     text_of,
     walk,
 )
@@ -133,7 +133,7 @@ class _Statements(Expressions):
             case "return_statement" if not (children(node) or self.given):
                 yield "return"
             case _:
-                raise UntranslatableError(f"`{text_of(node).splitlines()[0]}`")
+                raise refusal(node)
 
     def declaration(self, node: Node) -> str:
         """`name = value` of a `const` or `let`."""
@@ -193,7 +193,7 @@ class _Statements(Expressions):
             case "call_expression":
                 yield from self.call_statement(node)
             case _:
-                raise UntranslatableError("an expression that does nothing")
+                raise refusal(node)
 
     def target(self, node: Node) -> str:
         """What can be assigned to."""
@@ -208,12 +208,12 @@ class _Statements(Expressions):
                     return self.member(node)
             case _:
                 pass
-        raise UntranslatableError(f"an assignment to `{text_of(node)}`")
+        raise refusal(node, "an assignment to ")
 
     def call_statement(self, node: Node) -> Iterator[str]:
         """A call for what it does."""
         function, given = field(node, "function"), arguments(node)
-        match path := dotted_name(function):
+        match dotted_name(function):
             case ("sim", "play" | "pause") if self.button:
                 return
             case ("sim", "reset") if self.button:
@@ -231,7 +231,7 @@ class _Statements(Expressions):
             case "set" if len(given) in (1, 2):
                 yield self.set(self.part(function, "object"), *given)
             case _:
-                raise refused_call(path)
+                raise refusal(function, "a call of ")
 
     def set(self, array: str, values: Node, offset: Node | None = None) -> str:
         """`array.set(numbers, offset)`."""

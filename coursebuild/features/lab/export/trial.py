@@ -6,17 +6,15 @@ value that the page may put into it, is not offered.
 
 from __future__ import annotations
 
-import functools
-import hashlib
-import json
 from pathlib import Path
 
 from msgspec import Struct
-from msgspec.structs import asdict
 
 from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.model import Course
 from coursebuild.core.run.versions import engine_version
+from coursebuild.core.values import fingerprint
+from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from coursebuild.features.lab.export.difference import difference
 from coursebuild.features.lab.export.script import (
@@ -64,8 +62,8 @@ def exported(
     )
     # The model is in it by what the trial recorded.
     readouts = [picture["readouts"] for picture in main["pictures"]]
-    made_of = (_digest(), lab.config, asdict(metadata), main.get("recorded"), readouts)
-    key = hashlib.sha256(json.dumps(made_of).encode()).hexdigest()
+    code = lab_digest(".", "export/script.jinja")
+    key = fingerprint((code, lab.config, metadata, main.get("recorded"), readouts))
     store = context.memory.store
     found = store.get_value("exports", key, LabExport)
     if found is not None:
@@ -139,10 +137,3 @@ def _others(lab: Lab) -> list[dict[int, float | str]]:
             values = [value for _, value in control.options]
         found += [{**start, i: value} for value in values if value != start[i]]
     return found
-
-
-@functools.cache
-def _digest() -> str:
-    """A hash of how scripts are made, run and held against labs."""
-    files = sorted(file for file in Path(__file__).parents[1].rglob("*.*") if file.is_file())
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
