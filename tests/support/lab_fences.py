@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coursebuild.core.model import Block, Inline, Paragraph, Text
 from coursebuild.core.text.diagnostics import Parsed
-from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.text.source import Excerpt, Source
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.parse import parse_lab
 from support.positioned_nodes import shown
@@ -31,8 +31,3 @@ def parse(body: str, kind: str = "simlab") -> Parsed[Lab | None]:
 
 def told(body: str, kind: str = "simlab") -> list[str]:
     return shown(parse(body, kind).diagnostics)
-
-
-def text_of(span: Span | None) -> str:
-    assert span is not None
-    return span.text

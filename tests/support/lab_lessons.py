@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from support.scratch_course import GOOD, Folder
@@ -14,21 +15,17 @@ BALL = """<mujoco><worldbody><body name="ball" pos="0 0 1"><freejoint/><geom siz
 <site name="tip" pos="0.1 0 0"/></body></worldbody>
 <keyframe><key name="start" qpos="0 0 2 1 0 0 0"/></keyframe></mujoco>
 """
-CART = """<mujoco><worldbody><body name="cart"><joint name="slide" type="slide" axis="1 0 0"
-stiffness="1e5"/><geom size="0.1" mass="1"/></body></worldbody>
-<actuator><motor joint="slide"/></actuator></mujoco>
-"""
-SLIDER = '"min": 0, "max": 1, "value": 0.5'
 
 
 def fence(body: str) -> str:
-    return f"```lab simlab\n{body}\n```\n\n".replace("SLIDER", SLIDER)
+    return f"```lab simlab\n{body}\n```\n\n"
 
 
-def course(make: Make, *lessons: str) -> Folder:
-    folder = make(GOOD, *lessons)
+def course(root: Path, stores: Path, *lessons: str) -> Folder:
+    """A course of a good lesson and these, with the ball as a model."""
+    folder = Folder(root)
+    folder.fill([GOOD, *lessons], stores)
     folder.write("models/ball.xml", BALL)
-    folder.write("models/cart.xml", CART)
     return folder
 
 

@@ -14,6 +14,7 @@ from coursebuild.core.run.memory import Memory
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
+from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import compile_lab
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine
@@ -31,10 +32,15 @@ BALL = (
 def make_lab(text: str | None = None, /, **fields: Any) -> Lab:
     """The lab of a fence with this JSON, in the third line of a lesson."""
     body = text if text is not None else json.dumps({"xml": BALL, **fields}, ensure_ascii=False)
-    source = Source("content/lessons/4.2-x.md", f"Text.\n\n```lab simlab\n{body}\n```\n")
+    return lab_of(f"Text.\n\n```lab simlab\n{body}\n```\n")
+
+
+def lab_of(text: str) -> Lab:
+    """The one lab of a lesson."""
+    source = Source("content/lessons/4.2-x.md", text)
     parsed = parse_document(source, frozenset(), lesson=True)
     assert parsed.diagnostics == (), [d.message for d in parsed.diagnostics]
-    (lab,) = (block for block in parsed.value.blocks if isinstance(block, Lab))
+    (lab,) = labs_in((parsed.value,))
     return lab
 
 

@@ -26,12 +26,10 @@ FIELDS = ("n", "on", "v", "k")
     "code, python",
     [
         ("data.qvel[3] = 6; data.qvel[4] = .001", "data.qvel[3] = 6\ndata.qvel[4] = 0.001"),
-        ("mj.mj_resetData(model, data)", "mujoco.mj_resetData(model, data)"),
         ("data.qpos[0] = data.qvel[1] = 0", "data.qpos[0] = data.qvel[1] = 0"),
         ("ctx.n = 1, ctx.n--; ; // end", "ctx.n = 1\nctx.n -= 1"),
         ("data.qvel[0] -= value * data.qvel[0]", "data.qvel[0] -= GAIN * data.qvel[0]"),
         ("ctx.n %= 3", "ctx.n = np.fmod(ctx.n, 3)"),
-        ("model.opt.disableflags |= 8", "model.opt.disableflags |= 8"),
         ("(model.opt.gravity[2]\n) = -9.81", "model.opt.gravity[2] = -9.81"),
         ("model.geom_rgba[3] *= 0.1", "model.geom_rgba.flat[3] *= 0.1"),
         ("ctx.n = model.geom_rgba[3]", "ctx.n = float(model.geom_rgba.flat[3])"),
@@ -41,7 +39,6 @@ FIELDS = ("n", "on", "v", "k")
             "data.mocap_quat.reshape(-1)[4:8] = [1, 0, 0, GAIN]",
         ),
         ("data.qvel.set(ctx.v, 3)", "data.qvel[3:3 + ctx.v.size] = ctx.v"),
-        ("data.qvel.fill(0)", "data.qvel[:] = 0"),
         ("data.qvel.fill(0, 1, 3)", "data.qvel[1:3] = 0"),
         ("ctx.v = data.qpos.slice(3, 7)", "ctx.v = data.qpos[3:7].copy()"),
         ("ctx.on = !ctx.on && sim.time >= 1", "ctx.on = not ctx.on and data.time >= 1"),
@@ -60,17 +57,17 @@ FIELDS = ("n", "on", "v", "k")
         ),
         ("const a = 1, N = 2, lambda = a + N", "a = 1\nN_ = 2\nlambda_ = a + N_"),
         ("let s = 0\nwhile (s < 3) s += 1", "s = 0\nwhile s < 3:\n    s += 1"),
-        ("ctx.n = ctx.k - (1 - ctx.k)", "ctx.n = ctx.k - (1 - ctx.k)"),
         ("ctx.n = ctx.n !== 1 !== ctx.on", "ctx.n = (ctx.n != 1) != ctx.on"),
         ("data.qpos[ctx.n] = 1", "data.qpos[int(ctx.n)] = 1"),
         ("ctx.n = Math.sin(Math.PI * ctx.n) ** 2", "ctx.n = np.sin(math.pi * ctx.n) ** 2"),
         ("ctx.n = Math.max(...ctx.v, 0)", "ctx.n = max(*ctx.v, 0)"),
-        ("data.xfrc_applied[6 * lib.bodyId('b')] = 1", None),
+        (
+            "data.xfrc_applied[6 * lib.bodyId('b')] = 1",
+            "data.xfrc_applied.flat[6 * model.body('b').id] = 1",
+        ),
     ],
 )
-def test_statements_become_those_of_python(code: str, python: str | None) -> None:
-    if python is None:
-        python = "data.xfrc_applied.flat[6 * model.body('b').id] = 1"
+def test_statements_become_those_of_python(code: str, python: str) -> None:
     value = "GAIN" if "value" in code else None
     assert "\n".join(translate_statements(code, FIELDS, value)) == python
 
@@ -91,9 +88,6 @@ def test_what_code_assigns_to_is_there_from_the_start() -> None:
     "code, python",
     [
         ("lib.energy().kinetic", "energy(model, data).kinetic"),
-        ("lib.norm(lib.angmom())", "np.linalg.norm(angular_momentum(model, data))"),
-        ("lib.qpos('hinge') * 2", "qpos(data, 'hinge') * 2"),
-        ("lib.normalForce()", "normal_force(model, data)"),
         ("data.ncon > 0 ? 'a' : \"b\\n\"", "'a' if data.ncon > 0 else 'b\\n'"),
         ("`z = ${data.qpos[2].toFixed(2)} m`", "'z = ' + format(data.qpos[2], '.2f') + ' m'"),
         ("`${ctx.on}, ${1}`", "str(ctx.on) + ', ' + str(1)"),
@@ -168,43 +162,26 @@ def test_texts_are_those_of_v8(v8: Isolate, code: str) -> None:
 @pytest.mark.parametrize(
     "code",
     """\
-data.qvel[0] = Math.random()
 data.qvel[0] = lib.random()
 data.qvel[0] = ctx.other
-data.qvel = [1, 2]
 data.nothing[0] = 1
-data.qpos[0] ??= 1
 data.qpos[0] = 1 << 2
-data.qpos[0] = null
 data.qpos[0] = parseFloat('1')
 data?.qpos
-ctx.v.push(1)
 ctx.k.x = 1
-const s = `${ctx.n.toString()}`
 const s = ctx.n.toFixed(ctx.k)
-const s = `${}`
 const o = {a: 1}
 const model = 1
 const a = 1; { const a = 2 }
 var w = 1
-function f() { }
 for (const x of data.qpos) ctx.n += x
 for (;;) break
-do { ctx.n++ } while (ctx.on)
-switch (ctx.n) { }
 return 1
-try { ctx.n = 1 } catch { }
-delete ctx.n
 ctx.on && (ctx.n = 1)
 sim.step(3)
-sim.play()
-model.opt = 1
 mj.FS_unlink('x')
 é = 1
 ctx['n'] = 1
-this.x = 1
-ctx.n = typeof ctx.n
-async () => 1
 label: ctx.n = 1""".splitlines(),
 )
 def test_code_without_a_counterpart_in_python_is_refused(code: str) -> None:
@@ -215,9 +192,9 @@ def test_code_without_a_counterpart_in_python_is_refused(code: str) -> None:
 @pytest.mark.parametrize(
     ("code", "message"),
     [
-        ("a => 1", "`=>`"),
-        ("new Float64Array(3)", "`new`"),
-        ("data?.qpos", "`?.`"),
+        ("ctx.n = (a) => {\n  a\n}", "`(a) => {`"),
+        ("new Float64Array(3)", "`new Float64Array(3)`"),
+        ("ctx.n = data?.qpos", "`data?.qpos`"),
         ("ctx.n = 'a", "code that cannot be read"),
         ("ctx.n = 1n", "the number `1n`"),
         ("const s = '\\ud800'", "the escape `\\ud800`"),
@@ -227,8 +204,8 @@ def test_code_without_a_counterpart_in_python_is_refused(code: str) -> None:
         ("const s = f`1`", "a template behind a name or a value"),
         ("ctx.v = [1, , 2]", "an array with holes"),
         ("let u", "`u` without a value"),
-        ("break now", "`now`"),
-        ("ctx.n = 1; 2", "an expression that does nothing"),
+        ("break now", "`break now`"),
+        ("ctx.n = 1; 2", "`2`"),
     ],
 )
 def test_a_refusal_says_what_has_no_counterpart(code: str, message: str) -> None:

@@ -7,10 +7,7 @@ import json
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import BlockQuote, Paragraph
-from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.text.source import Source
-from coursebuild.features.lab.model import Lab
+from coursebuild.core.model import Paragraph
 from coursebuild.features.lab.schema import (
     Button,
     Camera,
@@ -22,6 +19,7 @@ from coursebuild.features.lab.schema import (
     Verify,
 )
 from support.lab_fences import parse, told
+from support.lab_values import lab_of
 
 COMPLETE = r"""{
   "title": "The flip", "note": "Press *Play*.", "height": 240, "dock": true,
@@ -69,12 +67,10 @@ def test_a_complete_lab() -> None:
     assert isinstance(note, Paragraph) and note.span.text == "Press *Play*."
     assert (lab.xml, lab.models(), lab.is_docked()) == (None, ("tumbling_box",), True)
     fields = lab.fields
-    assert (fields.title, fields.height, fields.key) == ("The flip", 240, "intermediate")
     assert fields.camera == Camera(-70.0, 20.0, 0.8, (0.0, 0.0, 0.5))
-    assert (fields.toggles, fields.overlays) == (("frames", "com"), Overlays(frames=True))
-    mass, gain, integrator, mode, spin = fields.controls
-    assert isinstance(mass, Slider) and (mass.min, mass.max, mass.init) == (0.5, 2.0, True)
-    assert isinstance(gain, Slider) and (gain.param, gain.start, gain.step) == ("gain", 0.0, None)
+    assert fields.overlays == Overlays(frames=True)
+    *sliders, integrator, mode, spin = fields.controls
+    assert [isinstance(slider, Slider) and slider.start for slider in sliders] == [1.0, 0.0]
     assert isinstance(integrator, Select) and integrator.start == 0.0
     assert isinstance(mode, Select) and mode.start == "s"
     assert spin == Button("Spin", "data.qvel[4] = 6")
@@ -87,10 +83,7 @@ def test_a_complete_lab() -> None:
     ]
     goal = fields.goal
     assert goal is not None and (goal.expr, goal.hold) == ("up", 2)
-    assert [(entry.t, entry.do) for entry in goal.log] == [
-        (0, {"gain": 1, "mass": 2}),
-        (0.5, "Spin"),
-    ]
+    assert [entry.do for entry in goal.log] == [{"gain": 1, "mass": 2}, "Spin"]
     assert [inline.span.text for inline in lab.child_inlines()] == ["Let it *fly*."]
     assert (lab.verify.seconds, lab.verify.rtol, lab.verify.deep) == (3.0, 0.0, False)
 
@@ -101,14 +94,6 @@ def test_the_least_that_a_lab_needs() -> None:
     assert (lab.note, lab.fields) == ((), SimLab(model="m"))
     assert (lab.fields.height, lab.is_docked(), lab.verify) == (300, False, Verify())
     assert parse('{"model": "m", "overlays": ["com"], "camera": {"azimuth": 1}}').diagnostics == ()
-
-
-def test_the_lines_of_an_inline_model_have_places() -> None:
-    lab = parse('{"xml": "<mujoco>\\n  <worldbody/>\\n</mujoco>"}').value
-    assert lab is not None and lab.xml is not None
-    rows = lab.xml.lines()
-    assert [row.text for row in rows] == ["<mujoco>", "  <worldbody/>", "</mujoco>"]
-    assert [row.span().text for row in rows] == ["<mujoco>", "  <worldbody/>", "</mujoco>"]
 
 
 def test_of_another_kind_only_what_all_have_is_checked() -> None:
@@ -131,30 +116,15 @@ def test_of_another_kind_only_what_all_have_is_checked() -> None:
 
 def test_a_model_that_readers_edit() -> None:
     head = 'lab mjcf title="A ball" height=100 seconds=2 rtol=1e-6 diverges=3 deep dock'
-    source = Source("content/lessons/4.2-x.md", f"> ```{head}\n> <mujoco/>\n> ```\n")
-    (quoted,) = parse_document(source, frozenset(), lesson=True).value.blocks
-    assert isinstance(quoted, BlockQuote)
-    (lab,) = quoted.blocks
-    assert isinstance(lab, Lab) and lab.xml is not None
+    lab = lab_of(f"> ```{head}\n> <mujoco/>\n> ```\n")
+    assert lab.xml is not None
     fields = lab.fields
     assert (lab.kind, lab.xml.text, lab.xml.span().line) == ("mjcf", "<mujoco/>\n", 2)
     assert (fields.title, fields.height, lab.is_docked()) == ("A ball", 100, True)
     assert (lab.verify, fields.expect) == (Verify(2.0, 1e-6, True), (Expect(3.0, diverges=True),))
 
 
-def test_in_a_lesson() -> None:
-    source = Source("content/lessons/4.2-x.md", f"## Lab\n\n```lab simlab\n{COMPLETE}\n```\n")
-    parsed = parse_document(source, frozenset(), lesson=True)
-    assert parsed.diagnostics == ()
-    lab = parsed.value.blocks[1]
-    assert isinstance(lab, Lab)
-    assert lab.place(("controls", 0, "label")).line == 12
-
-
-# ------------------------------------------------------------------------------------- properties
-
-
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(st.data())
 def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))
@@ -169,7 +139,7 @@ def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
         assert orders == sorted(orders)
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(st.data())
 def test_any_value_in_any_place_is_taken_or_told(data: st.DataObject) -> None:
     """A field of the complete lab replaced by another value, at any depth."""

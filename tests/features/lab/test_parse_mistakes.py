@@ -6,7 +6,7 @@ import pytest
 
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from support.lab_fences import parse, text_of, told
+from support.lab_fences import parse, told
 
 LAB = '{"model": "m", %s}'
 SLIDER = LAB % '"controls": [{"label": "a", "min": 0, "max": 2, "value": 1, %s}]'
@@ -79,25 +79,15 @@ GOAL = CLAIM.replace('"expect": [{%s}]', '"goal": {"text": "Up", "expr": "up", %
          "3:59-62 field-value: `m` is a slider: its value is a number"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": {"int": "q"}', "3:61-64 field-value:"
          " `int` cannot be `q`: no option has this value [the options have `1`, `b`]"),
-        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"m": 1}, "Goo"]',
-         "3:64-69 lab-name: the lab has no button `Goo` [did you mean `Go`?]"),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", {}]',
          "3:60-61 field-value: `after[1]` names no control"),
-        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": ["Go", {"mm": 1}]',
-         "3:61-65 lab-name: the lab has no control `mm` [did you mean `m`?]"),
-        (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"Go": 1}, {"m": 1}]',
-         '3:55-59 lab-name: `Go` is a button and has no value [write `"Go"`]'),
         (CLAIM % '"t": 1, "expr": "1", "min": 2, "after": [{"m": 0},\n{"m": 1.5}]',
          "4:7-10 field-value: `m` goes from 0 to 1, and cannot be `1.5`"),
         # goals
         (GOAL % '"log": [{"t": 0, "do": "Goo"}]',
          "3:61-66 lab-name: the lab has no button `Goo` [did you mean `Go`?]"),
-        (GOAL % '"log": [{"t": 0, "do": {"m": -0.1}}]',
-         "3:67-71 field-value: `m` goes from 0 to 1, and cannot be `-0.1`"),
         (GOAL % '"log": [{"t": 0, "do": {"int": "x"}}]', "3:69-72 field-value: `int` cannot be `x`:"
          " no option has this value [`x` is the label of an option whose value is `1`]"),
-        (GOAL % '"log": [{"t": 0, "do": {"Go": 1}}]',
-         '3:62-66 lab-name: `Go` is a button and has no value [write `"Go"`]'),
         (GOAL % '"log": [{"t": 0.5, "do": "Go"}, {"t": 0.25, "do": {"m": 1}}]',
          "3:76-80 field-value: `t` must be at least that of the entry before, 0.5"),
     ],
@@ -105,13 +95,6 @@ GOAL = CLAIM.replace('"expect": [{%s}]', '"goal": {"text": "Up", "expr": "up", %
 def test_what_an_author_is_told(body: str, expected: str) -> None:
     assert told(body) == [expected]
     assert parse(body).value is None
-
-
-def test_notes_point_at_the_first() -> None:
-    (found,) = parse('{"model": "m", "xml": "<mujoco/>"}').diagnostics
-    assert [(n.message, text_of(n.span)) for n in found.notes] == [
-        ("the other one is here", '"model"')
-    ]
 
 
 def test_a_wrong_control_hides_nothing_else() -> None:
@@ -141,6 +124,6 @@ def test_a_step_as_long_as_its_range_and_a_claim_of_one_value_are_good() -> None
 
 
 def test_half_a_character_is_no_number() -> None:
-    text = "```lab mjcf height=\udc80\n<mujoco/>\n```\n"
-    parsed = parse_document(Source("content/lessons/1.1-x.md", text), frozenset(), lesson=True)
+    source = Source("content/lessons/1.1-x.md", "```lab mjcf height=\udc80\n<mujoco/>\n```\n")
+    parsed = parse_document(source, frozenset(), lesson=True)
     assert "fence-key-value" in {wrong.rule for wrong in parsed.diagnostics}

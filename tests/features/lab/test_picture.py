@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.picture.draw import FreeCamera, Solid, draw
-from coursebuild.features.lab.picture.shapes import Kind, flat_surface, surface
+from coursebuild.features.lab.picture.shapes import Kind, flat_surface, grid_faces, surface
 from coursebuild.features.lab.picture.static import png
 from coursebuild.features.lab.picture.textures import TextureMapping, texture_of
 from support.png_files import read_png
@@ -52,21 +52,16 @@ def colour_at(pixels: Pixels, x: int, y: int) -> str:
     return "red" if r > max(g, b) else "green" if g > b else "blue" if b else "black"
 
 
-def test_nothing_is_clear() -> None:
-    pixels = draw((), FRONT, SIZE)
-    assert pixels.shape == (60, 80, 4)
-    assert not pixels.any()
-
-
-@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
-def test_the_nearest_is_seen_whatever_comes_first(order: tuple[int, ...]) -> None:
+def test_the_nearest_is_seen_whatever_comes_first() -> None:
     solids = (
         solid(at=(0, -1, 0), size=(0.2, 0.1, 0.2), rgba=GREEN),
         solid(at=(0, 0, 0), size=(0.6, 0.1, 0.6), rgba=RED),
         solid(at=(0, 1, 0), size=(1.5, 0.1, 1.0), rgba=BLUE),
     )
-    pixels = draw(tuple(solids[i] for i in order), FRONT, SIZE)
-    assert [colour_at(pixels, x, 30) for x in (40, 50, 57, 79)] == ["green", "red", "blue", "clear"]
+    for order in ((0, 1, 2), (2, 1, 0), (1, 0, 2)):
+        pixels = draw(tuple(solids[i] for i in order), FRONT, SIZE)
+        colours = [colour_at(pixels, x, 30) for x in (40, 50, 57, 79)]
+        assert colours == ["green", "red", "blue", "clear"]
 
 
 def test_a_plane_that_goes_on_behind_the_camera() -> None:
@@ -86,21 +81,16 @@ def test_the_camera_within_a_thing_sees_its_inside() -> None:
     assert covered(draw((solid(size=(10, 10, 10)),), FRONT, SIZE)).all()
 
 
-class TestTransparency:
-    def test_the_order_does_not_matter(self) -> None:
-        sheets = [
-            solid(at=(0, y, 0), size=(0.5, 0.001, 0.5), rgba=rgba)
-            for y, rgba in ((-1, (1, 0, 0, 0.5)), (0, (0, 1, 0, 0.5)), (1, (0, 0, 1, 0.5)))
-        ]
-        assert np.array_equal(draw(sheets, FRONT, SIZE), draw(sheets[::-1], FRONT, SIZE))
-
-    def test_behind_something_it_is_hidden(self) -> None:
-        front = solid(at=(0, -1, 0), rgba=RED)
-        glass = solid(at=(0, 2, 0), size=(0.2, 0.1, 0.2), rgba=(0, 0, 1, 0.5))
-        assert np.array_equal(draw((front, glass), FRONT, SIZE), draw((front,), FRONT, SIZE))
-
-    def test_the_invisible_is_not_drawn(self) -> None:
-        assert not draw((solid(rgba=(1, 1, 1, 0)),), FRONT, SIZE).any()
+def test_transparent_things_are_mixed_in_any_order_and_hidden_by_others() -> None:
+    sheets = [
+        solid(at=(0, y, 0), size=(0.5, 0.001, 0.5), rgba=rgba)
+        for y, rgba in ((-1, (1, 0, 0, 0.5)), (0, (0, 1, 0, 0.5)), (1, (0, 0, 1, 0.5)))
+    ]
+    assert np.array_equal(draw(sheets, FRONT, SIZE), draw(sheets[::-1], FRONT, SIZE))
+    front = solid(at=(0, -1, 0), rgba=RED)
+    glass = solid(at=(0, 2, 0), size=(0.2, 0.1, 0.2), rgba=(0, 0, 1, 0.5))
+    assert np.array_equal(draw((front, glass), FRONT, SIZE), draw((front,), FRONT, SIZE))
+    assert not draw((solid(rgba=(1, 1, 1, 0)),), FRONT, SIZE).any()
 
 
 def test_colours_stay_in_range() -> None:
@@ -108,81 +98,55 @@ def test_colours_stay_in_range() -> None:
     assert (pixels[30, 40, 0], pixels[30, 40, 1]) == (255, 0)
 
 
-def checkered(half: float, repeat: tuple[float, float], uniform: bool) -> TextureMapping:
-    """A texture of 2 × 2 squares on a plane."""
+def test_a_pattern_far_away_is_its_mean_colour() -> None:
+    """And not a noise of squares that happen to be hit."""
     squares = np.kron([[255, 0], [0, 255]], np.ones((8, 8))).astype(np.uint8)
     given = {"type": 0, "width": 16, "height": 16, "channels": 1, "data": squares.ravel()}
     texture = texture_of(given)
     assert texture is not None
-    return TextureMapping(texture, "plane", (half, half, 1.0), repeat, uniform)
-
-
-def test_a_pattern_far_away_is_its_mean_colour() -> None:
-    """And not a noise of squares that happen to be hit."""
+    mapping = TextureMapping(texture, "plane", (300, 300, 1.0), (600, 600), uniform=False)
     floor = solid("plane", size=(300, 300, 1), rgba=(1, 1, 1, 1))
-    floor = replace(floor, texture=checkered(300, (600, 600), uniform=False), plane=True)
+    floor = replace(floor, texture=mapping, plane=True)
     pixels = draw((floor,), FreeCamera(90, -60, 300, (0, 0, 0)), SIZE)[..., 0]
     assert np.ptp(pixels[20:40].astype(int)) < 25
-
-
-def test_the_same_each_time() -> None:
-    solids = [
-        solid(
-            "sphere", at=(0.3 * i, 0.1 * i, 0), size=(0.3, 0.4, 0.5), rgba=(0.1 * i, 0.5, 0.5, 1.0)
-        )
-        for i in range(5)
-    ] + [solid("capsule", at=(0, 0, 0.5), size=(0.2, 0.6), rgba=(1, 0, 0, 0.4))]
-    assert png(draw(solids, FRONT, SIZE)) == png(draw(solids, FRONT, SIZE))
 
 
 def test_many_small_triangles_look_as_few_large_ones() -> None:
     """The same square as two triangles and as eight thousand."""
     steps = np.linspace(-0.8, 0.8, 65)
     grid = np.stack(np.meshgrid(steps, [0.0], steps, indexing="ij"), axis=-1).reshape(65, 65, 3)
-    index = np.arange(65 * 65).reshape(65, 65)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    fine = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
     corners = np.array([(-0.8, 0, -0.8), (0.8, 0, -0.8), (0.8, 0, 0.8), (-0.8, 0, 0.8)])
     coarse = np.array([(0, 1, 2), (0, 2, 3)])
     camera = replace(FRONT, azimuth=70, elevation=-15)
     pictures = [
         draw((Solid(flat_surface(v, f), np.zeros(3), np.eye(3), RED),), camera, (120, 90))
-        for v, f in ((grid.reshape(-1, 3), fine), (corners, coarse))
+        for v, f in ((grid.reshape(-1, 3), grid_faces(65, 65)), (corners, coarse))
     ]
     assert np.array_equal(covered(pictures[0]), covered(pictures[1]))
     both = [p[covered(p)].astype(int) for p in pictures]
     assert np.abs(both[0] - both[1]).max() <= 12  # brightness is worked out at corners
 
 
-class TestBlownUp:
-    @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e300, 1e15])
-    @pytest.mark.parametrize("rgba", [RED, (1.0, 0.0, 0.0, 0.5)])
-    def test_what_is_nowhere_is_left_out(
-        self, value: float, rgba: tuple[float, float, float, float]
-    ) -> None:
-        gone = solid(at=(value, 0, 0), rgba=rgba)
-        here = solid("sphere", size=(0.3,), rgba=GREEN)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            assert np.array_equal(draw((gone, here), FRONT, SIZE), draw((here,), FRONT, SIZE))
-
-    def test_rotations_and_sizes_that_are_no_numbers(self) -> None:
-        broken = [
-            solid(rotation=np.full((3, 3), math.nan)),
-            solid(size=(math.nan, 1, 1)),
-            solid(size=(0.0, 0.0, 0.0)),
-        ]
-        assert not draw(broken, FRONT, SIZE).any()
-
-    def test_a_camera_at_its_target(self) -> None:
-        assert draw((solid(),), replace(FRONT, distance=0.0), SIZE).shape == (60, 80, 4)
+@pytest.mark.parametrize("rgba", [RED, (1.0, 0.0, 0.0, 0.5)])
+def test_what_is_nowhere_is_left_out(rgba: tuple[float, float, float, float]) -> None:
+    here = solid("sphere", size=(0.3,), rgba=GREEN)
+    nowhere = (math.nan, math.inf, -math.inf, 1e300, 1e15)
+    gone = [
+        *(solid(at=(value, 0, 0), rgba=rgba) for value in nowhere),
+        solid(rotation=np.full((3, 3), math.nan), rgba=rgba),
+        solid(size=(math.nan, 1, 1), rgba=rgba),
+        solid(size=(0.0, 0.0, 0.0), rgba=rgba),
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.array_equal(draw((*gone, here), FRONT, SIZE), draw((here,), FRONT, SIZE))
 
 
 @settings(max_examples=25, deadline=None)
 @given(
     st.floats(-720, 720),
     st.floats(-90, 90),
-    st.floats(0.01, 100),
+    st.floats(0, 100),
     st.tuples(*[st.floats(-5, 5)] * 3),
     st.floats(1, 170),
 )
@@ -201,22 +165,13 @@ def test_any_camera(
     )
     pixels = draw(solids, camera, (24, 18))
     assert pixels.dtype == np.uint8 and pixels.shape == (18, 24, 4)
+    assert np.array_equal(draw(solids, camera, (24, 18)), pixels), "the same each time"
 
 
-@pytest.mark.parametrize("size", [(1, 1), (7, 3), (64, 48)])
-@pytest.mark.parametrize("opaque", [True, False])
-def test_a_file_is_read_back_as_it_was(size: tuple[int, int], opaque: bool) -> None:
+def test_a_file_is_read_back_as_it_was() -> None:
     random = np.random.default_rng(0)
-    pixels = random.integers(0, 256, (size[1], size[0], 4), dtype=np.uint8)
-    if opaque:
+    for width, height in ((1, 1), (7, 3), (64, 48)):
+        pixels = random.integers(0, 255, (height, width, 4), dtype=np.uint8)
+        assert np.array_equal(read_png(png(pixels)), pixels)
         pixels[..., 3] = 255
-    else:
-        pixels[0, 0, 3] = 7
-    assert np.array_equal(read_png(png(pixels)), pixels)
-
-
-def test_an_even_picture_takes_little_room() -> None:
-    y, x = np.mgrid[:64, :64]
-    grey = (100 + 2 * x - y) % 256
-    data = png(np.dstack([grey, grey, grey, np.full_like(grey, 255)]).astype(np.uint8))
-    assert len(data) < 500
+        assert np.array_equal(read_png(png(pixels)), pixels)

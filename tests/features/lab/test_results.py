@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import gzip
 import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import brotli
 import pytest
 
-from support.lab_lessons import BALL, RIGHT, Make, checked, course, fence
-from support.scratch_course import GOOD, Folder
+from support.lab_lessons import RIGHT, checked, course, fence
+from support.scratch_course import Folder
 
 pytestmark = pytest.mark.engine
 
@@ -43,9 +41,8 @@ class Built(NamedTuple):
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Built:
-    folder = Folder(tmp_path_factory.mktemp("built") / "course")
-    folder.fill([GOOD, "## A lab\n\n" + fence(RIGHT), "## A\n\n" + fence(RESETS)], stores)
-    folder.write("models/ball.xml", BALL)
+    root = tmp_path_factory.mktemp("built") / "course"
+    folder = course(root, stores, "## A lab\n\n" + fence(RIGHT), "## A\n\n" + fence(RESETS))
     folder.write("models/a/still.xml", STILL)
     folder.write("models/lost.xml", LOST)
     report = checked(folder, status=0)
@@ -80,15 +77,12 @@ def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(built: Bui
         assert (found["rule"], found["severity"], found["line"]) == ("lab-reset", "warning", 5)
         assert [(lab["status"], lab["cached"]) for lab in report["labs"]] == [("ok", cached)] * 2
     assert '<div class="lab-static">' in built.page("1.3")
+    only = checked(built.folder, "1.3")
+    assert [lab["name"] for lab in only["labs"]] == ["1.3-lab-1"]
 
 
-def test_only_the_lessons_that_are_asked_for(built: Built) -> None:
-    assert [lab["name"] for lab in checked(built.folder, "1.3")["labs"]] == ["1.3-lab-1"]
-    assert checked(built.folder, "1.1", status=0)["labs"] == []
-
-
-def test_a_model_that_does_not_compile_is_told_once(make: Make) -> None:
-    folder = course(make, "## A\n\n" + fence('{"model": "ball"}'))
+def test_a_model_that_does_not_compile_is_told_once(tmp_path: Path, stores: Path) -> None:
+    folder = course(tmp_path / "course", stores, "## A\n\n" + fence('{"model": "ball"}'))
     folder.write("models/ball.xml", "<mujoco><nonsense/></mujoco>")
     report = checked(folder, status=1)
     assert [d["rule"] for d in report["diagnostics"]] == ["model-error"]
@@ -111,18 +105,3 @@ def test_models_are_live_on_their_pages_and_seen_in_the_gallery(built: Built) ->
     gallery = (models / "index.html").read_text("utf-8")
     assert gallery.count('<img src="../assets/labs/') == 3
     assert "<p>A box that nothing moves.</p>" in gallery
-
-
-def test_files_of_labs_have_compressed_copies(built: Built) -> None:
-    public = built.public
-    found = (p for p in public.rglob("*") if p.suffix in (".br", ".gz"))
-    copies = [p for p in found if "search" not in p.relative_to(public).parts]
-    assert {p.name.split(".")[-2] for p in copies} == {"js", "css", "wasm", "json", "mjb"}
-    for copy in copies:
-        data = copy.read_bytes()
-        plain = brotli.decompress(data) if copy.suffix == ".br" else gzip.decompress(data)
-        assert plain == copy.with_suffix("").read_bytes()
-        assert len(plain) >= 1024 and len(data) < len(plain)
-        assert "assets" in copy.relative_to(public).parts
-    (whole,) = public.glob("assets/**/*.wasm")
-    assert whole.with_name(whole.name + ".br") in copies

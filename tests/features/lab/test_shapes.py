@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from coursebuild.features.lab.picture.shapes import (
-    Kind,
-    Surface,
     flat_surface,
     ropes,
     sharpen,
@@ -18,37 +16,18 @@ from coursebuild.features.lab.picture.shapes import (
 )
 
 
-def made(kind: Kind, size: tuple[float, ...]) -> Surface:
-    shape = surface(kind, size)
-    assert shape is not None
-    return shape
-
-
 def test_normals_of_an_ellipsoid_are_those_of_its_equation() -> None:
     axes = np.array((0.5, 0.2, 1.0))
-    shape = made("ellipsoid", (0.5, 0.2, 1.0))
+    shape = surface("ellipsoid", (0.5, 0.2, 1.0))
+    assert shape is not None
     gradient = shape.vertices / axes**2
     gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
     assert np.allclose(shape.normals, gradient, atol=1e-9)
 
 
-def test_making_one_leaves_the_next_alone() -> None:
-    before = made("sphere", (1.0,)).vertices.copy()
-    made("capsule", (0.1, 5.0))
-    made("ellipsoid", (3.0, 2.0, 1.0))
-    assert np.array_equal(made("sphere", (1.0,)).vertices, before)
-
-
 def test_a_triangle_without_area_has_no_normal_and_no_error() -> None:
     shape = flat_surface(np.zeros((3, 3)), np.array([(0, 1, 2)]))
     assert np.array_equal(shape.normals, np.zeros((3, 3)))
-
-
-def test_what_has_no_surface() -> None:
-    assert surface("mesh", (1.0, 1.0, 1.0)) is None
-    given = flat_surface(np.eye(3), np.array([(0, 1, 2)]))
-    for kind in ("mesh", "sdf", "hfield"):
-        assert surface(kind, (1.0, 1.0, 1.0), given) is given
 
 
 def test_a_rope_whose_ends_meet_is_a_ball() -> None:
@@ -64,12 +43,10 @@ def test_a_smooth_surface_has_the_mean_normal_of_its_faces() -> None:
     assert found.normals[3] == pytest.approx((math.sqrt(0.5), 0, math.sqrt(0.5)))
 
 
-@pytest.mark.parametrize(
-    ("turned", "sharp"), [(0.3, False), (0.6, False), (0.7, True), (1.5, True)]
-)
-def test_an_edge_is_sharp_where_the_face_is_turned_far(turned: float, sharp: bool) -> None:
-    corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, math.cos(turned), math.sin(turned))]])
+def test_an_edge_is_sharp_where_the_face_is_turned_far() -> None:
     up = np.tile((0.0, 0.0, 1.0), (1, 3, 1))
-    expected = (0, -math.sin(turned), math.cos(turned)) if sharp else (0, 0, 1)
-    assert sharpen(corners, up)[0, 1] == pytest.approx(expected)
+    for turned, sharp in ((0.3, False), (0.6, False), (0.7, True), (1.5, True)):
+        corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, math.cos(turned), math.sin(turned))]])
+        expected = (0, -math.sin(turned), math.cos(turned)) if sharp else (0, 0, 1)
+        assert sharpen(corners, up)[0, 1] == pytest.approx(expected), turned
     assert np.array_equal(sharpen(np.zeros((1, 3, 3)), up), up), "no face, no normal of it"
