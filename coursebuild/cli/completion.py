@@ -99,7 +99,7 @@ def _values(action: argparse.Action, directory: str | None) -> Iterable[str]:
         return action.choices
     root = find_course_root(directory or ".")
     match action.metavar:
-        case "LESSON" | "OLD" if root is not None:
+        case "LESSON" if root is not None:
             return _lessons(Path(root))
         case "MODEL" | "SCENE" if root is not None:
             return sorted(path.stem for path in Path(root, "models").glob("*.xml"))

@@ -28,7 +28,10 @@ from coursebuild.core.text.source import Span
 
 _FRAME = re.compile(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
 _WARNING = re.compile(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
-_THREAD = re.compile(r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?")
+_NOISE = re.compile(
+    r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?|\n+Extension modules: [^\n]*\Z"
+)
+"""What a crash tells that is of no use, or another each time."""
 _COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _CRASH = "Current thread "
 _ABORTED = "Fatal Python error: Aborted\n\n"
@@ -197,7 +200,7 @@ def _last_words(stderr: str) -> str:
 def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
     """The end of the standard error."""
     text = text.rstrip()
-    text = _THREAD.sub("", text.removeprefix(_ABORTED) if outcome is Outcome.TIMEOUT else text)
+    text = _NOISE.sub("", text.removeprefix(_ABORTED) if outcome is Outcome.TIMEOUT else text)
     if not text.strip():
         return []
     lines = text.replace("\r\n", "\n").split("\n")
