@@ -51,7 +51,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(metavar="KIND", required=True, prog=parser.prog)
     lesson = kinds.add_parser("lesson", help="a draft, and its entry in the course map")
     lesson.add_argument("id", metavar="ID", help="its level's id, a dot, its own part, as in 1.4")
-    lesson.add_argument("title", metavar="TITLE")
+    lesson.add_argument("title", metavar="TITLE", help="as readers see it")
     lesson.add_argument("--slug", help="for its file and address (default: made of the title)")
     lesson.set_defaults(add=_new_lesson)
     model = kinds.add_parser("model", help="a file of models/ with a ball above a floor")
