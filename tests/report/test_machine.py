@@ -132,8 +132,10 @@ def test_sarif_names_rule_region_and_related_places() -> None:
     assert result["ruleId"] == "math-syntax"
     rule = run["tool"]["driver"]["rules"][result["ruleIndex"]]
     assert rule["id"] == "math-syntax"
-    site = tomllib.loads((ROOT / "content/course.toml").read_text())["course"]["base_url"]
-    assert rule["helpUri"] == f"{site}rules.html#math-syntax"
+    home = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["urls"]["Homepage"]
+    page = "docs/reference/rules.md"
+    assert rule["helpUri"] == f"{home}/blob/main/{page}#math-syntax"
+    assert "\n## math-syntax\n" in (ROOT / page).read_text()
     assert result["locations"][0]["physicalLocation"]["region"] == {
         "startLine": 2,
         "startColumn": 1,

@@ -10,8 +10,8 @@ from typing import Literal
 
 from msgspec import Struct
 
-HELP = "https://example.org/mujoco-course/rules.html#{}"
-"""Where a rule is explained: on the site of coursebuild's own course, of the map's `base_url`."""
+HELP = "https://github.com/OWNER/coursebuild/blob/main/docs/reference/rules.md#{}"
+"""Where a rule is explained."""
 
 
 class Rule(Struct, frozen=True):

@@ -106,7 +106,7 @@ def test_mistakes_are_told_as_they_are_typed_and_nothing_is_saved(editor: Editor
     assert told.range == types.Range(place, types.Position(5, 16))
     assert told.severity == types.DiagnosticSeverity.Error
     assert told.message.startswith("lesson 9.9 is mentioned, and the course map does not have it")
-    assert told.code_description and told.code_description.href.endswith("rules.html#link-lesson")
+    assert told.code_description and told.code_description.href.endswith("rules.md#link-lesson")
     editor.write(TWO, LINKS)
     editor.until(TWO)
     assert editor.folder.text(TWO) == LINKS
