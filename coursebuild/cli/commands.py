@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 from collections.abc import Sequence
 
 from coursebuild.cli.output import CLEAN, USAGE, say, write
@@ -19,6 +20,8 @@ from coursebuild.core.files.errors import UsageError
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
+    from typing import NoReturn
+
     from coursebuild.core.features import Command
 
 _OVERVIEW = """\
@@ -87,7 +90,7 @@ def known_commands(*, installed: bool = True) -> dict[str, Command]:
 def parser_of(command: Command) -> argparse.ArgumentParser:
     """What can be said to a command."""
     code = importlib.import_module(command.module)
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog=f"coursebuild {command.name}",
         description=f"{command.summary[:1].upper()}{command.summary[1:]}.",
         epilog=getattr(code, "EXAMPLES", None),
@@ -97,6 +100,22 @@ def parser_of(command: Command) -> argparse.ArgumentParser:
     parser.add_argument("-C", metavar="DIR", dest="root", help="the course's folder")
     code.declare(parser)
     return parser
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that proposes the option that was meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong with the line."""
+        option = re.match("unrecognized arguments: (--[^ =]+)", message)
+        if option is None:
+            super().error(message)
+        from coursebuild.core.text.diagnostics import nearest
+
+        known = [name[2:] for name in self._option_string_actions if name.startswith("--")]
+        near = nearest(option[1][2:], known)
+        help = f"did you mean `--{near}`?" if near else f"`{self.prog} --help` lists them"
+        raise UsageError(f"there is no option `{option[1]}`", help=help)
 
 
 def _overview() -> str:
