@@ -14,7 +14,7 @@ from support.scratch_course import Folder
 pytestmark = pytest.mark.site
 
 SAID = """\
-wrote 10 files to {0}
+wrote 11 files to {0}
 
   coursebuild -C {1} serve    look at the course, and write
   coursebuild -C {1} build    verify it, and write the site to public/
