@@ -216,7 +216,7 @@ class ScriptServer:
         while self._idle:
             worker = self._idle.pop()
             worker.rested = True
-            if worker.environment == work.environment and worker.is_there():
+            if worker.environment == work.environment:
                 return worker
             worker.close()
         python = sys.executable if work.place is None else work.place.python

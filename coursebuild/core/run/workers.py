@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import select
 import selectors
 import subprocess
 import time
@@ -92,10 +91,6 @@ class Worker:
     def kill(self) -> None:
         """End it at once; on Linux, what it runs with it."""
         self._process.kill()
-
-    def is_there(self) -> bool:
-        """Whether it waits for a job: while it does it says nothing, unless it ends."""
-        return self.job is None and not select.select([self.reports], [], [], 0)[0]
 
     def dismiss(self) -> None:
         """Give it no more jobs; it ends, and kills what it runs."""
