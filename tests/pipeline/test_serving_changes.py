@@ -166,7 +166,8 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
 ) -> None:
     begun = "import pathlib, time\nopen('begun', 'a').write('x')\n"
     waits = "while not pathlib.Path('go').exists(): time.sleep(0.01)\n"
-    folder = make("## First\n\n" + block("x.py", f"{begun}{waits}print(1)", "1"))
+    code = f"{begun}{waits}print(1)"
+    folder = make("## First\n\n" + block("x.py", code, "1", info="timeout=3000"))
     with serving(folder) as preview, preview.events() as events:
         wait_for(folder.root / "begun")
         assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
