@@ -7,7 +7,6 @@
  * 3. It must mean the same in a module, where `await` is a reserved word and `<!--` is no comment, and in the trial's script.
  */
 
-const SEEN = ['model', 'data', 'mj', 'sim', 'ctx', 'lib']
 const BODIES = {
   statements: (code) => [code],
   setter: (code) => [code],
@@ -22,9 +21,8 @@ const NOT_IN_MODULES = [
 ]
 
 function mistake({ code, form, text }) {
-  const names = form === 'setter' || form === 'target' ? [...SEEN, 'value'] : SEEN
   try {
-    for (const body of BODIES[form](code)) new Function(...names, `"use strict"; ${body}`)
+    for (const body of BODIES[form](code)) new Function(`"use strict"; ${body}`)
     ;(0, eval)(`"use strict"; (${text})`)
   } catch (error) {
     return form === 'target' && UNASSIGNABLE.test(error.message) ? 'nothing can be assigned to it' : error.message
