@@ -10,7 +10,7 @@ FENCES = [
     ' simlab\n{"xml": "<mujoco/>"}',
     " mjcf\n<mujoco/>",
     " pendulum\n{}",
-    " hidden\n{}",
+    " deep/hidden\n{}",
     " notes\n{}",
 ]
 
@@ -23,4 +23,4 @@ def test_kinds_of_labs_are_the_built_in_ones_and_scripts_in_the_folder_of_labs()
         files=[f"content/labs/{name}" for name in files],
     )
     told = [diagnostic.message for diagnostic in check_labs(course, course.documents)]
-    assert told == [f"no kind of lab is called `{name}`" for name in ("hidden", "notes")]
+    assert told == [f"no kind of lab is called `{name}`" for name in ("deep/hidden", "notes")]

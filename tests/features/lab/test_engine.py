@@ -105,6 +105,7 @@ def test_code_that_changes_what_all_labs_share_is_told_and_undone(bench: Bench) 
     )
     for code, name in (
         ("globalThis.count = 1; mj.mj_step = () => {}", "`count`, `mj.mj_step`"),
+        ("Object.freeze(Math)", None),
         ("Reflect.ownKeys = Map.prototype.get = JSON.stringify = null", None),
         ("globalThis.trial = null", "`trial`"),
     ):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from coursebuild.core.run.v8 import Isolate
@@ -129,6 +129,7 @@ def formulas() -> st.SearchStrategy[str]:
     return st.recursive(st.sampled_from(atoms), larger, max_leaves=12)
 
 
+@example(code="Math.round(data.qpos[0])")
 @given(code=formulas())
 def test_values_are_those_of_v8(v8: Isolate, code: str) -> None:
     lines = translate_statements(f"const x = 3.5, y = -7.25\nctx.n = {code}", FIELDS)

@@ -58,6 +58,7 @@ def test_only_what_slides_has_no_right_to_differ(bench: Bench) -> None:
     for joint, actuator, exact in (
         (slide, "", True),
         (slide, '<general joint="j"/>', True),
+        (slide, '<general joint="j" dyntype="integrator"/>', True),
         (slide, f'<general joint="j" {filtered}/>', False),
         ('type="hinge"', "", False),
     ):

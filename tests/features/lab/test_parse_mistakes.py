@@ -123,7 +123,8 @@ def test_a_step_as_long_as_its_range_and_a_claim_of_one_value_are_good() -> None
     assert told(CLAIM % '"t": 1, "expr": "1", "min": 1, "max": 1') == []
 
 
-def test_half_a_character_is_no_number() -> None:
-    source = Source("content/lessons/1.1-x.md", "```lab mjcf height=\udc80\n<mujoco/>\n```\n")
+@pytest.mark.parametrize("key", ["height=5", "seconds=0", "rtol=x", "diverges=-1", "height=\udc80"])
+def test_keys_of_an_edited_model_have_values_that_they_can_have(key: str) -> None:
+    source = Source("content/lessons/1.1-x.md", f"```lab mjcf {key}\n<mujoco/>\n```\n")
     parsed = parse_document(source, frozenset(), lesson=True)
     assert "fence-key-value" in {wrong.rule for wrong in parsed.diagnostics}

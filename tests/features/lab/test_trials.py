@@ -114,8 +114,10 @@ def test_poisoned_trials_are_one_that_can_be_shown_or_told(kept: Folder, count: 
     told: list[str] = []
     outcomes = Counter[str]()
     bombs = (zlib.compress(data, 1) for data in (b" " * (1 + (1 << 28)), b"[" * 100_000))
-    texts = map(zlib.compress, poisoned(zlib.decompress(whole), count))
-    for data in (whole, *bombs, whole[:-1], *texts):
+    text = zlib.decompress(whole)
+    nothing = json.dumps({**json.loads(text), "main": None}).encode()
+    texts = map(zlib.compress, (text[:-1], nothing, *poisoned(text, count)))
+    for data in (whole, *bombs, *texts):
         entry.write_bytes(sealed(name, data))
         shutil.rmtree(kept.root / ".coursebuild/pictures", ignore_errors=True)
         memory = Memory(kept.root, Memo(kept.root))
