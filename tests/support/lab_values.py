@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from coursebuild.core.features import TrialContext, Tried
@@ -16,8 +15,6 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import compile_lab
-from coursebuild.features.lab.engines.browser import LabEngine
-from coursebuild.features.lab.engines.native import NativeEngine
 from coursebuild.features.lab.inputs import SECONDS, lab_trials
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.trial import Engines, LabTrials
@@ -44,17 +41,12 @@ def lab_of(text: str) -> Lab:
     return lab
 
 
-def request(lab: Lab, **more: Any) -> dict[str, Any]:
+def request(lab: Lab) -> dict[str, Any]:
     """What the trial is asked."""
     module = compile_lab(lab, "4.2-lab-1")
     seconds = lab.verify.seconds
     config = json.loads(module.config)
-    return {"config": config, "code": module.literal, "seconds": seconds, **more}
-
-
-def xml_of(lab: Lab) -> str:
-    assert lab.xml is not None
-    return lab.xml.text
+    return {"config": config, "code": module.literal, "seconds": seconds}
 
 
 def try_labs(
@@ -73,25 +65,24 @@ def try_labs(
     return LabTrials(context, engines, seconds).run(trials)
 
 
-class Bench:
-    """Both engines."""
+class Bench(Engines):
+    """Both engines, and what they are asked for a lab."""
 
-    def __init__(self, root: Path, browser: LabEngine | None = None) -> None:
-        self.native = NativeEngine(root)
-        self.browser = LabEngine() if browser is None else browser
+    def trial(self, lab: Lab, seconds: float = 30.0) -> dict[str, Any]:
+        return self.browser.trial(request(lab), self.saved(lab), seconds)
 
-    def trial(self, lab: Lab, seconds: float = 30.0, **more: Any) -> dict[str, Any]:
-        mjb = self.native.save("models/x.xml", xml_of(lab))
-        return self.browser.trial(request(lab, **more), mjb, seconds)
-
-    def parity(self, lab: Lab, **more: Any) -> dict[str, Any]:
+    def parity(self, lab: Lab) -> dict[str, Any]:
         """The comparison of the main run."""
-        mjb = self.native.save("models/x.xml", xml_of(lab))
-        reply = self.browser.trial(request(lab, **more), mjb, 30.0)
+        reply, mjb = self.trial(lab), self.saved(lab)
         assert not reply["failures"], reply["failures"]
         run = reply["main"]["parity"]
         horizon = max(1, round(1.0 / reply["main"]["timestep"]))
         return {**self.native.parity(mjb, run, horizon), "run": run, "mjb": mjb}
+
+    def saved(self, lab: Lab) -> bytes:
+        """The lab's own model."""
+        assert lab.xml is not None
+        return self.native.save("models/x.xml", lab.xml.text)
 
 
 class OpenEngines(Engines):
@@ -103,11 +94,3 @@ class OpenEngines(Engines):
     def close(self) -> None:
         """End them."""
         super().__exit__()
-
-    def but(
-        self, *, native: NativeEngine | None = None, browser: LabEngine | None = None
-    ) -> OpenEngines:
-        """The same engines, but for one."""
-        engines = OpenEngines.__new__(OpenEngines)
-        engines.native, engines.browser = native or self.native, browser or self.browser
-        return engines

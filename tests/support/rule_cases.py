@@ -18,6 +18,7 @@ lessons; 1.2 has a script whose output is recorded, so that every course has som
 
 from __future__ import annotations
 
+import copy
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -199,7 +200,8 @@ class Workshop:
         assert loaded.course is not None
         options = self.options(root)
         models, wrong = compile_models(loaded.course, options, Progress(quiet=True))
-        engines = self._engines.but(browser=changed(self._engines.browser))
+        engines = copy.copy(self._engines)
+        engines.browser = changed(engines.browser)
         # What labs did is not shared: it would not be tried by another engine.
         own = replace(options, cache=Memo(root))
         _, found = try_labs(loaded.course, own, engines, dict(models), wrong)

@@ -11,22 +11,20 @@ from typing import Any, Literal, TypeAlias
 import pytest
 
 from coursebuild.features.lab.compile import LabCode, compile_lab
-from coursebuild.features.lab.engines.browser import LabEngine
 from support.lab_values import Bench, make_lab
 
-pytestmark = pytest.mark.engine
 Form: TypeAlias = Literal["statements", "setter", "expression", "target"]
 
 
 @pytest.fixture(scope="module")
-def engine() -> Iterator[LabEngine]:
-    with LabEngine() as engine:
-        yield engine
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with Bench(tmp_path_factory.mktemp("course")) as bench:
+        yield bench
 
 
-def mistakes(engine: LabEngine, given: list[tuple[Form, str]]) -> list[str | None]:
+def mistakes(bench: Bench, given: list[tuple[Form, str]]) -> list[str | None]:
     """Why pieces of code cannot be part of a lab."""
-    return engine.mistakes([LabCode(("x",), form, code) for form, code in given])
+    return bench.browser.mistakes([LabCode(("x",), form, code) for form, code in given])
 
 
 BREAKING_OUT: list[tuple[Form, str]] = [
@@ -87,14 +85,16 @@ FINE: list[tuple[Form, str]] = [
 ]
 
 
-def test_only_what_is_a_piece_by_itself_is_taken(engine: LabEngine) -> None:
-    told = mistakes(engine, BREAKING_OUT)
+@pytest.mark.engine
+def test_only_what_is_a_piece_by_itself_is_taken(bench: Bench) -> None:
+    told = mistakes(bench, BREAKING_OUT)
     assert [one for one, why in zip(BREAKING_OUT, told, strict=True) if why is None] == []
-    told = mistakes(engine, FINE)
+    told = mistakes(bench, FINE)
     assert [one for one, why in zip(FINE, told, strict=True) if why is not None] == []
 
 
-def test_no_piece_is_run_when_it_is_looked_at(engine: LabEngine) -> None:
+@pytest.mark.engine
+def test_no_piece_is_run_when_it_is_looked_at(bench: Bench) -> None:
     mark = "(() => { globalThis.ran = true })()"
     runs: list[tuple[Form, str]] = [
         ("expression", mark),
@@ -102,10 +102,8 @@ def test_no_piece_is_run_when_it_is_looked_at(engine: LabEngine) -> None:
         ("target", f"ctx[{mark}]"),
         ("statements", "if (globalThis.ran) throw 'it ran'"),
     ]
-    assert mistakes(engine, runs) == [None] * len(runs)
-    bench = Bench(Path(), engine)
-    with bench.native:
-        assert bench.trial(make_lab(setup=runs[-1][1], verify={"seconds": 0.01}))["failures"] == []
+    assert mistakes(bench, runs) == [None] * len(runs)
+    assert bench.trial(make_lab(setup=runs[-1][1], verify={"seconds": 0.01}))["failures"] == []
 
 
 FULL: dict[str, Any] = {

@@ -29,8 +29,8 @@ LOOP = "for (;;) ;"
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     """Both engines. A busy machine may need longer than the usual patience to fill the memory."""
-    bench = Bench(tmp_path_factory.mktemp("course"), LabEngine(patience=300.0))
-    with bench.browser, bench.native:
+    with Bench(tmp_path_factory.mktemp("course")) as bench:
+        bench.browser = LabEngine(patience=300.0)
         yield bench
 
 
@@ -60,8 +60,8 @@ def test_code_that_never_returns_is_told_long_before_a_lab_that_simulates_much(
     tmp_path: Path,
 ) -> None:
     button = {"type": "button", "label": "b", "run": LOOP}
-    bench = Bench(tmp_path, LabEngine(patience=0.5))
-    with bench.browser, bench.native:
+    with Bench(tmp_path) as bench:
+        bench.browser = LabEngine(patience=0.5)
         stuck = bench.trial(make_lab(verify={"seconds": 0.02}, controls=[button]), seconds=600.0)
         assert told(stuck) == [(("controls", 0, "run"), "timeout", "ran for more than 0.5 s")]
         slow = bench.trial(make_lab(verify={"seconds": 1e9}), seconds=1.5)
@@ -70,8 +70,8 @@ def test_code_that_never_returns_is_told_long_before_a_lab_that_simulates_much(
 
 def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
     eat = "ctx.all = []; for (;;) ctx.all.push(new Array(10000).fill(ctx.all.length + 0.5))"
-    bench = Bench(tmp_path, LabEngine(memory=160))
-    with bench.browser, bench.native:
+    with Bench(tmp_path) as bench:
+        bench.browser = LabEngine(memory=160)
         reply = bench.trial(make_lab(setup=eat))
         assert told(reply) == [(("setup",), "timeout", "took more than 160 MiB")]
         assert told(bench.trial(make_lab())) == []
@@ -151,8 +151,7 @@ def test_memory_does_not_grow_from_trial_to_trial(bench: Bench) -> None:
 
 
 def test_engine_that_is_stopped_from_another_thread_tries_no_more(tmp_path: Path) -> None:
-    bench = Bench(tmp_path)
-    with bench.browser, bench.native:
+    with Bench(tmp_path) as bench:
         mjb = bench.native.save("models/x.xml", BALL)
         bench.browser.mistakes([])
         threading.Timer(0.2, bench.browser.stop).start()
@@ -172,8 +171,7 @@ def test_an_interrupt_ends_a_trial_and_the_process() -> None:
         "atexit.register(gc.freeze)\n"  # as commands do
         "from pathlib import Path\n"
         "from support.lab_values import *\n"
-        "bench = Bench(Path('.'))\n"
-        "with bench.native, bench.browser:\n"
+        "with Bench(Path('.')) as bench:\n"
         "    bench.browser.mistakes([])\n"
         "    mjb = bench.native.save('models/x.xml', BALL)\n"
         "    asked = request(make_lab(setup='for (;;) ;'))\n"

@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 import sys
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +22,10 @@ from coursebuild.features.lab.export.script import (
     filled,
     initial_values,
 )
+from coursebuild.features.lab.trial import Engines
 from coursebuild.pipeline.options import Options
 from support.built_sites import BuiltCourses
-from support.lab_values import OpenEngines, make_lab, try_labs
+from support.lab_values import make_lab, try_labs
 from support.made_courses import make_course
 
 ROOT = Path(__file__).parents[3]
@@ -141,9 +141,9 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
     labs = [{**usual, **lab} for lab in (*OFFERED, *(lab for lab, _ in WITHHELD))]
     fences = (f"```lab\n{json.dumps(lab, ensure_ascii=False)}\n```\n\n" for lab in labs)
     options = Options(root=tmp_path, jobs=1, quiet=True)
-    with closing(OpenEngines(tmp_path)) as engines, NativeEngine(tmp_path, seconds=2.0) as native:
-        own = engines.but(native=native)
-        results, found = try_labs(make_course("".join(fences)), options, own)
+    engines = Engines(tmp_path)
+    engines.native = NativeEngine(tmp_path, seconds=2.0)
+    results, found = try_labs(make_course("".join(fences)), options, engines)
     assert [d.rule for d in found if d.rule != "lab-reset"] == ["lab-expect"]
     lines = [result.line for result in results]
     assert [line.unexported for line in lines[: len(OFFERED)]] == [""] * len(OFFERED)

@@ -34,8 +34,7 @@ SLIDING = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    bench = Bench(tmp_path_factory.mktemp("course"))
-    with bench.browser, bench.native:
+    with Bench(tmp_path_factory.mktemp("course")) as bench:
         yield bench
 
 

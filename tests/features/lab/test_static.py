@@ -51,8 +51,7 @@ EVERYTHING = """
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    bench = Bench(tmp_path_factory.mktemp("course"))
-    with bench.browser, bench.native:
+    with Bench(tmp_path_factory.mktemp("course")) as bench:
         yield bench
 
 
