@@ -137,7 +137,8 @@ class Isolate:
         """End what runs, and free all memory; the isolate cannot be used any more."""
         atexit.unregister(self.close)
         self.stop()
-        self._life.close()
+        with self._lock:  # another thread may close it, too
+            self._life.close()
 
     def stop(self) -> None:
         """From another thread: end what runs, and all that comes after, by a `StoppedError`."""
