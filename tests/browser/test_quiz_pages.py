@@ -159,7 +159,8 @@ def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> 
     answer_all(page)
     page.emulate_media(media="print")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    quiz = page.locator(".quiz")
+    quiz, hints = page.locator(".quiz"), question(page, MCQ).locator(".hint")
+    expect(hints.first).to_have_attribute("open", "")
     expect(quiz.locator("button:visible")).to_have_count(0)
     for text in ("twice as long, 2T", "So much.", "0.08 kg m2", "Something else happens."):
         expect(quiz.get_by_text(text).locator("visible=true").first).to_be_visible()
@@ -167,7 +168,8 @@ def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> 
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.emulate_media(media="screen")
     # Folds that were opened for the printer are no hints that were taken.
-    expect(question(page, MCQ).locator(".hint").nth(1)).to_be_hidden()
+    expect(hints.first).not_to_have_attribute("open", "")
+    expect(hints.nth(1)).to_be_hidden()
 
 
 def test_script_of_quizzes_comes_when_a_quiz_comes_near(

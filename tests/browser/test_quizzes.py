@@ -262,6 +262,7 @@ def test_hints_come_one_by_one_and_the_answer_after_a_try(page: Page) -> None:
     hints.nth(0).locator("summary").click()
     expect(hints.nth(0)).to_contain_text("First")
     expect(hints.nth(1)).to_be_visible()
+    expect(hints.nth(2)).to_be_hidden()
     question(page, MCQ).get_by_role("radio").nth(2).check()
     press(page, MCQ)
     expect(verdict(page, MCQ)).to_contain_text("Not right.")
