@@ -37,6 +37,7 @@ def edited(page: Page) -> tuple[Locator, Locator]:
 
 def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) -> None:
     found, text = edited(page)
+    press(found, "Back to the lesson’s model")
     lesson = text.input_value()
     assert lesson.startswith("<mujoco>")
     wrong = lesson.replace('<joint axis="0 1 0"', '<joint axle="0 1 0"')
