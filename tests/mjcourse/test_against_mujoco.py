@@ -29,6 +29,45 @@ def same_rotation(got: np.ndarray, want: np.ndarray) -> None:
     close(got * np.sign(got @ want), want)
 
 
+def test_mul_and_conj(rng: np.random.Generator) -> None:
+    res = np.zeros(4)
+    for a, b in zip(unit_quats(rng), unit_quats(rng), strict=True):
+        mujoco.mju_mulQuat(res, a, b)
+        close(spatial.quat_mul(a, b), res)
+        mujoco.mju_negQuat(res, a)
+        assert (spatial.quat_conj(a) == res).all()
+
+
+def test_matrices_both_ways(rng: np.random.Generator) -> None:
+    flat, quat = np.zeros(9), np.zeros(4)
+    half_turns = [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [1e-9, 1, 0, 0], [0, 0.6, 0.8, 0]]
+    for q in (*unit_quats(rng), *map(spatial.quat_normalize, half_turns)):
+        mujoco.mju_quat2Mat(flat, q)
+        close(spatial.quat_to_mat(q), flat.reshape(3, 3))
+        mujoco.mju_mat2Quat(quat, flat)
+        same_rotation(spatial.mat_to_quat(flat.reshape(3, 3)), quat)
+
+
+def test_rotate(rng: np.random.Generator) -> None:
+    res = np.zeros(3)
+    for q, v in zip(unit_quats(rng), rng.normal(size=(COUNT, 3)), strict=True):
+        mujoco.mju_rotVecQuat(res, v, q)
+        close(spatial.quat_rotate(q, v), res, np.linalg.norm(v))
+
+
+def test_axis_angle_and_rotation_vectors(rng: np.random.Generator) -> None:
+    quat, rotvec = np.zeros(4), np.zeros(3)
+    for axis, angle in zip(
+        rng.normal(size=(COUNT, 3)), rng.uniform(-7, 7, size=COUNT), strict=True
+    ):
+        axis = axis / np.linalg.norm(axis)
+        mujoco.mju_axisAngle2Quat(quat, axis, angle)
+        close(spatial.axis_angle_to_quat(axis, angle), quat)
+        close(spatial.rotvec_to_quat(axis * angle), quat)
+        mujoco.mju_quat2Vel(rotvec, quat, 0.01)
+        close(spatial.quat_to_rotvec(quat) / 0.01, rotvec, 4 / 0.01)
+
+
 def test_integration(rng: np.random.Generator) -> None:
     for q, v in zip(unit_quats(rng), rng.normal(size=(COUNT, 3)), strict=True):
         for dt in (0.002, -1.0, 1e-9):
@@ -104,6 +143,19 @@ def geom(kind: str, mass: float, size: np.ndarray, pos: np.ndarray, quat: np.nda
         f'<geom type="{kind}" mass="{mass!r}" size="{numbers(size)}" pos="{numbers(pos)}" '
         f'quat="{numbers(quat)}"/>'
     )
+
+
+def test_inertia_of_one_geom(rng: np.random.Generator) -> None:
+    for kind, _ in itertools.product(GEOMS, range(10)):
+        base, formula = GEOMS[kind]
+        mass, size = float(rng.uniform(0.1, 5)), np.array(base) * rng.uniform(0.3, 3)
+        pos, quat = rng.normal(size=3), unit_quats(rng, 1)[0]
+        model = compiled(geom(kind, mass, size, pos, quat))
+        theirs = spatial.inertia_from_principal(model.body_inertia[1], model.body_iquat[1])
+        ours = spatial.rotate_inertia(formula(mass, size), spatial.quat_to_mat(quat))
+        atol = 4e-15 * np.abs(theirs).max()
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=atol, err_msg=kind)
+        close(model.body_ipos[1], pos, 4)
 
 
 def test_inertia_of_a_composed_body(rng: np.random.Generator) -> None:

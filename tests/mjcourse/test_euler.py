@@ -38,6 +38,14 @@ def exact_quat(angles: np.ndarray, seq: str) -> hp.Vector:
     return hp.mul(first, hp.mul(second, third))
 
 
+def test_quaternion_to_four_ulp() -> None:
+    errors = {}
+    for seq, angles in itertools.product(SEQUENCES, TURNS):
+        got = spatial.euler_to_quat(angles, seq)
+        errors[seq, angles] = hp.ulps_of(mpmath.mpf(1), got, exact_quat(np.array(angles), seq))
+    assert hp.beyond(4, errors) == []
+
+
 @pytest.mark.site
 def test_angles_give_the_rotation_back_to_six_ulp() -> None:
     errors = {}

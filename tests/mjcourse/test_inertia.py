@@ -32,6 +32,20 @@ def exact_composition(
     return total, centre, about
 
 
+def test_parallel_axis_to_three_ulp(rng: np.random.Generator) -> None:
+    for size, _ in itertools.product((1e-160, 1e-9, 1.0, 3e7), range(20)):
+        mass, offset = rng.uniform(0.1, 9), rng.normal(size=3) * size
+        tensor = spatial.box_inertia(mass, rng.uniform(0.01, 1, size=3))
+        point = exact_point(mpmath.mpf(mass), hp.exact(offset))
+        got = spatial.parallel_axis(tensor, mass, offset)
+        larger = [max(abs(t), abs(p)) for t, p in zip(hp.exact(tensor), point, strict=True)]
+        for entry, base, extra, scale in zip(
+            got.ravel(), hp.exact(tensor), point, larger, strict=True
+        ):
+            error = abs(mpmath.mpf(float(entry)) - base - extra)
+            assert error <= 3 * hp.ULP * scale + hp.DENORMAL, (mass, offset, tensor)
+
+
 def test_composition_near_and_far(rng: np.random.Generator) -> None:
     sums, centres_of_mass, tensors_of_all = {}, {}, {}
     for away, count in itertools.product((0.0, 1.0, 1e3, 1e9, 1e12), (1, 2, 7)):
@@ -86,6 +100,24 @@ def test_composition_errors() -> None:
         spatial.compose_inertia([1.0, -1.0], np.zeros((2, 3)), np.zeros((2, 3, 3)))
     with pytest.raises(ValueError, match=r"^total mass at index \(1,\) is not positive$"):
         spatial.compose_inertia([[1.0], [0.0]], np.zeros((1, 3)), np.zeros((1, 3, 3)))
+
+
+def test_rotation_of_a_tensor_to_eight_ulp(rng: np.random.Generator) -> None:
+    for _ in range(40):
+        quat, moments = rng.normal(size=4), rng.uniform(0, 1, size=3) * 10.0 ** rng.uniform(-12, 9)
+        rot = spatial.quat_to_mat(quat)
+        rows = hp.exact(rot)
+        middle = hp.exact(np.diag(moments))
+        want = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
+        largest = max(hp.exact(moments))
+        got = spatial.rotate_inertia(np.diag(moments), rot)
+        assert hp.ulps_of(largest, got, want) <= 8
+        assert (got == got.T).all()
+        rows = hp.matrix(hp.exact(quat))
+        want = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
+        got = spatial.inertia_from_principal(moments, quat * 1e-200)
+        assert hp.ulps_of(largest, got, want) <= 8
+        assert (got == got.T).all()
 
 
 def test_spatial_inertia_times_velocity_is_momentum() -> None:

@@ -1,5 +1,6 @@
 import multiprocessing
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -123,12 +124,16 @@ def test_a_course_without_models(course: Path) -> None:
     [
         ("../models/box", "leads out of models/"),
         ("arms/../box", "leads out of models/"),
+        ("..", "leads out of models/"),
         ("/etc/passwd", "is absolute; give it relative to models/"),
         ("", "is not the name of a file below models/"),
+        (".", "is not the name of a file below models/"),
         ("./box", "is not the name of a file below models/"),
+        ("arms//ur5", "is not the name of a file below models/"),
         ("arms/", "is not the name of a file below models/"),
         (".xml", "is not the name of a file below models/"),
         ("arms\\ur5", "holds a character that no portable file name has"),
+        ("C:box", "holds a character that no portable file name has"),
         ("box\0", "holds a character that no portable file name has"),
     ],
 )
@@ -170,6 +175,14 @@ def test_a_linked_script_belongs_where_it_lies_or_where_it_leads(
     inside = course / "examples" / "linked.py"
     inside.symlink_to(write(tmp_path / "elsewhere" / "y.py"))
     assert ask(inside) == course / "models" / "box.xml"
+
+
+def test_the_error_survives_pickling(course: Path) -> None:
+    with pytest.raises(ModelNotFoundError) as caught:
+        ask(course / "x.py", "nothing_like_it")
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert type(again) is ModelNotFoundError
+    assert str(again) == str(caught.value)
 
 
 def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path: Path) -> None:

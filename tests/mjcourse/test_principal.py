@@ -74,6 +74,16 @@ def test_moments_and_axes() -> None:
     assert hp.beyond(8, differences) == []
 
 
+def test_graded_tensors_keep_their_small_moments() -> None:
+    errors = {}
+    for tensor in GRADED:
+        with mpmath.workdps(700):
+            want = sorted(mpmath.eigsy(table_of(tensor), eigvals_only=True))
+        moments, _ = spatial.principal_axes(tensor)
+        errors[repr(tensor.tolist())] = hp.own_ulps(moments, want)
+    assert hp.beyond(8, errors) == []
+
+
 def test_axes_of_a_diagonal_tensor_are_the_frame_s_own() -> None:
     moments, axes = spatial.principal_axes(np.diag([3.0, 1.0, 2.0]))
     assert moments.tolist() == [1, 2, 3]

@@ -9,6 +9,7 @@ ENTRY = st.floats(-1e3, 1e3, allow_subnormal=False).map(lambda x: x if abs(x) > 
 WIDE = st.floats(allow_nan=False, allow_infinity=False)
 VECTOR = npst.arrays(float, 3, elements=ENTRY)
 SIX = npst.arrays(float, 6, elements=ENTRY)
+TURN = npst.arrays(float, 3, elements=st.floats(-10, 10))
 QUAT = npst.arrays(float, 4, elements=ENTRY).filter(np.any)
 ANY_QUAT = npst.arrays(float, 4, elements=WIDE).filter(np.any)
 MASS = st.floats(1e-3, 1e3)
@@ -42,6 +43,17 @@ def test_every_quaternion_but_zero_is_a_rotation(quat: np.ndarray) -> None:
 
 
 @QUICK
+@given(TURN)
+def test_log_undoes_exp_up_to_whole_turns(rotvec: np.ndarray) -> None:
+    quat = spatial.rotvec_to_quat(rotvec)
+    again = spatial.rotvec_to_quat(spatial.quat_to_rotvec(quat))
+    assert spatial.angular_distance(again, quat) < 4e-15
+    if np.linalg.norm(rotvec) < 3.14:
+        near(spatial.quat_to_rotvec(quat), rotvec, np.linalg.norm(rotvec))
+        near(spatial.log_so3(spatial.exp_so3(rotvec)), rotvec, 3.14)
+
+
+@QUICK
 @given(MASS, VECTOR, TENSOR, QUAT, VECTOR, SIX)
 def test_inertia_stays_symmetric_positive_definite(
     mass: float,
@@ -64,6 +76,16 @@ def test_inertia_stays_symmetric_positive_definite(
         velocity @ here @ velocity,
         scale * size(velocity) ** 2 * (1 + size(pos)) ** 2,
     )
+
+
+@QUICK
+@given(TENSOR, QUAT)
+def test_principal_moments_do_not_depend_on_the_frame(tensor: np.ndarray, quat: np.ndarray) -> None:
+    moments, axes = spatial.principal_axes(tensor)
+    turned, _ = spatial.principal_axes(spatial.rotate_inertia(tensor, spatial.quat_to_mat(quat)))
+    near(turned, moments, moments[2])
+    near(axes * moments @ axes.T, tensor, moments[2])
+    near(spatial.inertia_from_principal(moments, spatial.mat_to_quat(axes)), tensor, moments[2], 32)
 
 
 LEADING = npst.mutually_broadcastable_shapes(num_shapes=2, max_dims=2, max_side=3)

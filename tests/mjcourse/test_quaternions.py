@@ -38,6 +38,21 @@ def test_normalize_to_two_ulp_at_any_length() -> None:
     assert hp.beyond(2, errors) == []
 
 
+def test_mul_to_two_ulp_of_the_lengths() -> None:
+    errors = {}
+    for a, b in itertools.product(QUATS, QUATS):
+        p, q = hp.exact(a), hp.exact(b)
+        size = hp.length(p) * hp.length(q)
+        errors[a, b] = hp.ulps_of(size, spatial.quat_mul(a, b), hp.mul(p, q))
+    assert hp.beyond(2, errors) == []
+
+
+def test_mul_is_the_plain_product() -> None:
+    assert spatial.quat_mul([1, 2, 3, 4], [5, 6, 7, 8]).tolist() == [-60, 12, 30, 24]
+    assert spatial.quat_mul([0, 1, 0, 0], [0, 0, 1, 0]).tolist() == [0, 0, 0, 1]
+    assert spatial.quat_mul([3, 0, 0, 0], [5e-324, 0, 1e300, 0]).tolist() == [1.5e-323, 0, 3e300, 0]
+
+
 def test_rotate_to_six_ulp_at_any_length() -> None:
     vectors = ((1.0, 2.0, 3.0), (-1e-200, 1e-201, 0.0), (1e306, -1e306, 3e305), (0.0, 0.0, 7.0))
     errors = {}

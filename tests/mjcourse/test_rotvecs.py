@@ -29,11 +29,23 @@ def test_exp_to_four_ulp_of_each_component() -> None:
 @pytest.mark.site
 def test_log_to_four_ulp_of_each_component() -> None:
     errors = {}
-    angles = (*hp.SMALL_ANGLES, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0)
-    for axis, angle, size in itertools.product(hp.AXES, angles, hp.SIZES[::3]):
+    angles = (1e-12, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0)
+    for axis, angle, size in itertools.product(hp.AXES, angles, hp.SIZES):
         quat = spatial.axis_angle_to_quat(axis, angle) * size
         want = hp.log(hp.exact(quat))
         errors[axis, angle, size] = hp.own_ulps(spatial.quat_to_rotvec(quat), want)
+    assert hp.beyond(4, errors) == []
+
+
+def test_log_keeps_the_digits_of_the_smallest_angles() -> None:
+    errors = {}
+    for axis, angle in itertools.product(hp.AXES, hp.SMALL_ANGLES):
+        rotvec = rotvec_of(axis, angle)
+        quat = spatial.rotvec_to_quat(rotvec)
+        got = spatial.quat_to_rotvec(quat)
+        errors[axis, angle, "of the quaternion"] = hp.own_ulps(got, hp.log(hp.exact(quat)))
+        if angle > 1e-300:
+            errors[axis, angle, "there and back"] = hp.own_ulps(got, hp.exact(rotvec))
     assert hp.beyond(4, errors) == []
 
 
@@ -44,6 +56,13 @@ def test_log_at_exactly_half_a_turn() -> None:
     got = spatial.quat_to_rotvec([0, -1, 1, 0])
     assert got[0] > 0 > got[1]
     assert np.linalg.norm(got) == pytest.approx(np.pi, rel=1e-15)
+
+
+def test_log_takes_the_shorter_way_round() -> None:
+    quat = np.array([np.cos(2.5), np.sin(2.5), 0, 0])
+    assert spatial.quat_to_rotvec(quat)[0] == pytest.approx(5 - 2 * np.pi, rel=1e-15)
+    assert spatial.quat_to_rotvec(-quat)[0] == spatial.quat_to_rotvec(quat)[0]
+    assert not np.signbit(spatial.quat_to_rotvec([-1, 0, 0, 0])).any()
 
 
 def test_difference_of_rotations_keeps_its_digits() -> None:
@@ -102,3 +121,17 @@ def test_slerp_at_its_ends_and_beyond() -> None:
     assert (spatial.quat_slerp(a, b, 0) == spatial.quat_normalize(a)).all()
     got = spatial.quat_to_rotvec(spatial.quat_slerp(a, b, [-1.0, 0.5, 1.0, 2.0]))
     np.testing.assert_allclose(got[:, 2], [0.1, 0.4, 0.5, 0.7], rtol=1e-15)
+
+
+def test_integrate_to_four_ulp() -> None:
+    errors = {}
+    for angle in (1e-300, 1e-12, 1e-3, 1.0, 3.0, hp.PI):
+        rng = np.random.default_rng(3)
+        for dt, k in itertools.product((1.0, -0.25, 1e-3, 1e150), range(4)):
+            quat, axis = rng.normal(size=4), rng.normal(size=3)
+            angvel = axis / np.linalg.norm(axis) * (angle / abs(dt))
+            turn = [mpmath.mpf(dt) * entry for entry in hp.exact(angvel)]
+            want = hp.mul(hp.unit(hp.exact(quat)), hp.exp(turn))
+            got = spatial.quat_integrate(quat, angvel, dt)
+            errors[angle, dt, k] = hp.ulps_of(ONE, got, want)
+    assert hp.beyond(4, errors) == []

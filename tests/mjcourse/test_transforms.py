@@ -1,10 +1,38 @@
+import mpmath
 import numpy as np
 import pytest
 
 from mjcourse import spatial
+from support import high_precision as hp
 
 RNG = np.random.default_rng(23)
+POSES = [
+    (spatial.quat_to_mat(RNG.normal(size=4)), RNG.normal(size=3) * size)
+    for size in (0.0, 1e-9, 1.0, 30.0, 1e8)
+]
 VELOCITY, MOTION, FORCE = RNG.normal(size=(3, 6))
+
+
+def cross_matrix(pos: np.ndarray) -> hp.Vector:
+    x, y, z = hp.exact(pos)
+    return [mpmath.mpf(0), -z, y, z, mpmath.mpf(0), -x, -y, x, mpmath.mpf(0)]
+
+
+def test_blocks_of_the_transforms() -> None:
+    errors = {}
+    for rot, pos in POSES:
+        moved = hp.matmul(cross_matrix(pos), hp.exact(rot))
+        motion, force = spatial.motion_transform(rot, pos), spatial.force_transform(rot, pos)
+        size = 1 + hp.length(hp.exact(pos))
+        for kind, got, zero, full in (
+            ("motion", motion, motion[:3, 3:], motion[3:, :3]),
+            ("force", force, force[3:, :3], force[:3, 3:]),
+        ):
+            assert (got[:3, :3] == rot).all()
+            assert (got[3:, 3:] == rot).all()
+            assert (zero == 0).all()
+            errors[kind, tuple(pos)] = hp.ulps_of(size, full, moved)
+    assert hp.beyond(2, errors) == []
 
 
 def test_a_force_off_the_origin_has_a_torque() -> None:

@@ -82,14 +82,14 @@ def matrix(q: Sequence[mpmath.mpf]) -> Vector:
     ]
 
 
-def matmul(a: Sequence[mpmath.mpf], b: Sequence[mpmath.mpf]) -> Vector:
-    """The product of two 3 × 3 matrices, row by row."""
-    cells = [(i, j) for i in range(3) for j in range(3)]
-    return [sum(a[3 * i + k] * b[3 * k + j] for k in range(3)) for i, j in cells]
+def matmul(a: Sequence[mpmath.mpf], b: Sequence[mpmath.mpf], n: int = 3) -> Vector:
+    """The product of two n × n matrices, row by row."""
+    cells = [(i, j) for i in range(n) for j in range(n)]
+    return [sum(a[n * i + k] * b[n * k + j] for k in range(n)) for i, j in cells]
 
 
-def transpose(a: Sequence[mpmath.mpf]) -> Vector:
-    return [a[3 * j + i] for i in range(3) for j in range(3)]
+def transpose(a: Sequence[mpmath.mpf], n: int = 3) -> Vector:
+    return [a[n * j + i] for i in range(n) for j in range(n)]
 
 
 def turned(q: Sequence[mpmath.mpf], vector: Sequence[mpmath.mpf]) -> Vector:
