@@ -15,67 +15,46 @@ from typing import Annotated, Literal, TypeAlias
 from msgspec import Meta, Struct
 
 from coursebuild.core.model import Limits, Pace
-from coursebuild.core.syntax.fields import NotNegative, Text
+from coursebuild.core.syntax.fields import NotNegative, Text, matching
 from coursebuild.core.syntax.theme import ThemeTable
 
 Slug: TypeAlias = Annotated[
     str,
-    Meta(
-        pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$",
-        extra={"expects": "lower-case letters and digits in words joined by single hyphens"},
+    matching(
+        r"^[a-z0-9]+(-[a-z0-9]+)*$",
+        "lower-case letters and digits in words joined by single hyphens",
     ),
 ]
 LessonId: TypeAlias = Annotated[
     str,
-    Meta(
-        pattern=r"^[A-Za-z0-9]+(\.[A-Za-z0-9]+)+$",
-        extra={"expects": "letters and digits in parts joined by dots, as in `4.2` or `A.1`"},
+    matching(
+        r"^[A-Za-z0-9]+(\.[A-Za-z0-9]+)+$",
+        "letters and digits in parts joined by dots, as in `4.2` or `A.1`",
     ),
 ]
 Url: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=r"^https?://[^\s/]\S*$",
-        extra={"expects": "an address that begins with `https://` or `http://`"},
-    ),
+    str, matching(r"^https?://[^\s/]\S*$", "an address that begins with `https://` or `http://`")
 ]
-
-
 Language: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$",
-        extra={"expects": "a language tag, as in `en` or `pt-BR`"},
-    ),
+    str, matching(r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$", "a language tag, as in `en` or `pt-BR`")
 ]
 Version: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=r"^[0-9]+\.[0-9]+\.[0-9]+$",
-        extra={"expects": "a version of three numbers, as in `3.14.0`"},
-    ),
+    str, matching(r"^[0-9]+\.[0-9]+\.[0-9]+$", "a version of three numbers, as in `3.14.0`")
 ]
 FeaturePath: TypeAlias = Annotated[
     str,
-    Meta(
-        pattern=r"^features/[\w-]+(/[\w-]+)*\.py$",
-        extra={"expects": "a Python file in `features/`, as in `features/tabs.py`"},
+    matching(
+        r"^features/[\w-]+(/[\w-]+)*\.py$", "a Python file in `features/`, as in `features/tabs.py`"
     ),
 ]
 FolderPath: TypeAlias = Annotated[
-    str,
-    Meta(
-        pattern=r"^[\w-]+(/[\w-]+)*$",
-        extra={"expects": "a folder of the course, as in `src`"},
-    ),
+    str, matching(r"^[\w-]+(/[\w-]+)*$", "a folder of the course, as in `src`")
 ]
-
-
 InterpreterPath: TypeAlias = Annotated[
     str,
-    Meta(
-        pattern=r"^([\w.-]+/)+bin/python[0-9.]*$",
-        extra={"expects": "the Python of a virtual environment, as in `.venv/bin/python`"},
+    matching(
+        r"^([\w.-]+/)+bin/python[0-9.]*$",
+        "the Python of a virtual environment, as in `.venv/bin/python`",
     ),
 ]
 
@@ -164,8 +143,12 @@ class FormatTable(Struct, frozen=True, forbid_unknown_fields=True):
     """How `coursebuild fmt` lays lessons out."""
 
     width: Annotated[
-        Annotated[int, Meta(ge=0, le=1000)],
-        Meta(description="columns of a line of text; 0 leaves line breaks where they are"),
+        int,
+        Meta(
+            ge=0,
+            le=1000,
+            description="columns of a line of text; 0 leaves line breaks where they are",
+        ),
     ] = 0
 
 
@@ -220,12 +203,7 @@ class LevelTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A level: a group of lessons."""
 
     id: Annotated[
-        Annotated[
-            str,
-            Meta(
-                pattern=r"^[A-Za-z0-9]+$", extra={"expects": "letters and digits, as in `4` or `A`"}
-            ),
-        ]
+        Annotated[str, matching(r"^[A-Za-z0-9]+$", "letters and digits, as in `4` or `A`")]
         | Annotated[int, Meta(ge=0)],
         Meta(description="letters and digits, as in `4` or `A`"),
     ]

@@ -32,20 +32,17 @@ _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     """Everything that the types of these tables cannot say."""
-    verify = root.get("verify")
-    if isinstance(verify, ObjectNode):
-        for node, fields in decoding.each([verify], VerifyTable):
-            yield from _check_verify(node, fields)
-        for node, _ in decoding.each(verify.objects("filter"), FilterTable):
-            yield from _check_filter(node)
-        variables = verify.get("env")
-        for member in variables.members if isinstance(variables, ObjectNode) else ():
-            if not _VARIABLE.fullmatch(member.key.value):
-                message = f"{named(member.key.value)} cannot be set for scripts"
-                help = "expected: a name of your own, as in `FAST`"
-                yield diagnose("field-value", member.key.span, message, help=help)
-    callouts = root.get("callouts")
-    for member in callouts.members if isinstance(callouts, ObjectNode) else ():
+    verify = root.object("verify")
+    for node, fields in decoding.each([verify], VerifyTable):
+        yield from _check_verify(node, fields)
+    for node, _ in decoding.each(verify.objects("filter"), FilterTable):
+        yield from _check_filter(node)
+    for member in verify.object("env").members:
+        if not _VARIABLE.fullmatch(member.key.value):
+            message = f"{named(member.key.value)} cannot be set for scripts"
+            help = "expected: a name of your own, as in `FAST`"
+            yield diagnose("field-value", member.key.span, message, help=help)
+    for member in root.object("callouts").members:
         if not _CALLOUT.fullmatch(member.key.value):
             message = f"{named(member.key.value)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
@@ -65,11 +62,8 @@ def _check_verify(node: ObjectNode, fields: VerifyTable) -> Iterator[Diagnostic]
             yield diagnose("field-value", member.key.span, message)
 
 
-def comparison(root: ObjectNode, fields: VerifyTable | None) -> Comparison:
+def comparison(node: ObjectNode, fields: VerifyTable) -> Comparison:
     """How outputs are compared where a fence says nothing; tolerances alone mean `rtol`."""
-    node = root.get("verify")
-    if fields is None or not isinstance(node, ObjectNode):
-        return Comparison()
     rtol, atol = _decimal(node, "rtol"), _decimal(node, "atol")
     implied = "exact" if rtol is None and atol is None else "rtol"
     mode = Mode(fields.compare or implied)

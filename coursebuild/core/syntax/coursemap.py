@@ -18,6 +18,8 @@ import graphlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
+from msgspec.structs import asdict
+
 from coursebuild.core.model import (
     Course,
     Filter,
@@ -42,8 +44,8 @@ from coursebuild.core.syntax.course_settings import (
 )
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fields import repeated
-from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.theme import check_contrast, theme
+from coursebuild.core.syntax.nodes import Node, NumberNode, ObjectNode, StringNode
+from coursebuild.core.syntax.theme import ThemeTable, check_contrast, theme
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.wording import TOML, short
 from coursebuild.core.text.diagnostics import (
@@ -91,9 +93,7 @@ def _course(
     levels: tuple[Level, ...],
 ) -> Course:
     about, verify = fields.course, fields.verify or VerifyTable()
-    table = root.get("course")
-    gate = root.get("verify")
-    engine = table.get("engine") if isinstance(table, ObjectNode) else None
+    table, gate = root.object("course"), root.object("verify")
     return Course(
         map=source,
         title=about.title,
@@ -104,10 +104,10 @@ def _course(
         licence=about.licence,
         id=about.id or "",
         engine=about.engine,
-        engine_span=engine.span if engine is not None else None,
-        comparison=comparison(root, verify),
+        engine_span=table.place("engine"),
+        comparison=comparison(gate, verify),
         truth=verify.truth,
-        truth_span=gate.place("truth") if isinstance(gate, ObjectNode) else None,
+        truth_span=gate.place("truth"),
         filters=tuple(Filter(f.pattern, f.replacement) for f in verify.filter),
         callouts=callout_kinds(fields.callouts),
         silences=tuple(Silence(s.rule, s.reason, s.path) for s in fields.silence),
@@ -124,17 +124,14 @@ def _course(
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
-        theme=theme(root.get("theme"), fields.theme),
-        python=NamedPath(verify.python, gate.place("python"))
-        if verify.python is not None and isinstance(gate, ObjectNode)
-        else None,
+        theme=theme(root.object("theme"), fields.theme or ThemeTable()),
+        python=NamedPath(verify.python, gate.place("python")) if verify.python else None,
     )
 
 
-def _paths(table: Node | None, field: str, paths: tuple[str, ...]) -> tuple[NamedPath, ...]:
-    array = table.get(field) if isinstance(table, ObjectNode) else None
-    items = array.items if isinstance(array, ArrayNode) else ()
-    return tuple(NamedPath(p, item.span) for p, item in zip(paths, items, strict=True))
+def _paths(table: ObjectNode, field: str, paths: tuple[str, ...]) -> tuple[NamedPath, ...]:
+    places = (item.span for item in table.items(field))
+    return tuple(map(NamedPath, paths, places))
 
 
 # --------------------------------------------------------------------------- levels and lessons
@@ -151,25 +148,10 @@ def _levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Level]
         yield Level(node.span, name, title, summary, lessons)
 
 
-def _lesson(node: ObjectNode, fields: LessonTable, level: str) -> Lesson:
-    required = node.get("prerequisites")
-    spans = tuple(item.span for item in required.items) if isinstance(required, ArrayNode) else ()
-    return Lesson(
-        span=node.span,
-        id=fields.id,
-        slug=fields.slug,
-        title=fields.title,
-        status=Status(fields.status),
-        summary=fields.summary,
-        aliases=fields.aliases,
-        objectives=fields.objectives,
-        prerequisites=fields.prerequisites,
-        prerequisite_spans=spans,
-        minutes=fields.minutes,
-        further=fields.further,
-        level=level,
-        document=None,
-    )
+def _lesson(node: ObjectNode, table: LessonTable, level: str) -> Lesson:
+    spans = tuple(item.span for item in node.items("prerequisites"))
+    fields = asdict(table) | {"status": Status(table.status)}
+    return Lesson(**fields, span=node.span, prerequisite_spans=spans, level=level, document=None)
 
 
 def _id(node: Node | None) -> str:

@@ -18,7 +18,7 @@ import math
 import operator
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import msgspec.inspect as inspect
 from msgspec import Struct
@@ -47,6 +47,7 @@ from coursebuild.core.text.source import Span
 S = TypeVar("S", bound=Struct)
 T = TypeVar("T", bound=Struct)
 
+_NO_REMARKS: Mapping[str, str] = {}
 _FAILED = object()
 """The value of a node that is wrong."""
 
@@ -73,7 +74,7 @@ class Decoding(Struct, Generic[S], frozen=True):
 def decode(node: Node, type: type[S], name: str, words: FormatWords) -> Decoding[S]:
     """Read a node as a struct; messages call the whole `name`, as in `the quiz`."""
     decoder = _Decoder(words)
-    value = decoder.value(node, _type_info(type), name, {})
+    value = decoder.value(node, _type_info(type), name)
     whole = value if isinstance(value, type) else None
     return Decoding(whole, tuple(decoder.diagnostics), decoder.structs, tuple(decoder.texts))
 
@@ -86,7 +87,7 @@ def _type_info(type: type[Struct]) -> inspect.Type:
 class _Decoder:
     """Gathers what one walk finds. A method gives the value of a node, or reports and `_FAILED`.
 
-    `name` is what messages call the node, `remarks` is the `extra` of the type's `Meta`.
+    `name` is what messages call the node.
     """
 
     def __init__(self, words: FormatWords) -> None:
@@ -106,13 +107,15 @@ class _Decoder:
         help = help or type_help(node, type) or _described(name, type)
         return self.report("field-type", node.mark, message, help)
 
-    def value(self, node: Node, type: inspect.Type, name: str, remarks: dict[str, Any]) -> object:
-        """The value of a node of which a type is declared."""
+    def value(
+        self, node: Node, type: inspect.Type, name: str, remarks: Mapping[str, str] = _NO_REMARKS
+    ) -> object:
+        """The value of a node of which a type is declared, in a `Meta` with these remarks."""
         if not accepts(type, node):
             return self.wrong_type(node, type, name)
         match type, node:
             case inspect.Metadata(), _:
-                return self.value(node, type.type, name, {**(type.extra or {}), **remarks})
+                return self.value(node, type.type, name, type.extra or _NO_REMARKS)
             case inspect.StrType(), StringNode():
                 return self.string(node, type, name, remarks)
             case inspect.LiteralType(), StringNode():
@@ -120,9 +123,9 @@ class _Decoder:
             case inspect.IntType() | inspect.FloatType(), NumberNode():
                 return self.number(node, type, name)
             case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
-                return self.array(node, type, name, remarks)
+                return self.array(node, type, name)
             case inspect.DictType(), ObjectNode():
-                return self.map(node, type, remarks)
+                return self.map(node, type)
             case inspect.StructType(), ObjectNode():
                 return self.struct(node, type)
             case inspect.UnionType(), _:
@@ -131,14 +134,14 @@ class _Decoder:
                 if tagged and isinstance(node, ObjectNode):
                     return self.tagged(node, tagged)
                 fitting = next(one for one in type.types if accepts(one, node))
-                return self.value(node, fitting, name, remarks)
+                return self.value(node, fitting, name)
             case _:
                 return node.value if isinstance(node, BoolNode) else None
 
     # ---------------------------------------------------------------------------------- scalars
 
     def string(
-        self, node: StringNode, type: inspect.StrType, name: str, remarks: dict[str, Any]
+        self, node: StringNode, type: inspect.StrType, name: str, remarks: Mapping[str, str]
     ) -> object:
         value = node.value
         blank = type.pattern == NOT_BLANK
@@ -171,11 +174,7 @@ class _Decoder:
     # ------------------------------------------------------------------------------- containers
 
     def array(
-        self,
-        node: ArrayNode,
-        type: inspect.VarTupleType | inspect.TupleType,
-        name: str,
-        remarks: dict[str, Any],
+        self, node: ArrayNode, type: inspect.VarTupleType | inspect.TupleType, name: str
     ) -> object:
         length, problem = len(node.items), ""
         if isinstance(type, inspect.TupleType):
@@ -190,17 +189,17 @@ class _Decoder:
         if problem:
             return self.report("field-value", node.mark, f"{named(name)} {problem}")
         values = [
-            self.value(item, type, f"{name}[{i}]", remarks)
+            self.value(item, type, f"{name}[{i}]")
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))
         ]
         return _FAILED if _FAILED in values else tuple(values)
 
-    def map(self, node: ObjectNode, type: inspect.DictType, remarks: dict[str, Any]) -> object:
+    def map(self, node: ObjectNode, type: inspect.DictType) -> object:
         values: dict[str, object] = {}
         for member in node.members:
             key = member.key.value
             if key not in values:
-                values[key] = self.value(member.value, type.value_type, key, remarks)
+                values[key] = self.value(member.value, type.value_type, key)
         return _FAILED if _FAILED in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
@@ -219,7 +218,7 @@ class _Decoder:
             key = member.key.value
             if key in fields:
                 if key not in values:
-                    values[key] = self.value(member.value, fields[key].type, key, {})
+                    values[key] = self.value(member.value, fields[key].type, key)
             elif not tagged or key != type.tag_field:
                 unknown.setdefault(key, member.key)
         meant: set[str] = set()

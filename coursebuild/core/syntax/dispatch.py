@@ -14,7 +14,6 @@ from coursebuild.core.features import FenceKind
 from coursebuild.core.model import Block, CodeBlock, FeatureBlock, Mjcf, Script
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import Fence, kind_doubts
-from coursebuild.core.syntax.info import FenceKeys
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import stray_keys
 from coursebuild.core.syntax.script import parse_python
@@ -80,16 +79,12 @@ def _of_feature(
     kind: FenceKind[FeatureBlock], fence: Fence, session: ParsingState, texts: TextParser
 ) -> Block:
     if fence.nested and not kind.nested:
-        return _nested(fence, session)
+        message = f"a text of a quiz or lab cannot hold a {fence.kind}"
+        session.report(diagnose("fence-info", fence.head, message))
+        return fence.code()
     parsed = kind.parse(fence, texts)
     session.diagnostics += parsed.diagnostics
     return parsed.value or fence.code()
-
-
-def _nested(fence: Fence, session: ParsingState) -> CodeBlock:
-    message = f"a text of a quiz or lab cannot hold a {fence.kind}"
-    session.report(diagnose("fence-info", fence.head, message))
-    return fence.code()
 
 
 _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
@@ -97,23 +92,16 @@ _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 def _mjcf(fence: Fence, session: ParsingState) -> Mjcf | CodeBlock:
     """An `mjcf` fence; one that says in a wrong way what it is cannot be compiled, and is code."""
-    keys, wrong = _keys(fence, session, ("fragment", "error"))
-    fragment, place = keys.value("fragment"), keys.place("fragment")
-    if fragment is not None and place is not None and not _ELEMENTS.fullmatch(fragment):
-        message = f"`{fragment}` is not the name of an element"
+    parsed = fence.keys(values=("fragment", "error"))
+    session.diagnostics += parsed.diagnostics
+    keys, fragment = parsed.value, parsed.value.get("fragment")
+    if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
+        message = f"`{fragment.value}` is not the name of an element"
         help = 'name the element that it goes into, for example `fragment="worldbody"`'
-        session.report(diagnose("fence-key-value", place, message, help=help))
+        session.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
         return fence.code()
-    if wrong:
+    if parsed.diagnostics:
         return fence.code()
-    error, place = keys.value("error"), keys.place("error")
-    return Mjcf(fence.span, fence.body, fragment, error, place)
-
-
-def _keys(
-    fence: Fence, session: ParsingState, values: tuple[str, ...], *, named: bool = False
-) -> tuple[FenceKeys, bool]:
-    """The keys of a fence, and whether something is wrong with them."""
-    keys = fence.keys(values=values, named=named)
-    session.diagnostics += keys.diagnostics
-    return keys.value, bool(keys.diagnostics)
+    return Mjcf(
+        fence.span, fence.body, keys.value("fragment"), keys.value("error"), keys.place("error")
+    )

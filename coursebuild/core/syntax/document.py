@@ -56,12 +56,11 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     title = None if lesson else title_line(source)
     if title is not None:
         base = base.slice(len(base.text.partition("\n")[0]))
-    reader = TextReader(base, session, session.definitions, nested=False)
+    reader = TextReader(base, session, session.references, nested=False)
     blocks = reader.read()
     anchor = "" if title is None else slug(title.text)
     free = not session.anchors.has(anchor)
     document = Document(source, blocks, session.notes.finish(), anchor if free else "")
-    session.end()
     session.diagnostics += _misplaced(document)
     return Parsed(document, sort_diagnostics(session.diagnostics))
 

@@ -16,7 +16,7 @@ from msgspec import Struct
 from coursebuild.core.model import CodeBlock
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.info import FenceKeys, kind_of, read_keys, words_of
-from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
+from coursebuild.core.syntax.spans import PositionedToken, locate, trimmed
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -76,12 +76,11 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     """The fence of a `fence` token of the text `base`."""
     assert token.map is not None
     info_at = token.start + len(token.markup)
-    info = trimmed(locate(base, [SourceSlice(token.info, info_at)]))
+    info_end = info_at + len(token.info)
+    info = trimmed(base.slice(info_at, info_end))
     closed = len(token.rows) == token.map[1] - token.map[0] - 2
-    body = locate(base, token.rows)
-    if not token.rows:
-        body = Excerpt(base.source, "", ((0, base.offset(info_at + len(token.info) + 1)),))
-    elif not body.text.endswith("\n"):
+    body = locate(base, token.rows) if token.rows else base.slice(info_end + 1, info_end + 1)
+    if token.rows and not body.text.endswith("\n"):
         body = Excerpt(base.source, body.text + "\n", body.pieces)
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_at + len(token.info.rstrip()))

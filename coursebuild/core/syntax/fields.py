@@ -1,7 +1,7 @@
 """Types of fields that several declarations share, and checks of how fields hang together.
 
-Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`; `has_value`,
-`one_of`, `repeated`.
+Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`, `matching`;
+`has_value`, `one_of`, `repeated`.
 
 What a type adds to its plain Python type stands in `Meta`: bounds and patterns, which the decoder
 and the JSON Schemas both read, and in `extra` two remarks for the decoder alone: `text` ("blocks"
@@ -48,6 +48,11 @@ Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
 Digits: TypeAlias = Annotated[int, Meta(ge=0, le=15)]
 """Decimal places."""
+
+
+def matching(pattern: str, expects: str) -> Meta:
+    """What a string must look like, and the words for it in messages."""
+    return Meta(pattern=pattern, extra={"expects": expects})
 
 
 def has_value(node: ObjectNode, name: str) -> bool:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.syntax.spans import joined, trimmed
+from coursebuild.core.syntax.spans import trimmed
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -170,4 +170,4 @@ def _unescaped(value: Excerpt) -> Excerpt:
     escapes = _ESCAPE.finditer(value.text)
     cuts = [0, *(at for found in escapes for at in (found.start(), found.start(1)))]
     ends = [*cuts[1::2], len(value.text)]
-    return joined(value.slice(a, b) for a, b in zip(cuts[::2], ends, strict=True)) or value
+    return Excerpt.join([value.slice(a, b) for a, b in zip(cuts[::2], ends, strict=True)])

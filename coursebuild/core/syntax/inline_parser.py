@@ -31,9 +31,9 @@ from markdown_it.rules_inline import (
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
 
-from coursebuild.core.syntax.attributes import Braces
+from coursebuild.core.syntax.attributes import TERM
 from coursebuild.core.syntax.html import LITERAL, tag_at
-from coursebuild.core.syntax.math import math_inline
+from coursebuild.core.syntax.math import BACKTICKS, math_inline
 from coursebuild.core.syntax.spans import InlineState, PositionedToken
 
 MAX_NESTING = 20
@@ -45,7 +45,7 @@ InlineRule = Callable[[StateInline, bool], bool]
 
 
 def inline_tokens(src: str, env: EnvType, *, html: bool = False) -> list[PositionedToken]:
-    """The inline tokens of a block's content; `env` comes from `environment`.
+    """The inline tokens of a block's content; `env` has its `references`.
 
     In `html` only tags, entities and formulas are read.
     """
@@ -129,30 +129,25 @@ def _term(state: StateInline, silent: bool) -> bool:
     if silent:
         return False
     assert isinstance(state, InlineState)
-    if state.last_braced is None:
-        state.last_braced = state.src.rfind("]{")
     if state.pos > state.last_braced:
         return False
     start, limit = state.pos, state.posMax
     end = parseLinkLabel(state, start)
-    braces = Braces.of_term(state.src, end + 1, limit) if end >= 0 else None
+    braces = TERM.match(state.src, end + 1, limit) if end >= 0 else None
     if braces is None:
         return False
     state.pos, state.posMax = start + 1, end
     state.push("term_open", "dfn", 1)
     state.md.inline.tokenize(state)
     token = state.push("term_close", "dfn", -1)
-    token.map = [braces.start, braces.end]
-    token.info = "" if braces.closed else "unclosed"
-    state.pos, state.posMax = braces.end, limit
+    token.map = [*braces.span(1)]
+    state.pos, state.posMax = braces.end(), limit
     return True
 
 
 def _link(state: StateInline, silent: bool) -> bool:
     """A link or image, unless no bracket closes after this one."""
     assert isinstance(state, InlineState)
-    if state.last_bracket is None:
-        state.last_bracket = state.src.rfind("]")
     if state.pos > state.last_bracket:
         return False
     rule = link if state.src[state.pos] == "[" else image
@@ -246,8 +241,8 @@ class _Inlines(ParserInline):
     def parse(self, src: str, md: MarkdownIt, env: EnvType, tokens: list[Token]) -> list[Token]:
         """Add the tokens of a whole text."""
         state = InlineState(src, md, env)
-        if "`" not in self.rules:  # backticks are text
-            state.last_runs = {}
+        if "`" in self.rules and "$" in src:  # else backticks are text, or of no interest
+            state.last_runs = {len(run[0]): run.start() for run in BACKTICKS.finditer(src)}
         self.tokenize(state)
         if state.delimiters or any(state.tokens_meta):  # there are marks to be paired
             for rule in self.ruler2.getRules(""):

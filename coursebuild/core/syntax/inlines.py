@@ -19,7 +19,6 @@ from collections.abc import Iterable
 from markdown_it.common.utils import normalizeReference
 from markdown_it.helpers import parseLinkDestination
 from markdown_it.token import Token
-from markdown_it.utils import EnvType
 from msgspec import Struct, field
 
 from coursebuild.core.model import (
@@ -38,7 +37,7 @@ from coursebuild.core.model import (
     Term,
     plain_text,
 )
-from coursebuild.core.syntax.attributes import Braces, folded, read_label, read_meaning, read_term
+from coursebuild.core.syntax.attributes import folded, read_label, read_meaning, read_term
 from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.syntax.html import LITERAL, Balance, media_of, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
@@ -50,10 +49,10 @@ from coursebuild.core.syntax.links import (
     plain,
     with_mentions,
 )
-from coursebuild.core.syntax.markdown import Definitions, environment
+from coursebuild.core.syntax.markdown import References
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.safe_html import forbidden_in
-from coursebuild.core.syntax.spans import PositionedToken, locate
+from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import unread_markup
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Span
@@ -75,12 +74,11 @@ class _Frame(Struct):
 class InlineReader:
     """Reads the inline content of one text."""
 
-    def __init__(self, definitions: Definitions, session: ParsingState, balance: Balance) -> None:
-        self.definitions = definitions
+    def __init__(self, references: References, session: ParsingState, balance: Balance) -> None:
+        self.references = references
         self.session = session
         self.balance = balance
         self.report = session.report
-        self._environment: EnvType | None = None
 
     def read(
         self, content: Excerpt, *, mentions: bool = True, html: bool = False
@@ -90,9 +88,7 @@ class InlineReader:
         `mentions` says whether "Lesson 2.2" becomes a link. In `html` only tags, entities and
         formulas are read, and its elements may be closed in another block.
         """
-        if self._environment is None:  # all link definitions are known by now
-            self._environment = environment(self.definitions)
-        tokens = inline_tokens(content.text, self._environment, html=html)
+        tokens = inline_tokens(content.text, {"references": self.references}, html=html)
         one = _Pass(self, content, mentions)
         if html:
             return one.read(tokens)
@@ -205,8 +201,7 @@ class _Pass:
         assert closed.map is not None
         span = self.content.span(opened.start, closed.end)
         report = self.reader.report
-        braces = Braces(closed.map[0], closed.map[1], not closed.info)
-        given = read_term(self.content, braces, report)
+        given = read_term(self.content.slice(*closed.map), report)
         if given is None:
             return None
         name = given or folded(plain_text(children))
@@ -241,13 +236,13 @@ class _Pass:
         label = text[start + 1 : label_end]
         if end > label_end + 3:
             label = text[label_end + 2 : end - 1]
-        definition = self.reader.definitions.get(normalizeReference(label))
-        if definition is None or not definition.rows:
+        definition = self.reader.references.get(normalizeReference(label))
+        if definition is None:
             return self.content.span(start, end)
-        rows = locate(definition.base, definition.rows)
-        head = _DEFINED.match(rows.text)
-        found = None if head is None else _address(rows, head.end())
-        return found or rows.span()
+        place: Excerpt = definition["place"]
+        head = _DEFINED.match(place.text)
+        found = None if head is None else _address(place, head.end())
+        return found or place.span()
 
     # -- leaves
 
@@ -281,12 +276,12 @@ class _Pass:
         if not token.content.strip():
             self.reader.report(diagnose("math-syntax", span, "the formula is empty"))
         tex, display = self.content.slice(*token.map), token.info == "display"
-        braces, report = token.meta.get("braces"), self.reader.report
-        if braces is None:
+        if token.meta["braces"] is None:
             return Math(span, tex, display)
+        braces, report = self.content.slice(*token.meta["braces"]), self.reader.report
         if not display:
-            return Math(span, tex, display, None, *read_meaning(self.content, braces, report))
-        label = read_label(self.content, braces, report)
+            return Math(span, tex, display, None, *read_meaning(braces, report))
+        label = read_label(braces, report)
         if label is not None:
             self.reader.session.anchors.take(label.id, label.span)
         return Math(span, tex, display, label)

@@ -157,7 +157,7 @@ class _Reader:
             members.append(Member(key, self.value(depth + 1)))
             done = self.separator(start, "}")
         self.at += 1
-        return ObjectNode(self.body, start, self.at, start, start + 1, tuple(members))
+        return ObjectNode(self.body, start, self.at, (start, start + 1), tuple(members))
 
     def array(self, start: int, depth: int) -> ArrayNode:
         items: list[Node] = []
@@ -168,7 +168,7 @@ class _Reader:
             items.append(self.value(depth + 1))
             done = self.separator(start, "]")
         self.at += 1
-        return ArrayNode(self.body, start, self.at, start + 1, tuple(items))
+        return ArrayNode(self.body, start, self.at, (start, start + 1), tuple(items))
 
     def colon(self, key: StringNode) -> None:
         char = self.next()

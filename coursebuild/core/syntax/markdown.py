@@ -4,7 +4,7 @@ Entry point: `block_tokens`. CommonMark with tables, task lists, footnotes and f
 what markdown-it does:
 
 1. The first token of a block gets its place, and the rows that its content was cut from.
-2. Link definitions keep the rows that hold them.
+2. Link definitions know where they stand.
 3. What is nested deeper than `MAX_NESTING` becomes paragraphs, which say so: nothing is lost, and
    nothing overflows. The same becomes of what is in containers where these hold far more lines
    together than the text has: each of them reads its lines again.
@@ -13,7 +13,7 @@ what markdown-it does:
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 from markdown_it import MarkdownIt
 from markdown_it.common.utils import MD_TRIM_CHARS
@@ -22,7 +22,6 @@ from markdown_it.ruler import Ruler
 from markdown_it.rules_block import StateBlock, paragraph, reference
 from markdown_it.utils import EnvType
 from mdit_py_plugins.footnote.index import footnote_def
-from msgspec import Struct
 
 from coursebuild.core.syntax.math import math_block
 from coursebuild.core.syntax.spans import BlockState, PositionedToken, SourceSlice
@@ -39,31 +38,16 @@ _SPARE_LINES = 10_000
 BlockRule = Callable[[StateBlock, int, int, bool], bool]
 
 
-class Definition(Struct):
-    """A link definition as markdown-it keeps it, with the rows of `base` that hold it."""
-
-    href: str
-    title: str
-    base: Excerpt
-    rows: list[SourceSlice]
+References: TypeAlias = dict[str, dict[str, Any]]
+"""The link definitions of a text by label, as markdown-it keeps them; `place` is an `Excerpt`."""
 
 
-Definitions: TypeAlias = dict[str, Definition]
-"""The link definitions of a text, by normalised label."""
-
-
-def environment(definitions: Definitions) -> EnvType:
-    """The environment in which markdown-it's rules find the definitions."""
-    known = {label: {"href": d.href, "title": d.title} for label, d in definitions.items()}
-    return {"references": known}
-
-
-def block_tokens(base: Excerpt, definitions: Definitions) -> list[PositionedToken]:
+def block_tokens(base: Excerpt, references: References) -> list[PositionedToken]:
     """The block tokens of a text with LF line ends and no NUL.
 
-    Its link definitions are added to `definitions`.
+    Its link definitions are added to `references`.
     """
-    env: EnvType = {**environment(definitions), "definitions": definitions, "base": base}
+    env: EnvType = {"references": references, "base": base}
     state = BlockState(base.text, _MARKDOWN, env)
     state.lines_left = _READINGS * state.lineMax + _SPARE_LINES
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
@@ -85,21 +69,17 @@ def _footnote_definition(state: StateBlock, start: int, end: int, silent: bool) 
 
 
 def _located_reference(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """A link definition; the rows that hold it are kept with it."""
-    known = state.env.setdefault("references", {})
+    """A link definition, with which its place is kept."""
+    known: References = state.env["references"]
     count = len(known)
     if not reference(state, start, end, silent):
         return False
     if not silent and len(known) > count:
-        label = next(reversed(known))
-        rows = []
-        for line in range(start, state.line):
-            at = state.bMarks[line] + state.tShift[line]
-            rows.append(SourceSlice(state.src[at : state.eMarks[line]] + "\n", at))
-        definitions: Definitions = state.env["definitions"]
-        definitions[label] = Definition(
-            known[label]["href"], known[label]["title"], state.env["base"], rows
-        )
+        base: Excerpt = state.env["base"]
+        starts = (state.bMarks[line] + state.tShift[line] for line in range(start, state.line))
+        ends = state.eMarks[start : state.line]
+        rows = [base.slice(at, end + 1) for at, end in zip(starts, ends, strict=True)]
+        known[next(reversed(known))]["place"] = Excerpt.join(rows)
     return True
 
 
@@ -165,7 +145,7 @@ def _atx_row(state: BlockState, begin: int) -> list[SourceSlice]:
     at = state.skipCharsStr(begin, "#")
     while content and state.src[at] in MD_TRIM_CHARS:
         at += 1
-    return [SourceSlice(content, at)]
+    return [SourceSlice(at, at + len(content))]
 
 
 def _configured() -> MarkdownIt:

@@ -1,7 +1,6 @@
 """Formulas: the inline rule for `$…$` and `$$…$$`, and the block rule for `$$` on its own lines.
 
-Entry points: `math_inline`, `math_block` (rules of the parsers), `find_formula` (also for HTML in
-quiz texts).
+Entry points: `math_inline`, `math_block` (rules of the parsers).
 
 A `$` opens a formula when something other than white space follows; the next `$` that no backslash
 escapes must close it, with something other than white space before it and no digit after it. So
@@ -13,60 +12,43 @@ before that means that it was never closed.
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
 
 from markdown_it.rules_block import StateBlock
 from markdown_it.rules_inline import StateInline
 
-from coursebuild.core.syntax.attributes import Braces
+from coursebuild.core.syntax.attributes import LABEL, SYMBOL
 from coursebuild.core.syntax.spans import BlockState, InlineState, PositionedToken
 
 _TEX = re.compile(r"(?:[^\\`$]++|\\[\s\S])*+")
 _BLOCK_TEX = re.compile(r"(?:[^\\$]++|\\[\s\S]|\$(?!\$))*+")
-_BACKTICKS = re.compile(r"`+")
+BACKTICKS = re.compile(r"`+")
 _DOLLARS = re.compile(r"\$+")
 _LABEL = re.compile(r"\{#[^{}$]*\}?")
 _SPACE = " \t\n"
 _DIGITS = ("0", "1", "2", "3", "4", "5", "6", "7", "8", "9")
 
 
-class FormulaText(NamedTuple):
-    """A formula found in a text: its TeX is at `[start, end)`; its dollars end at `after`."""
-
-    start: int
-    end: int
-    after: int
-    display: bool
-
-
-def find_formula(
-    text: str, at: int, limit: int, last_runs: dict[int, int] | None = None
-) -> FormulaText | None:
-    """The formula that begins with the `$` at `at` and closes before `limit`, if it is one.
-
-    `last_runs` says where the last run of each number of backticks begins; by it a code span inside
-    is recognised.
-    """
-    width = 2 if text.startswith("$$", at) else 1
-    start = at + width
+def _formula_end(state: InlineState, start: int, width: int) -> int | None:
+    """Where the TeX ends that begins behind one or two dollars, if it is a formula."""
+    text, limit = state.src, state.posMax
     if start >= limit or (width == 1 and text[start] in _SPACE):
         return None
     end = start
     while True:
         end = _TEX.match(text, end, limit).end()  # type: ignore[union-attr]  # it matches nothing too
         if text.startswith("`", end, limit):
-            run = _BACKTICKS.match(text, end, limit)
+            run = BACKTICKS.match(text, end, limit)
             assert run is not None
-            if last_runs is not None and last_runs.get(len(run[0]), -1) > end:
+            if state.last_runs.get(len(run[0]), -1) > end:  # a code span begins
                 return None
             end = run.end()
         elif not text.startswith("$", end, limit):  # a backslash may stand before the limit
             return None
         elif width == 1:
             closes = text[end - 1] not in _SPACE and text[end + 1 : end + 2] not in _DIGITS
-            return FormulaText(start, end, end + 1, False) if closes else None
+            return end if closes else None
         elif text.startswith("$$", end, limit):
-            return FormulaText(start, end, end + 2, True)
+            return end
         else:
             end += 1
 
@@ -74,42 +56,27 @@ def find_formula(
 def math_inline(state: StateInline, silent: bool) -> bool:
     """The inline rule: a token `math`, or `math_unclosed` for a `$$` without end.
 
-    The TeX stands where `map` says; `meta` has the braces after the formula that are its own.
+    The TeX stands where `map` says; `meta` says where braces are that belong to the formula.
     """
     assert isinstance(state, InlineState)
-    at = state.pos
-    run = _DOLLARS.match(state.src, at, state.posMax)
+    run = _DOLLARS.match(state.src, state.pos, state.posMax)
     assert run is not None
-    if len(run[0]) > 2:
-        if not silent:
+    start, width = run.end(), len(run[0])
+    end = _formula_end(state, start, width) if width <= 2 else None
+    if end is None:
+        if width > 2 and not silent:
             state.append_pending(run[0])
-        state.pos = run.end()
-        return True
-    if state.last_runs is None:
-        runs = _BACKTICKS.finditer(state.src) if "`" in state.src else ()
-        state.last_runs = {len(m[0]): m.start() for m in runs}
-    formula = find_formula(state.src, at, state.posMax, state.last_runs)
-    if formula is None:
-        if len(run[0]) == 2:
-            if not silent:
-                token = state.push("math_unclosed", "", 0)
-                token.content = run[0]
-            state.pos = run.end()
-            return True
-        return False
+        elif width == 2 and not silent:
+            state.push("math_unclosed", "", 0).content = run[0]
+        state.pos = start if width > 1 else state.pos
+        return width > 1
+    braces = (LABEL if width == 2 else SYMBOL).match(state.src, end + width, state.posMax)
     if not silent:
         token = state.push("math", "", 0)
-        token.content = state.src[formula.start : formula.end]
-        token.map = [formula.start, formula.end]
-        token.info = "display" if formula.display else ""
-    state.pos = formula.after
-    if "{" in state.src[formula.after : formula.after + 4]:
-        find = Braces.of_label if formula.display else Braces.of_symbol
-        braces = find(state.src, formula.after, state.posMax)
-        if braces is not None:
-            state.pos = braces.end
-            if not silent:
-                token.meta["braces"] = braces
+        token.content, token.map = state.src[start:end], [start, end]
+        token.info = "display" if width == 2 else ""
+        token.meta["braces"] = braces and braces.span(1)
+    state.pos = braces.end() if braces else end + width
     return True
 
 

@@ -88,40 +88,34 @@ class ErrorNode(_PositionedNode, frozen=True, eq=False):
     """What stands in the place of a value and was already reported."""
 
 
-class ArrayNode(_PositionedNode, frozen=True, eq=False):
-    """A list of values."""
+class _Container(_PositionedNode, frozen=True, eq=False):
+    """A value that holds others."""
 
-    mark_end: int
-    """Where its opening ends: the bracket, or the first `[[header]]`."""
-    items: tuple[Node, ...]
+    opening: tuple[int, int]
+    """The stretch of its bracket, its brace or its `[header]`; a header may stand below a part of
+    the table."""
 
     @property
     def mark(self) -> Span:
         """Its opening."""
-        return self.body.span(self.start, self.mark_end)
+        return self.body.span(*self.opening)
 
 
-class ObjectNode(_PositionedNode, frozen=True, eq=False):
+class ArrayNode(_Container, frozen=True, eq=False):
+    """A list of values."""
+
+    items: tuple[Node, ...]
+
+
+class ObjectNode(_Container, frozen=True, eq=False):
     """A JSON object or a TOML table."""
 
-    mark_start: int
-    mark_end: int
-    """The stretch of its opening: the brace, or the `[header]`, which may stand below a part of the
-    table."""
     members: tuple[Member, ...]
     """As written: a repeated key is in it more than once."""
 
-    @property
-    def mark(self) -> Span:
-        """Its opening."""
-        return self.body.span(self.mark_start, self.mark_end)
-
     def member(self, name: str) -> Member | None:
         """The first member of that name."""
-        for member in self.members:
-            if member.key.value == name:
-                return member
-        return None
+        return next((member for member in self.members if member.key.value == name), None)
 
     def get(self, name: str) -> Node | None:
         """The value of the first member of that name."""
@@ -133,11 +127,21 @@ class ObjectNode(_PositionedNode, frozen=True, eq=False):
         value = self.get(name)
         return self.mark if value is None else value.mark
 
+    def items(self, name: str) -> tuple[Node, ...]:
+        """The values in the array of that name."""
+        value = self.get(name)
+        return value.items if isinstance(value, ArrayNode) else ()
+
     def objects(self, name: str) -> tuple[ObjectNode, ...]:
         """The objects in the array of that name."""
+        return tuple(item for item in self.items(name) if isinstance(item, ObjectNode))
+
+    def object(self, name: str) -> ObjectNode:
+        """The object of that name; an empty one where there is none."""
         value = self.get(name)
-        items = value.items if isinstance(value, ArrayNode) else ()
-        return tuple(item for item in items if isinstance(item, ObjectNode))
+        if isinstance(value, ObjectNode):
+            return value
+        return ObjectNode(self.body, self.start, self.end, self.opening, ())
 
 
 class Member(Struct, frozen=True):

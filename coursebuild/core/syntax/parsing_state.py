@@ -14,7 +14,7 @@ from msgspec import Struct, field
 
 from coursebuild.core.model import Block, Footnote, FootnoteRef
 from coursebuild.core.syntax.headings import Anchors
-from coursebuild.core.syntax.markdown import Definitions
+from coursebuild.core.syntax.markdown import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Source, Span
 
@@ -28,9 +28,10 @@ class ParsingState:
         self.source = source
         self.callouts = callouts
         self.lesson = lesson
-        self.definitions: Definitions = {}
+        self.references: References = {}
         """The link definitions of the document, which its inner texts may use."""
         self.diagnostics: list[Diagnostic] = []
+        self.report = self.diagnostics.append
         self.script: str | None = None
         """The path of the nearest script above."""
         self.figures: list[str] = []
@@ -44,22 +45,13 @@ class ParsingState:
         self.notes = FootnoteList(self.report)
         self.anchors = Anchors(self.report)
 
-    def report(self, diagnostic: Diagnostic) -> None:
-        """Take note of a mistake."""
-        self.diagnostics.append(diagnostic)
-
-    def end(self) -> None:
-        """Let go of what refers back to this, so that no memory waits for the collector."""
-        self.notes.written.clear()
-        del self.notes, self.anchors
-
     def apart(self, read: Callable[[], T]) -> Parsed[T]:
         """What `read` gives, with the diagnostics that it raised, for the caller to pass on."""
-        before, self.diagnostics = self.diagnostics, []
-        try:
-            return Parsed(read(), tuple(self.diagnostics))
-        finally:
-            self.diagnostics = before
+        before = len(self.diagnostics)
+        value = read()
+        found = tuple(self.diagnostics[before:])
+        del self.diagnostics[before:]
+        return Parsed(value, found)
 
 
 class Written(Struct):
@@ -70,6 +62,10 @@ class Written(Struct):
     span: Span
     read: Callable[[], tuple[Block, ...]]
     """Reads its blocks; done once all else is read, in the order of the numbers."""
+    number: int = 0
+    """0 until it is referred to."""
+    references: int = 0
+    """How often it is referred to."""
 
 
 class FootnoteList(Struct):
@@ -81,10 +77,8 @@ class FootnoteList(Struct):
     report: Callable[[Diagnostic], None]
     written: dict[str, Written] = field(default_factory=dict)
     """By label, without case."""
-    numbers: dict[str, int] = field(default_factory=dict)
-    """By label, in order of first reference."""
-    references: dict[str, int] = field(default_factory=dict)
-    """How often each is referred to."""
+    referred: list[Written] = field(default_factory=list)
+    """In the order of their numbers."""
 
     def write(self, note: Written) -> None:
         """Take note of a footnote's text."""
@@ -96,35 +90,31 @@ class FootnoteList(Struct):
 
     def refer(self, label: str, span: Span) -> FootnoteRef | None:
         """A reference, or `None` (and a diagnostic) where no such footnote is written."""
-        key = label.casefold()
-        if key not in self.written:
+        note = self.written.get(label.casefold())
+        if note is None:
             known = [f"[^{note.label}]" for note in islice(self.written.values(), 100)]
             message = f"footnote `[^{label}]` is not written anywhere"
-            hint = (
-                did_you_mean(f"[^{label}]", known)
-                or f"write it as a paragraph that begins with `[^{label}]:`"
-            )
-            self.report(diagnose("footnote-undefined", span, message, help=hint))
+            help = did_you_mean(f"[^{label}]", known)
+            help = help or f"write it as a paragraph that begins with `[^{label}]:`"
+            self.report(diagnose("footnote-undefined", span, message, help=help))
             return None
-        number = self.numbers.setdefault(key, len(self.numbers) + 1)
-        occurrence = self.references.get(key, 0) + 1
-        self.references[key] = occurrence
-        return FootnoteRef(span, label, number, occurrence)
+        if not note.number:
+            self.referred.append(note)
+            note.number = len(self.referred)
+        note.references += 1
+        return FootnoteRef(span, label, note.number, note.references)
 
     def finish(self) -> tuple[Footnote, ...]:
         """Read the footnotes, also those that only footnotes refer to, and warn of the unused."""
-        blocks: dict[str, tuple[Block, ...]] = {}
-        while missing := [key for key in self.numbers if key not in blocks]:
-            for key in missing:
-                blocks[key] = self.written[key].read()
-        numbers, references = dict(self.numbers), dict(self.references)
-        for key, note in self.written.items():
-            if key not in numbers:
-                message = f"footnote `[^{note.label}]` is never referred to"
-                self.report(diagnose("footnote-unused", note.label_span, message))
-                note.read()
-        return tuple(
-            Footnote(note.span, note.label, number, references[key], blocks[key])
-            for key, number in numbers.items()
-            for note in (self.written[key],)
+        blocks = [note.read() for note in self.referred]  # which grows while they are read
+        footnotes = tuple(
+            Footnote(note.span, note.label, note.number, note.references, inner)
+            for note, inner in zip(self.referred, blocks, strict=True)
         )
+        for note in [note for note in self.written.values() if not note.number]:
+            message = f"footnote `[^{note.label}]` is never referred to"
+            self.report(diagnose("footnote-unused", note.label_span, message))
+            note.read()
+        self.written.clear()
+        self.referred.clear()  # as their readers refer back to this
+        return footnotes

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
+from msgspec.structs import asdict
 
 from coursebuild.core.model.scenarios import (
     VISIBLE,
@@ -35,8 +36,8 @@ from coursebuild.core.model.scenarios import (
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
 from coursebuild.core.syntax.course_schema import Slug
 from coursebuild.core.syntax.decode import Decoding, decode
-from coursebuild.core.syntax.fields import Positive, Text, repeated
-from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode
+from coursebuild.core.syntax.fields import Positive, Text, matching, repeated
+from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.wording import TOML, short
 from coursebuild.core.text.diagnostics import (
@@ -64,19 +65,17 @@ BANDS = Bands()
 class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
     """From where on an error would be noticed, and what it may differ by."""
 
-    visible: Annotated[
-        Annotated[float, Meta(gt=0, le=1)], Meta(description="share of the model's extent")
-    ] = VISIBLE
+    visible: Annotated[float, Meta(gt=0, le=1, description="share of the model's extent")] = VISIBLE
     visible_angle: Annotated[
-        Annotated[float, Meta(gt=0, le=180)], Meta(description="degrees, for attitudes and hinges")
+        float, Meta(gt=0, le=180, description="degrees, for attitudes and hinges")
     ] = VISIBLE_ANGLE
     band: Annotated[
-        Annotated[float, Meta(gt=0, le=1)],
-        Meta(description="share by which an error may differ from the recorded one"),
+        float,
+        Meta(gt=0, le=1, description="share by which an error may differ from the recorded one"),
     ] = BANDS.error
     order_band: Annotated[
-        Annotated[float, Meta(gt=0, le=1)],
-        Meta(description="by how much a fitted order may differ from the recorded one"),
+        float,
+        Meta(gt=0, le=1, description="by how much a fitted order may differ from the recorded one"),
     ] = BANDS.order
 
 
@@ -110,23 +109,13 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     )
     measure: Annotated[
         Annotated[
-            str,
-            Meta(
-                pattern=r"^(body|site|sensor):\S.*$",
-                extra={"expects": "`body:NAME`, `site:NAME` or `sensor:NAME`"},
-            ),
+            str, matching(r"^(body|site|sensor):\S.*$", "`body:NAME`, `site:NAME` or `sensor:NAME`")
         ]
         | None,
         Meta(description="what is compared beside coordinates, as in `site:tip`"),
     ] = None
     reference: Annotated[
-        Annotated[
-            str,
-            Meta(
-                pattern=r"^(ode|self|closed:\S.*)$",
-                extra={"expects": "`ode`, `self` or `closed:CASE`"},
-            ),
-        ]
+        Annotated[str, matching(r"^(ode|self|closed:\S.*)$", "`ode`, `self` or `closed:CASE`")]
         | None,
         Meta(description="what errors are measured against, where not whichever fits"),
     ] = None
@@ -154,7 +143,7 @@ class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
         dict[
             str,
             tuple[float | str | tuple[float, ...], ...]
-            | Annotated[str, Meta(pattern=_SHARE, extra={"expects": "values, or a share: `±1 %`"})],
+            | Annotated[str, matching(_SHARE, "values, or a share: `±1 %`")],
         ],
         Meta(description="values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
     ]
@@ -214,29 +203,23 @@ def whole(length: float, part: float) -> bool:
 
 def _declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declarations:
     bench = fields.bench or BenchTable()
-    nodes = zip(root.objects("scenario"), fields.scenario, strict=True)
     keeps = zip(root.objects("keep"), fields.keep, strict=True)
     return Declarations(
         model=source.path.removeprefix("models/").removesuffix(".toml"),
         source=source,
-        scenarios=tuple(_scenario(node, table) for node, table in nodes),
+        scenarios=tuple(map(_scenario, root.objects("scenario"), fields.scenario)),
         visible=Visible(bench.visible, bench.visible_angle),
         keep=tuple(
             Keep(node.mark, table.finding, table.reason, node.place("finding"))
             for node, table in keeps
         ),
         bands=Bands(bench.band, bench.order_band),
-        sweeps=tuple(
-            _sweep(node, table)
-            for node, table in zip(root.objects("sweep"), fields.sweep, strict=True)
-        ),
+        sweeps=tuple(map(_sweep, root.objects("sweep"), fields.sweep)),
     )
 
 
 def _sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
-    vary = node.get("vary")
-    assert isinstance(vary, ObjectNode)
-    spans = {member.key.value: member.key.mark for member in vary.members}
+    spans = {member.key.value: member.key.mark for member in node.object("vary").members}
     return DeclaredSweep(
         span=node.mark,
         name=table.name,
@@ -255,25 +238,15 @@ def _variation(name: str, given: tuple[SweepValue, ...] | str, span: Span) -> Va
 
 
 def _scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
-    reference, _, closed = (table.reference or "").partition(":")
-    return DeclaredScenario(
-        span=node.mark,
-        name=table.name,
-        title=table.title or "",
-        keyframe=table.keyframe,
-        qpos=table.qpos,
-        qvel=table.qvel,
-        duration=table.duration,
-        sample=table.sample,
-        controls=table.controls,
-        hold=table.hold,
-        measure=_measured(table.measure),
-        reference="ode" if reference == "ode" else "self" if reference == "self" else None,
-        closed=closed,
-        conserved=table.conserved,
-        timesteps=table.timesteps,
-        places=tuple((m.key.value, m.value.mark) for m in node.members),
-    )
+    kind, _, closed = (table.reference or "").partition(":")
+    fields = asdict(table) | {
+        "title": table.title or "",
+        "measure": _measured(table.measure),
+        "reference": kind if kind in ("ode", "self") else None,
+        "closed": closed,
+    }
+    places = tuple((member.key.value, member.value.mark) for member in node.members)
+    return DeclaredScenario(**fields, span=node.mark, places=places)
 
 
 def _measured(written: str | None) -> Measured | None:
@@ -313,10 +286,8 @@ def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[D
             yield diagnose("field-value", node.place("vary"), message, help=help)
         counts = table.vary.get("threads", ())
         if not all(one in range(1, MOST_THREADS + 1) for one in counts):
-            vary = node.get("vary")
-            assert isinstance(vary, ObjectNode)
             message = f"`threads` are whole numbers from 1 to {MOST_THREADS}"
-            yield diagnose("field-value", vary.place("threads"), message)
+            yield diagnose("field-value", node.object("vary").place("threads"), message)
 
 
 def _check_scenarios(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
@@ -343,11 +314,7 @@ def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]
 
 
 def _check_timesteps(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
-    given = node.get("timesteps")
-    items = given.items if isinstance(given, ArrayNode) else ()
-    spans = [item.mark for item in items]
-    if len(spans) != len(table.timesteps):
-        return
+    spans = [item.mark for item in node.items("timesteps")]
     pairs = list(zip(table.timesteps, spans, strict=True))
     for (length, name), (step, span) in itertools.product(_lengths(table), pairs):
         if not whole(length, step):
@@ -372,9 +339,7 @@ def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnost
     if len(table.controls) > 1 and table.hold is None:
         help = "`hold`: seconds for which each command holds"
         yield diagnose("field-missing", node.mark, "`hold` is missing", help=help)
-    given = node.get("controls")
-    items = given.items if isinstance(given, ArrayNode) else ()
-    for item, row in zip(items, table.controls, strict=False):
+    for item, row in zip(node.items("controls"), table.controls, strict=True):
         first = len(table.controls[0])
         if len(row) != first:
             message = f"this command has {len(row)} numbers, and the first one has {first}"

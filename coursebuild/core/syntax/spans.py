@@ -5,16 +5,14 @@ Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose to
 
 1. Block rules cut lines out of the text by `getLines`; `BlockState` notes where each of those rows
    began.
-2. `locate` joins such rows to an excerpt of the source, through the excerpt that was parsed (a
-   whole file, or a text in JSON).
+2. `locate` joins such rows of what was parsed, a whole file or a text in JSON, to an excerpt.
 3. Inline rules work on one block's content; `InlineState` notes from where to where each token
    reaches in it.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -29,13 +27,12 @@ from coursebuild.core.text.source import Excerpt, Source
 
 
 class SourceSlice(NamedTuple):
-    """A stretch of the parsed text that became part of a block's content."""
+    """The stretch `[start, end)` of the parsed text, which became part of a block's content."""
 
-    text: str
-    at: int
-    """Offset of the first character that is not padding."""
+    start: int
+    end: int
     padding: int = 0
-    """Leading spaces of `text` that stand for a part of the tab before `at`."""
+    """How many spaces stand before it, for a part of the tab before `start`."""
 
 
 @dataclass(slots=True)
@@ -74,13 +71,13 @@ class BlockState(StateBlock):
         self.rows = rows = [
             self._row(line, indent, keepLastLF or line + 1 < end) for line in range(begin, end)
         ]
-        return "".join([row.text for row in rows])
+        return "".join([" " * row.padding + self.src[row.start : row.end] for row in rows])
 
     def _row(self, line: int, indent: int, line_end: bool) -> SourceSlice:
         src, first = self.src, self.bMarks[line]
         last = self.eMarks[line] + 1 if line_end else self.eMarks[line]
         if indent <= 0:
-            return SourceSlice(src[first:last], first)
+            return SourceSlice(first, last)
         shift = self.tShift[line]
         begin, column = first, 0
         while column < indent and first < last:
@@ -92,8 +89,7 @@ class BlockState(StateBlock):
             else:
                 break
             first += 1
-        padding = max(0, column - indent)
-        return SourceSlice(" " * padding + src[first:last], first, padding)
+        return SourceSlice(first, last, max(0, column - indent))
 
 
 class InlineState(StateInline):
@@ -102,35 +98,25 @@ class InlineState(StateInline):
     def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
         super().__init__(src, md, env, [])
         self.mark = 0
-        self.last_bracket: int | None = None
-        """Where the last `]` stands, once somebody asked."""
-        self.last_braced: int | None = None
-        """Where the last `]{` stands, once somebody asked."""
-        self.last_runs: dict[int, int] | None = None
-        """Where the last run of each number of backticks begins, once somebody asked."""
+        self.last_bracket, self.last_braced = src.rfind("]"), src.rfind("]{")
+        """Where the last `]` and the last `]{` stand."""
+        self.last_runs: dict[int, int] = {}
+        """Where the last run of each number of backticks begins."""
         self.literal = ""
         """In a text that is HTML: the open element in which a dollar is a dollar."""
 
     def pushPending(self) -> Token:  # noqa: N802
         """Make the pending text a token."""
-        return self.push_text(self.pending)
-
-    def push_text(self, content: str) -> Token:
-        """Make this, which is all of the pending text, a token."""
-        start = self.mark
-        token = PositionedToken(
-            "text", "", 0, level=self.pendingLevel, content=content, start=start
-        )
-        token.end = start + len(content)
+        token = PositionedToken("text", "", 0, level=self.pendingLevel, content=self.pending)
+        token.start, token.end = self.mark, self.mark + len(self.pending)
         self.tokens.append(token)
         self.pending = ""
         return token
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
         """Add a token that begins here; the tokenizer sets its end when the rule is through."""
-        text = self.pending
-        if text:
-            self.push_text(text)
+        if self.pending:
+            self.pushPending()
         meta = None
         if nesting < 0:
             self.level -= 1
@@ -150,43 +136,12 @@ class InlineState(StateInline):
 
 def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
     """The rows joined, each character with its place in the source of `base`."""
-    texts: list[str] = []
-    pieces: list[tuple[int, int]] = []
-    at, shift = 0, None
-    for text, offset, padding in rows:
-        for i in range(padding):
-            pieces.append((at + i, base.offset(offset - 1)))
-            shift = None
-        start = at + padding
-        end = offset + len(text) - padding
-        for inner, to in _pieces(base, offset, end):
-            if to - start - inner != shift:
-                shift = to - start - inner
-                pieces.append((start + inner, to))
-        texts.append(text)
-        at += len(text)
-    return Excerpt(base.source, "".join(texts), tuple(pieces) or ((0, 0),))
-
-
-def _pieces(base: Excerpt, start: int, end: int) -> Iterable[tuple[int, int]]:
-    """The pieces of `base` between two of its offsets, counted from the first."""
-    first = bisect_right(base.pieces, start, key=lambda piece: piece[0])
-    last = bisect_right(base.pieces, end - 1, key=lambda piece: piece[0])
-    return ((0, base.offset(start)), *((t - start, s) for t, s in base.pieces[first:last]))
-
-
-def joined(parts: Iterable[Excerpt], between: str = "") -> Excerpt | None:
-    """Excerpts of one source put together; `None` where there are none."""
-    texts: list[str] = []
-    pieces: list[tuple[int, int]] = []
-    source: Source | None = None
-    at = 0
-    for part in parts:
-        source = part.source
-        pieces += [(at + t, s) for t, s in part.pieces]
-        texts.append(part.text)
-        at += len(part.text) + len(between)
-    return None if source is None else Excerpt(source, between.join(texts), tuple(pieces))
+    parts: list[Excerpt] = []
+    for start, end, padding in rows:
+        for _ in range(padding):
+            parts.append(Excerpt(base.source, " ", ((0, base.offset(start - 1)),)))
+        parts.append(base.slice(start, end))
+    return Excerpt.join(parts)
 
 
 def trimmed(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:

@@ -13,7 +13,7 @@ from typing import Literal
 from markdown_it.common.utils import MD_TRIM_CHARS
 
 from coursebuild.core.model import Cell, Inline, Table
-from coursebuild.core.syntax.spans import PositionedToken, SourceSlice, locate, trimmed
+from coursebuild.core.syntax.spans import PositionedToken, trimmed
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -70,15 +70,15 @@ def _split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
     line = base.text[start:end]
     at = start + len(line) - len(line.lstrip(MD_TRIM_CHARS))
     end = start + len(line.rstrip(MD_TRIM_CHARS))
-    cells: list[list[SourceSlice]] = [[]]
+    cells: list[list[Excerpt]] = [[]]
     for pipe in _PIPE.finditer(base.text, at, end):
-        cells[-1].append(SourceSlice(base.text[at : pipe.start()], at))
+        cells[-1].append(base.slice(at, pipe.start()))
         if pipe[0] == "|":
             cells.append([])
             at = pipe.end()
         else:  # the pipe is text, without its backslash
             at = pipe.end() - 1
-    cells[-1].append(SourceSlice(base.text[at:end], at))
-    found = [locate(base, cell) for cell in cells]
+    cells[-1].append(base.slice(at, end))
+    found = [Excerpt.join(parts) for parts in cells]
     found = found[not found[0].text :]
     return [trimmed(cell) for cell in (found if found and found[-1].text else found[:-1])]

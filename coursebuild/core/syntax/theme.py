@@ -6,22 +6,21 @@ Entry points: `ThemeTable`; `theme`, the value of it, its files not read yet; `c
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from msgspec import Meta, Struct
-from msgspec.structs import replace
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, LEAST, contrast, legible
 from coursebuild.core.model.theme import PICTURES, Accent, FontFamily, Theme, ThemeFile
-from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode
+from coursebuild.core.syntax.fields import matching
+from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 
 def _file(what: str, endings: str, example: str) -> Meta:
     """The field of a file in `theme/` with one of these endings."""
-    return Meta(
-        pattern=rf"^theme(/[\w-][\w.-]*)+\.({endings})$",
-        extra={"expects": f"{what} in `theme/`, as in `theme/{example}`"},
+    return matching(
+        rf"^theme(/[\w-][\w.-]*)+\.({endings})$", f"{what} in `theme/`, as in `theme/{example}`"
     )
 
 
@@ -30,10 +29,7 @@ Png: TypeAlias = Annotated[str, _file("a PNG", "png", "icon.png")]
 StyleSheet: TypeAlias = Annotated[str, _file("a style sheet", "css", "style.css")]
 Font: TypeAlias = Annotated[str, _file("a font", "ttf|otf|woff2?", "Vollkorn.ttf")]
 Licence: TypeAlias = Annotated[str, _file("a text", "txt|md", "OFL.txt")]
-Colour: TypeAlias = Annotated[
-    str,
-    Meta(pattern="^#[0-9A-Fa-f]{6}$", extra={"expects": "a colour as in `#17487a`"}),
-]
+Colour: TypeAlias = Annotated[str, matching("^#[0-9A-Fa-f]{6}$", "a colour as in `#17487a`")]
 
 
 class FontTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -61,10 +57,8 @@ class ThemeTable(Struct, frozen=True, forbid_unknown_fields=True):
     font: tuple[FontTable, ...] = ()
 
 
-def theme(node: Node | None, fields: ThemeTable | None) -> Theme:
+def theme(node: ObjectNode, fields: ThemeTable) -> Theme:
     """What the table says."""
-    if fields is None or not isinstance(node, ObjectNode):
-        return Theme()
 
     def file(name: str, path: str | None) -> ThemeFile | None:
         return None if path is None else ThemeFile(path, node.place(name))
@@ -72,9 +66,9 @@ def theme(node: Node | None, fields: ThemeTable | None) -> Theme:
     def accent(name: str, colour: str | None) -> Accent | None:
         return None if colour is None else Accent(colour.lower(), node.place(name))
 
-    return replace(
-        Theme(),
-        **{name: file(name, getattr(fields, name)) for name in PICTURES},
+    pictures: dict[str, Any] = {name: file(name, getattr(fields, name)) for name in PICTURES}
+    return Theme(
+        **pictures,
         accent=accent("accent", fields.accent),
         accent_dark=accent("accent_dark", fields.accent_dark),
         css=_files(node, "css", fields.css),
@@ -101,6 +95,4 @@ def check_contrast(theme: Theme) -> Iterator[Diagnostic]:
 
 
 def _files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[ThemeFile, ...]:
-    array = node.get(name)
-    items = array.items if isinstance(array, ArrayNode) else ()
-    return tuple(ThemeFile(path, item.span) for path, item in zip(paths, items, strict=True))
+    return tuple(map(ThemeFile, paths, (item.span for item in node.items(name))))

@@ -45,7 +45,7 @@ def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode
     `rule` is what that diagnostic is called. The value can be there along with diagnostics; a
     caller that finds any must not publish it.
     """
-    body = _body(source)
+    body = source.excerpt("\r\n")  # as `tomllib` reads it; a lone CR stays, since TOML refuses it
     try:
         tomllib.loads(source.text)
         reader = _Reader(body)
@@ -62,16 +62,6 @@ def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode
 def quoted(text: str) -> str:
     """A basic string of TOML, which takes the escapes of JSON."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _body(source: Source) -> Excerpt:
-    """The text with CRLF made LF, as `tomllib` reads it; a lone CR stays, since TOML refuses it."""
-    lines: list[tuple[str, int]] = []
-    at = 0
-    for line in source.text.split("\r\n"):
-        lines.append((line, at))
-        at += len(line) + 2
-    return Excerpt.of_lines(source, lines)
 
 
 def _repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
@@ -108,7 +98,7 @@ class _TableList(Struct):
 
     start: int
     end: int
-    mark_end: int
+    mark: tuple[int, int]
     items: list[_TableParts]
 
 
@@ -119,10 +109,10 @@ def _node(body: Excerpt, item: _Item) -> Node:
     """A table, when nothing can be added any more."""
     if isinstance(item, _TableParts):
         members = tuple(Member(key, _node(body, inner)) for key, inner in item.members.values())
-        return ObjectNode(body, item.start, item.end, *item.mark, members)
+        return ObjectNode(body, item.start, item.end, item.mark, members)
     if isinstance(item, _TableList):
         items = tuple(_node(body, table) for table in item.items)
-        return ArrayNode(body, item.start, item.end, item.mark_end, items)
+        return ArrayNode(body, item.start, item.end, item.mark, items)
     return item
 
 
@@ -169,7 +159,7 @@ class _Reader:
             self.known = (last, first)
         if statement.type == "table_array_element":
             if first is last:
-                item = _TableList(start, end, mark[1], [])
+                item = _TableList(start, end, mark, [])
                 parent.members[last.value] = (last, item)
             if isinstance(item, _TableList):
                 item.items.append(table)
@@ -229,7 +219,7 @@ class _Reader:
             case "array":
                 inner = (child for child in node.named_children if child.type != "comment")
                 items = tuple(self.value(child) for child in inner)
-                return ArrayNode(self.body, start, end, start + 1, items)
+                return ArrayNode(self.body, start, end, (start, start + 1), items)
             case "inline_table":
                 table = _TableParts(start, end, (start, start + 1))
                 for pair in node.named_children:

@@ -16,7 +16,7 @@ import re
 from collections.abc import Callable
 
 from coursebuild.core import model
-from coursebuild.core.syntax.attributes import Braces, read_label
+from coursebuild.core.syntax.attributes import LABEL, read_label
 from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_ours, read_fence
@@ -24,7 +24,7 @@ from coursebuild.core.syntax.figure import WORD, read_figure
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
 from coursebuild.core.syntax.html import Balance, media_of, tags
 from coursebuild.core.syntax.inlines import InlineReader
-from coursebuild.core.syntax.markdown import TOO_DEEP, Definitions, block_tokens
+from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.parsing_state import ParsingState, Written
 from coursebuild.core.syntax.recording import (
     is_caption,
@@ -46,14 +46,14 @@ class TextReader:
     """Reads one text; `nested` for a text of a quiz or lab."""
 
     def __init__(
-        self, base: Excerpt, session: ParsingState, definitions: Definitions, *, nested: bool
+        self, base: Excerpt, session: ParsingState, references: References, *, nested: bool
     ) -> None:
         self.base, self.session, self.nested = base, session, nested
         self.balance = Balance(session.report)
         self.texts = Texts(session)
-        self.tokens = block_tokens(base, definitions)
+        self.tokens = block_tokens(base, references)
         self.at = 0
-        self.inlines = InlineReader(definitions, session, self.balance)
+        self.inlines = InlineReader(references, session, self.balance)
         self._prepare()
 
     def _prepare(self) -> None:
@@ -234,8 +234,8 @@ class TextReader:
 
     def _label(self, text: Excerpt, at: int) -> model.Label | None:
         """The label of the formula that ends before an offset."""
-        braces = Braces.of_label(text.text, at, len(text.text))
-        label = read_label(text, braces, self.session.report) if braces is not None else None
+        braces = LABEL.match(text.text, at)
+        label = read_label(text.slice(*braces.span(1)), self.session.report) if braces else None
         if label is not None:
             self.session.anchors.take(label.id, label.span)
         return label
@@ -339,7 +339,7 @@ class Texts:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
         base = normalized(excerpt)
         return self._session.apart(
-            lambda: TextReader(base, self._session, self._definitions(), nested=True).read()
+            lambda: TextReader(base, self._session, self._references(), nested=True).read()
         )
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[model.Inline, ...]]:
@@ -349,11 +349,11 @@ class Texts:
 
     def _read_inlines(self, content: Excerpt) -> tuple[model.Inline, ...]:
         balance = Balance(self._session.report)
-        reader = InlineReader(self._definitions(), self._session, balance)
+        reader = InlineReader(self._references(), self._session, balance)
         inlines = reader.read(content)
         balance.finish()
         return inlines
 
-    def _definitions(self) -> Definitions:
+    def _references(self) -> References:
         """The document's link definitions; those that a text adds are its own."""
-        return dict(self._session.definitions)
+        return dict(self._session.references)

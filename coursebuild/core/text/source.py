@@ -18,7 +18,7 @@ from __future__ import annotations
 import hashlib
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import accumulate
 
@@ -78,12 +78,12 @@ class Source(Struct, frozen=True, dict=True):
         """The span from `start` to `end` (default: the whole text)."""
         return Span(self, start, len(self.text) if end is None else end)
 
-    def excerpt(self) -> Excerpt:
-        """The whole text with its line ends made LF."""
-        if "\r" not in self.text:
-            return Excerpt(self, self.text, ((0, 0),))
-        lines = [(self.line_text(i + 1), start) for i, start in enumerate(self.line_starts)]
-        return Excerpt.of_lines(self, lines)
+    def excerpt(self, line_end: str = r"\r\n|\r") -> Excerpt:
+        """The whole text, in which line ends that match become LF."""
+        whole = Excerpt.of_span(self.span())
+        ends = [end.span() for end in re.finditer(line_end, self.text)]
+        starts, stops = (0, *(b for _, b in ends)), (*(a for a, _ in ends), len(self.text))
+        return Excerpt.join([whole.slice(a, b) for a, b in zip(starts, stops, strict=True)], "\n")
 
 
 class Span(Struct, frozen=True):
@@ -155,22 +155,22 @@ class Excerpt(Struct, frozen=True):
         return text_digest(self.text)
 
     @classmethod
-    def of_lines(cls, source: Source, lines: Iterable[tuple[str, int]]) -> Excerpt:
-        """Join lines, each with the source offset of its first character, by LF."""
-        texts: list[str] = []
-        pieces: list[tuple[int, int]] = []
-        at = 0
-        for text, offset in lines:
-            if not pieces or offset - pieces[-1][1] != at - pieces[-1][0]:
-                pieces.append((at, offset))
-            texts.append(text)
-            at += len(text) + 1
-        return cls(source, "\n".join(texts), tuple(pieces) or ((0, 0),))
-
-    @classmethod
     def of_span(cls, span: Span) -> Excerpt:
         """A span's own text."""
         return cls(span.source, span.text, ((0, span.start),))
+
+    @classmethod
+    def join(cls, parts: Sequence[Excerpt], between: str = "") -> Excerpt:
+        """Excerpts of one source, at least one, put together."""
+        pieces: list[tuple[int, int]] = []
+        at, shift = 0, None
+        for part in parts:
+            for start, offset in part.pieces:
+                if offset - at - start != shift:
+                    shift = offset - at - start
+                    pieces.append((at + start, offset))
+            at += len(part.text) + len(between)
+        return cls(parts[0].source, between.join([part.text for part in parts]), tuple(pieces))
 
     def offset(self, at: int) -> int:
         """Source offset of the character at text offset `at`."""

@@ -10,7 +10,7 @@ import re
 
 from coursebuild.core.model import Inline
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.spans import joined, trimmed
+from coursebuild.core.syntax.spans import trimmed
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
@@ -108,4 +108,5 @@ def _missing(label: str, parts: _Parts, fence: Fence) -> Diagnostic:
 
 def _text(lines: list[Excerpt]) -> Excerpt | None:
     """The lines of a part as one text without indentation and empty lines; `None` where none is."""
-    return joined((trimmed(line) for line in lines if line.text.strip()), between="\n")
+    parts = [trimmed(line) for line in lines if line.text.strip()]
+    return Excerpt.join(parts, "\n") if parts else None

@@ -32,7 +32,7 @@ def test_lines_are_cut_out_as_by_markdown_it(text: str, data: st.DataObject) -> 
     arguments = (begin, end, data.draw(st.integers(0, 5)), data.draw(st.booleans()))
     assert ours.getLines(*arguments) == theirs.getLines(*arguments)
     base = Excerpt(Source("a.md", text), text, ((0, 0),))
-    assert locate(base, ours.rows).text == ours.getLines(*arguments)
+    assert not ours.rows or locate(base, ours.rows).text == ours.getLines(*arguments)
 
 
 @given(tables)

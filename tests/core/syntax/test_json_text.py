@@ -27,8 +27,7 @@ def walk(node: Node) -> list[Node]:
 def test_each_character_of_a_string_knows_its_place() -> None:
     text = '> ["a\\n\\u00e9\\ud83d\\ude00\\\\x",\n>  "plain", ""]'
     source = Source("lesson.md", text)
-    first, second = text.split("\n")
-    body = Excerpt.of_lines(source, [(first[2:], 2), (second[2:], len(first) + 3)])
+    body = Excerpt.join([line.slice(2) for line in source.excerpt().lines()], "\n")
     node = parse_json(body, source.span(0, 0)).value
     assert isinstance(node, ArrayNode)
     escaped, simple, empty = node.items

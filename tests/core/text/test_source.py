@@ -48,7 +48,7 @@ def test_excerpt_of_a_crlf_text_points_into_it() -> None:
 
 def test_excerpt_of_prefixed_lines() -> None:
     source = Source("x.md", "> {\n>  1}\n")
-    excerpt = Excerpt.of_lines(source, [("{", 2), (" 1}", 6)])
+    excerpt = Excerpt.join([Excerpt.of_span(source.span(*at)) for at in ((2, 3), (6, 9))], "\n")
     assert excerpt.span(3, 4).text == "1"
     assert excerpt.slice(2, 5).span(1, 3).text == "1}"
     assert excerpt.span().text == "{\n>  1}"
