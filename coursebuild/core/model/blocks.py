@@ -9,9 +9,9 @@ import enum
 import re
 from collections.abc import Mapping
 from decimal import Decimal
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from coursebuild.core.model.inlines import ForbiddenHtml, Inline, Label, MediaAddress
 from coursebuild.core.text.source import Excerpt, Source, Span
@@ -214,11 +214,11 @@ def volatile_pattern(pattern: str) -> str:
     return rf"[^\S\n]*(?:{pattern})[^\S\n]*"
 
 
-class Filter(Struct, frozen=True):
-    """`[[verify.filter]]`: a regular expression replaced on both sides before comparing."""
+class Filter(Struct, frozen=True, forbid_unknown_fields=True):
+    """A replacement in both texts before they are compared."""
 
-    pattern: str
-    replacement: str
+    pattern: Annotated[str, Meta(min_length=1, description="a regular expression, as RE2 reads it")]
+    replacement: Annotated[str, Meta(description="with groups as in `\\1`")]
 
 
 class Recording(Struct, frozen=True):

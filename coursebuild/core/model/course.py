@@ -114,15 +114,15 @@ class Pace(Struct, frozen=True, forbid_unknown_fields=True):
     task: Annotated[float, Meta(ge=0, description="minutes for a question, or to try a lab")]
 
 
-class Silence(Struct, frozen=True):
-    """A warning that the author does not want to see, and why.
+class Silence(Struct, frozen=True, forbid_unknown_fields=True):
+    """A warning that is not shown."""
 
-    `path` limits it to a file (glob).
-    """
-
-    rule: str
-    reason: str
-    path: str | None
+    rule: Annotated[str, Meta(pattern=r"\S", description="the name of a warning")]
+    reason: Annotated[str, Meta(description="why")] = ""
+    path: Annotated[
+        Annotated[str, Meta(pattern=r"\S")] | None,
+        Meta(description="only in these files; `*` and `?` stand for anything"),
+    ] = None
 
 
 class NamedPath(Struct, frozen=True):

@@ -14,7 +14,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model import Limits, Pace
+from coursebuild.core.model import Filter, Limits, Pace, Silence
 from coursebuild.core.syntax.fields import NotNegative, Text, matching
 from coursebuild.core.syntax.theme import ThemeTable
 
@@ -106,13 +106,6 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ()
 
 
-class FilterTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """A replacement in both texts before they are compared."""
-
-    pattern: Annotated[str, Meta(min_length=1, description="a regular expression, as RE2 reads it")]
-    replacement: Annotated[str, Meta(description="with groups as in `\\1`")]
-
-
 class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     """How recorded outputs are compared where a fence says nothing."""
 
@@ -127,7 +120,7 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     ellipsis: Annotated[bool, Meta(description="`...` in a recorded output matches anything")] = (
         False
     )
-    filter: tuple[FilterTable, ...] = ()
+    filter: tuple[Filter, ...] = ()
     env: Annotated[dict[str, str], Meta(description="environment variables of scripts")] = {}
     python: Annotated[
         InterpreterPath | None,
@@ -157,16 +150,6 @@ class CalloutTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     label: Annotated[Text, Meta(description="shown over the callout")]
     promise: Annotated[str, Meta(description="what it promises the reader")] = ""
-
-
-class SilenceTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """A warning that is not shown."""
-
-    rule: Annotated[Text, Meta(description="the name of a warning")]
-    reason: Annotated[str, Meta(description="why")] = ""
-    path: Annotated[
-        Text | None, Meta(description="only in these files; `*` and `?` stand for anything")
-    ] = None
 
 
 class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -246,6 +229,6 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
         dict[str, Text | CalloutTable],
         Meta(description="more kinds of callouts by name, with a label or a table"),
     ] = {}
-    silence: tuple[SilenceTable, ...] = ()
+    silence: tuple[Silence, ...] = ()
     level: tuple[LevelTable, ...] = ()
     page: tuple[PageTable, ...] = ()

@@ -9,15 +9,9 @@ import re
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
 
-from coursebuild.core.model import CalloutKind, Comparison, Mode
+from coursebuild.core.model import CalloutKind, Comparison, Filter, Mode, Silence
 from coursebuild.core.model.vocabulary import CALLOUTS
-from coursebuild.core.syntax.course_schema import (
-    CalloutTable,
-    CourseFile,
-    FilterTable,
-    SilenceTable,
-    VerifyTable,
-)
+from coursebuild.core.syntax.course_schema import CalloutTable, CourseFile, VerifyTable
 from coursebuild.core.syntax.decode import Decoding
 from coursebuild.core.syntax.nodes import NumberNode, ObjectNode, StringNode
 from coursebuild.core.syntax.wording import named
@@ -35,7 +29,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
     verify = root.object("verify")
     for node, fields in decoding.each([verify], VerifyTable):
         yield from _check_verify(node, fields)
-    for node, _ in decoding.each(verify.objects("filter"), FilterTable):
+    for node, _ in decoding.each(verify.objects("filter"), Filter):
         yield from _check_filter(node)
     for member in verify.object("env").members:
         if not _VARIABLE.fullmatch(member.key.value):
@@ -47,7 +41,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             message = f"{named(member.key.value)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
-    for node, silence in decoding.each(root.objects("silence"), SilenceTable):
+    for node, silence in decoding.each(root.objects("silence"), Silence):
         yield from _check_silence(node, silence)
 
 
@@ -108,7 +102,7 @@ def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind
     return tuple(kinds.values())
 
 
-def _check_silence(node: ObjectNode, fields: SilenceTable) -> Iterator[Diagnostic]:
+def _check_silence(node: ObjectNode, fields: Silence) -> Iterator[Diagnostic]:
     rule = RULES.get(fields.rule)
     if rule is None:
         warning_names = [name for name, known in RULES.items() if known.severity == "warning"]

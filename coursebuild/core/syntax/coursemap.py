@@ -20,16 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec.structs import asdict
 
-from coursebuild.core.model import (
-    Course,
-    Filter,
-    Lesson,
-    Level,
-    NamedPath,
-    Page,
-    Silence,
-    Status,
-)
+from coursebuild.core.model import Course, Lesson, Level, NamedPath, Page, Status
 from coursebuild.core.syntax.course_schema import (
     CourseFile,
     LessonTable,
@@ -37,11 +28,7 @@ from coursebuild.core.syntax.course_schema import (
     PageTable,
     VerifyTable,
 )
-from coursebuild.core.syntax.course_settings import (
-    callout_kinds,
-    check_settings,
-    comparison,
-)
+from coursebuild.core.syntax.course_settings import callout_kinds, check_settings, comparison
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.nodes import Node, NumberNode, ObjectNode, StringNode
@@ -108,9 +95,9 @@ def _course(
         comparison=comparison(gate, verify),
         truth=verify.truth,
         truth_span=gate.place("truth"),
-        filters=tuple(Filter(f.pattern, f.replacement) for f in verify.filter),
+        filters=verify.filter,
         callouts=callout_kinds(fields.callouts),
-        silences=tuple(Silence(s.rule, s.reason, s.path) for s in fields.silence),
+        silences=fields.silence,
         levels=levels,
         pages=tuple(
             Page(node.span, page.id, page.title, page.file, None, page.menu)

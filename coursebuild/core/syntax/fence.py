@@ -18,7 +18,7 @@ from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.info import FenceKeys, kind_of, read_keys, words_of
 from coursebuild.core.syntax.spans import PositionedToken, locate, trimmed
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
-from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.text.source import Excerpt, Span
 
 # Names of languages and file types that highlighters know and that are spelt like kinds of ours.
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
@@ -100,24 +100,17 @@ def _inner(body: Excerpt, marks: str) -> Span | None:
 
 def _lines(span: Span, head: Span, closed: bool) -> tuple[Span, str]:
     """The whole lines between the fences, and what new ones must begin with."""
-    source = span.source
-    first, last = head.line, span.end_line
-    start = _line_start(source, first + 1)
-    end = _line_start(source, last if closed else last + 1)
+    source, last = span.source, span.end_line
+    start = source.line_start(head.line + 1)
+    end = source.line_start(last if closed else last + 1)
     return Span(source, start, max(start, end)), line_prefix(head)
 
 
 def line_prefix(place: Span) -> str:
     """What further lines of a block must begin with, by what stands before its first."""
-    prefix = place.source.text[_line_start(place.source, place.line) : place.start]
+    prefix = place.source.text[place.source.line_start(place.line) : place.start]
     prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
     return prefix + " " if prefix.endswith(">") else prefix
-
-
-def _line_start(source: Source, line: int) -> int:
-    """Where a line (from 1) begins; the end of the text past the last one."""
-    starts = source.line_starts
-    return starts[line - 1] if line <= len(starts) else len(source.text)
 
 
 def kind_doubts(fence: Fence) -> Iterator[Diagnostic]:

@@ -20,6 +20,7 @@ from coursebuild.core.text.source import Excerpt, Span
 
 _WORD = re.compile(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
 _SPACED = re.compile(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
+_KIND = re.compile(r"\s*(\S*)")
 _BLACK = re.compile(r"\S")
 _REST = re.compile(r"\S*")
 _PART = re.compile(r"(?:^|(?<=,))[^,]*")
@@ -77,9 +78,8 @@ class FenceKeys(Struct, frozen=True):
 
 def kind_of(info: Excerpt) -> Excerpt:
     """The first word of an info string."""
-    words, text = info.text.split(None, 1), info.text
-    start = len(text) - len(text.lstrip())
-    return info.slice(start, start + len(words[0])) if words else info.slice(0, 0)
+    found = _KIND.match(info.text)
+    return info.slice(*found.span(1)) if found else info
 
 
 def read_keys(

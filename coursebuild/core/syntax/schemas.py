@@ -37,7 +37,7 @@ def json_schema(name: str) -> bytes:
     made = copy.deepcopy(msgspec.json.schema(root))
     definitions: dict[str, Any] = made["$defs"]
     if name == "course":
-        definitions["SilenceTable"]["required"].append("reason")
+        definitions["Silence"]["required"].append("reason")
     for refine in (feature.refine_schema for feature in features()):
         if refine is not None:
             refine(definitions)

@@ -144,19 +144,14 @@ def _timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
 
 
 def _figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[FigureName]:
-    if word is None or word.value_text is None:
-        return
-    text, at = word.value_text, 0
-    for name in text.text.split(","):
-        span = text.span(at, at + len(name))
-        at += len(name) + 1
-        if _FIGURE.fullmatch(name):
-            yield FigureName(name, span)
+    for name in () if word is None else word.parts():
+        if _FIGURE.fullmatch(name.text):
+            yield FigureName(name.text, name.span())
         else:
-            message = f"`{name}` is no name of a figure"
+            message = f"`{name.text}` is no name of a figure"
             help = "it is a file name that ends in `.svg` or `.png`, as in `figure=flip.svg`, or "
             help += "in `.csv` for the data of the figure with this name"
-            diagnostics.append(diagnose("fence-key-value", span, message, help=help))
+            diagnostics.append(diagnose("fence-key-value", name.span(), message, help=help))
 
 
 def _modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
@@ -248,7 +243,7 @@ def _syntax_mistake(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
     end = max(start, min(max(end, start + 1), len(row.text)))
 
     def lesson_line(found: re.Match[str]) -> str:
-        return f"{found[1]} line {code.line_span(int(found[2])).line}"
+        return f"{found[1]} line {rows[int(found[2]) - 1].span().line}"
 
     message, _, help = _ON_LINE.sub(lesson_line, error.msg).partition(". ")
     if not help and not script:

@@ -66,13 +66,13 @@ class Source(Struct, frozen=True, dict=True):
         line = bisect_right(self.line_starts, offset)
         return line, offset - self.line_starts[line - 1] + 1
 
+    def line_start(self, line: int) -> int:
+        """Where a line (from 1) begins; the end of the text past the last one."""
+        return self.line_starts[line - 1] if line <= len(self.line_starts) else len(self.text)
+
     def line_text(self, line: int) -> str:
         """The text of a line (from 1) without its line end; empty past the last line."""
-        starts = self.line_starts
-        if not 1 <= line <= len(starts):
-            return ""
-        end = starts[line] if line < len(starts) else len(self.text)
-        return self.text[starts[line - 1] : end].rstrip("\r\n")
+        return self.text[self.line_start(line) : self.line_start(line + 1)].rstrip("\r\n")
 
     def span(self, start: int = 0, end: int | None = None) -> Span:
         """The span from `start` to `end` (default: the whole text)."""
@@ -201,8 +201,3 @@ class Excerpt(Struct, frozen=True):
             out.append(self.slice(at, at + len(text)))
             at += len(text) + 1
         return tuple(out)
-
-    def line_span(self, line: int) -> Span:
-        """The source span of the text's line number `line` (from 1; clamped)."""
-        rows = self.lines()
-        return rows[min(max(line, 1), len(rows)) - 1].span()

@@ -43,7 +43,7 @@ def test_excerpt_of_a_crlf_text_points_into_it() -> None:
     excerpt = source.excerpt()
     assert excerpt.text == "ab\ncd\n"
     assert [excerpt.offset(i) for i in range(6)] == [0, 1, 2, 4, 5, 6]
-    assert excerpt.line_span(2).text == "cd"
+    assert excerpt.lines()[1].span().text == "cd"
 
 
 def test_excerpt_of_prefixed_lines() -> None:
