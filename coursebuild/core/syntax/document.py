@@ -15,7 +15,6 @@ import re
 from collections.abc import Iterator
 
 from coursebuild.core.model import (
-    Block,
     Document,
     Heading,
     Math,
@@ -34,7 +33,7 @@ from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import whole
 from coursebuild.core.syntax.tree import TextReader
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
-from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.text.source import Excerpt, Source
 
 _YAML = re.compile(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
@@ -91,14 +90,18 @@ def _misplaced(document: Document) -> tuple[Diagnostic, ...]:
     found = [*_taken(document)]
     for block in document_blocks(document):
         away = id(block) in elsewhere
-        for span in _terms(block) if away or not isinstance(block, Paragraph) else ():
+        inlines = [*walk_inlines(block_inlines(block))]
+        if away or not isinstance(block, Paragraph):
             message = "a term is not defined here"
             help = "define it in a paragraph of the text, whose sentence the glossary can show"
-            found.append(diagnose("term-place", span, message, help=help))
-        for span in _labels(block) if away or isinstance(block, Heading) else ():
+            terms = (term.span for term in inlines if isinstance(term, Term))
+            found += [diagnose("term-place", span, message, help=help) for span in terms]
+        if away or isinstance(block, Heading):
             message = "a formula has no label here"
             help = "label formulas of the text, but not those of quizzes, labs and headings"
-            found.append(diagnose("equation-label", span, message, help=help))
+            formulas = (one for one in (block, *inlines) if isinstance(one, Math | MathBlock))
+            labels = (formula.label.span for formula in formulas if formula.label is not None)
+            found += [diagnose("equation-label", span, message, help=help) for span in labels]
     return tuple(found)
 
 
@@ -114,17 +117,3 @@ def _taken(document: Document) -> Iterator[Diagnostic]:
             notes = [Note("it is that of this term", terms[block.anchor])]
             message = f"the id `{block.anchor}` is already used"
             yield diagnose("anchor-repeated", block.span, message, notes=notes)
-
-
-def _terms(block: Block) -> Iterator[Span]:
-    for inline in walk_inlines(block_inlines(block)):
-        if isinstance(inline, Term):
-            yield inline.span
-
-
-def _labels(block: Block) -> Iterator[Span]:
-    if isinstance(block, MathBlock) and block.label is not None:
-        yield block.label.span
-    for inline in walk_inlines(block_inlines(block)):
-        if isinstance(inline, Math) and inline.label is not None:
-            yield inline.label.span

@@ -13,11 +13,13 @@ from unicodedata import normalize
 from msgspec import Struct, field
 
 from coursebuild.core.model import Image, Inline, plain_text, walk_inlines
+from coursebuild.core.syntax.spans import trimmed
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 _CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
 _ID = re.compile(r"#[\w:.-]*[\w:-]|#\w")
+_WORD = re.compile(r"\S+")
 _CLASS = re.compile(r"\.[A-Za-z_][\w-]*")
 _NO_SLUG = re.compile(r"[^\w\s-]")
 _SPACES = re.compile(r"\s")
@@ -31,8 +33,8 @@ class Attributes(Struct, frozen=True):
     """What stands in braces after a heading, and the heading's text before it."""
 
     title: Excerpt
-    id: str | None = None
-    id_span: Span | None = None
+    id: Excerpt | None = None
+    """With its `#`."""
     classes: tuple[str, ...] = ()
 
 
@@ -41,32 +43,25 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
     found = _CANDIDATE.search(content.text) if "{" in content.text else None
     if found is None:
         return Parsed(Attributes(content))
-    start = found.start()
-    title = content.slice(0, len(content.text[:start].rstrip()))
-    braces = content.span(start, start + len(found[0].rstrip()))
+    title, braces = trimmed(content.slice(0, found.start())), trimmed(content.slice(found.start()))
     if not found[1]:
-        message = "the attributes of this heading are never closed"
-        return Parsed(
-            Attributes(title), (diagnose("heading-attributes", braces, message, help=_HELP),)
-        )
-    inner_start = start + found[0].index("{") + 1
-    inner = content.text[inner_start : start + found[0].rindex("}")]
-    name, name_span, classes = None, None, []
-    for word in re.finditer(r"\S+", inner):
-        span = content.span(inner_start + word.start(), inner_start + word.end())
-        if _ID.fullmatch(word[0]) and name is None:
-            name, name_span = word[0][1:], span
-        elif _CLASS.fullmatch(word[0]):
-            classes.append(word[0][1:])
+        return _mistake(title, braces, "the attributes of this heading are never closed")
+    name, classes, inner = None, list[str](), braces.slice(1, len(braces.text) - 1)
+    for word in (inner.slice(*found.span()) for found in _WORD.finditer(inner.text)):
+        if _ID.fullmatch(word.text) and name is None:
+            name = word
+        elif _CLASS.fullmatch(word.text):
+            classes.append(word.text[1:])
+        elif word.text.startswith("#") and name is not None:
+            return _mistake(title, word, "a heading has one id")
         else:
-            second = word[0].startswith("#") and name is not None
-            message = (
-                "a heading has one id" if second else f"`{word[0]}` is neither an id nor a class"
-            )
-            return Parsed(
-                Attributes(title), (diagnose("heading-attributes", span, message, help=_HELP),)
-            )
-    return Parsed(Attributes(title, name, name_span, tuple(classes)))
+            return _mistake(title, word, f"`{word.text}` is neither an id nor a class")
+    return Parsed(Attributes(title, name, tuple(classes)))
+
+
+def _mistake(title: Excerpt, place: Excerpt, message: str) -> Parsed[Attributes]:
+    wrong = diagnose("heading-attributes", place.span(), message, help=_HELP)
+    return Parsed(Attributes(title), (wrong,))
 
 
 def slug(text: str) -> str:

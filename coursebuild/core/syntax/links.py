@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import accumulate
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -46,21 +46,20 @@ _OURS = ("lesson", "model", "page", "term")
 
 def classify(url: str) -> Target:
     """The target of a destination as markdown-it normalises it (percent-encoded)."""
-    found = _SCHEME.match(url)
-    scheme = found[1] if found else ""
-    if scheme in _OURS:
-        name, mark, anchor = url[len(scheme) + 1 :].partition("#")
-        place = unquote(anchor) if mark and anchor else None
-        if scheme == "lesson":
+    scheme, colon, rest = url.partition(":")
+    name, _, anchor = rest.partition("#")
+    place = unquote(anchor) or None
+    match scheme + colon:
+        case "lesson:":
             return LessonTarget(unquote(name), place)
-        if scheme == "page":
+        case "page:":
             return PageTarget(unquote(name), place)
-        if scheme == "term":
-            return TermTarget(term_id(unquote(url[len(scheme) + 1 :])))
-        return ModelTarget(unquote(name), place)
-    if url.startswith("examples/"):
-        return ExampleTarget(unquote(url))
-    return UrlTarget(url)
+        case "model:":
+            return ModelTarget(unquote(name), place)
+        case "term:":
+            return TermTarget(term_id(unquote(rest)))
+        case _:
+            return ExampleTarget(unquote(url)) if url.startswith("examples/") else UrlTarget(url)
 
 
 def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | None:
@@ -98,14 +97,15 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
     return check_scheme(url, span, image=True)
 
 
-_LESSON = r"[0-9]+(?:\.[0-9]+)+"
-_LEVEL = r"[0-9]+(?:\.[0-9]+)*"
-_FIRST = re.compile(rf"(?<![\w\\])(?:(Lessons?)\s+({_LESSON})|(Levels?)\s+({_LEVEL}))(?!\w)")
+_LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"
+_LEVEL = r"[0-9]+(?:\.[0-9]+)*(?!\w)"
 _BETWEEN = r"(?:,?\s+(?:and|or|to)\s+|,\s+|\s?[–-]\s?)"
-_NEXT = {
-    "Lessons": re.compile(rf"{_BETWEEN}({_LESSON})(?!\w)"),
-    "Levels": re.compile(rf"{_BETWEEN}({_LEVEL})(?!\w)"),
-}
+_MENTIONS = re.compile(
+    r"(?<![\w\\])(?:"
+    rf"(Lesson)(?:\s+{_LESSON}|s\s+{_LESSON}(?:{_BETWEEN}{_LESSON})*)"
+    rf"|Level(?:\s+{_LEVEL}|s\s+{_LEVEL}(?:{_BETWEEN}{_LEVEL})*))"
+)
+_NUMBER = re.compile(r"[0-9.]*[0-9]")
 
 
 class TextPiece(NamedTuple):
@@ -116,14 +116,6 @@ class TextPiece(NamedTuple):
     end: int
     literal: bool = True
     """Whether each character stands for itself; not so for entities and escapes."""
-
-
-class _Mention(NamedTuple):
-    start: int
-    end: int
-    id_start: int
-    id: str
-    is_lesson: bool
 
 
 def may_mention(text: str) -> bool:
@@ -156,34 +148,22 @@ def _text(items: list[TextPiece], content: Excerpt) -> Text:
 def with_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
     joined = "".join([item.text for item in run])
-    if not may_mention(joined):
-        return plain(run, content)
     starts = [0, *accumulate(len(item.text) for item in run)]
     out: list[Inline] = []
     at = 0
-    for mention in _mentions(joined):
-        out += plain(_cut(run, starts, at, mention.start), content)
-        children = tuple(plain(_cut(run, starts, mention.start, mention.end), content))
-        number = _cut(run, starts, mention.id_start, mention.end)
-        target = LessonTarget(mention.id, None) if mention.is_lesson else LevelTarget(mention.id)
-        place = content.span(number[0].start, number[-1].end)
-        span = children[0].span.to(children[-1].span)
-        out.append(Link(span, target, place, "", children, mention=True))
-        at = mention.end
+    for mentions in _MENTIONS.finditer(joined):
+        for number in _NUMBER.finditer(joined, *mentions.span()):
+            first = at <= mentions.start()  # whose link begins with the word
+            start = mentions.start() if first else number.start()
+            out += plain(_cut(run, starts, at, start), content)
+            children = plain(_cut(run, starts, start, number.end()), content)
+            target = LessonTarget(number[0], None) if mentions[1] else LevelTarget(number[0])
+            digits = _cut(run, starts, *number.span())
+            place = content.span(digits[0].start, digits[-1].end)
+            span = children[0].span.to(children[-1].span)
+            out.append(Link(span, target, place, "", tuple(children), mention=True))
+            at = number.end()
     return out + plain(_cut(run, starts, at, len(joined)), content)
-
-
-def _mentions(text: str) -> Iterator[_Mention]:
-    at = 0
-    while found := _FIRST.search(text, at):
-        is_lesson = found[1] is not None
-        group = 2 if is_lesson else 4
-        yield _Mention(found.start(), found.end(), found.start(group), found[group], is_lesson)
-        at = found.end()
-        more = _NEXT.get(found[1] or found[3])
-        while more is not None and (found := more.match(text, at)):
-            yield _Mention(found.start(1), found.end(), found.start(1), found[1], is_lesson)
-            at = found.end()
 
 
 def _cut(run: Sequence[TextPiece], starts: list[int], start: int, end: int) -> list[TextPiece]:

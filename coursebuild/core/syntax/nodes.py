@@ -128,12 +128,12 @@ class ObjectNode(_Container, frozen=True, eq=False):
         return self.mark if value is None else value.mark
 
     def items(self, name: str) -> tuple[Node, ...]:
-        """The values in the array of that name."""
+        """What is in the array of that name."""
         value = self.get(name)
         return value.items if isinstance(value, ArrayNode) else ()
 
     def objects(self, name: str) -> tuple[ObjectNode, ...]:
-        """The objects in the array of that name."""
+        """The objects in it."""
         return tuple(item for item in self.items(name) if isinstance(item, ObjectNode))
 
     def object(self, name: str) -> ObjectNode:

@@ -1,16 +1,17 @@
-"""Recorded output: a paragraph `Output…:` directly followed by a `text` fence or a table.
+"""What scripts print and draw: `Output…:` above a `text` fence or a table, and `Figure:`.
 
 Entry points: `is_caption`, `near_caption`, `record_fence`, `record_table` (a caption and its body),
 `no_body` and `nothing_recorded` (what follows is none), `no_caption` and `stray_keys` (on a fence
-that records nothing).
+that records nothing); `read_figure`.
 """
 
 from __future__ import annotations
 
+import posixpath
 import re
 from decimal import Decimal
 
-from coursebuild.core.model import Comparison, Inline, Mode, Recording, Table, plain_text
+from coursebuild.core.model import Comparison, Image, Inline, Mode, Recording, Table, plain_text
 from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.syntax.fence import Fence, is_ours
 from coursebuild.core.syntax.info import FenceKeys, Word
@@ -19,6 +20,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.patterns import matches_nothing, pattern_mistake
 from coursebuild.core.text.source import Span
 
+FIGURE = "Figure:"
 _CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
 _NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
@@ -200,3 +202,22 @@ def _contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
                 wrong = diagnose("recording-keys", second.key_span, message, notes=notes)
                 diagnostics.append(wrong)
                 return
+
+
+def read_figure(
+    children: tuple[Inline, ...], span: Span, drawn: list[str]
+) -> tuple[tuple[Inline, ...], bool]:
+    """The inlines of a paragraph that begins with `Figure:`, and whether it shows an image.
+
+    `drawn` are the names of what scripts above draw and nothing has shown yet. A paragraph without
+    an image shows the next of them, beside the lesson, and says in its words what that shows.
+    """
+    image = next((one for one in children if isinstance(one, Image)), None)
+    if image is None and drawn:
+        text = " ".join(plain_text(children).removeprefix(FIGURE).split())
+        image = Image(span, drawn[0], text, "", span)
+        children = (*children, image)
+    name = "" if image is None else posixpath.basename(image.url)
+    if name in drawn:
+        drawn.remove(name)
+    return children, image is not None

@@ -20,18 +20,19 @@ from coursebuild.core.syntax.attributes import LABEL, read_label
 from coursebuild.core.syntax.callout import Head, read_head, resolve
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_ours, read_fence
-from coursebuild.core.syntax.figure import WORD, read_figure
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
 from coursebuild.core.syntax.html import Balance, media_of, tags
 from coursebuild.core.syntax.inlines import InlineReader
 from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.parsing_state import ParsingState, Written
 from coursebuild.core.syntax.recording import (
+    FIGURE,
     is_caption,
     near_caption,
     no_body,
     no_caption,
     nothing_recorded,
+    read_figure,
     record_fence,
     record_table,
 )
@@ -61,7 +62,7 @@ class TextReader:
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(self._content(token)).value.id
                 if name is not None:
-                    self.session.anchors.reserve(name)
+                    self.session.anchors.reserve(name.text[1:])
             elif token.type == "footnote_reference_open":
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
@@ -125,7 +126,7 @@ class TextReader:
                 return recording
         elif not self.nested and (kind := self._next_kind()) is not None:
             self.session.diagnostics += near_caption(children, span, kind)
-        if not self.nested and content.text.startswith(WORD):
+        if not self.nested and content.text.startswith(FIGURE):
             children, shown = read_figure(children, span, self.session.figures)
             return model.Paragraph(span, children, token.hidden, shown)
         return model.Paragraph(span, children, token.hidden)
@@ -160,9 +161,9 @@ class TextReader:
         self, attributes: Attributes, children: tuple[model.Inline, ...]
     ) -> tuple[str, bool]:
         anchors = self.session.anchors
-        if attributes.id is not None and attributes.id_span is not None:
-            anchors.take(attributes.id, attributes.id_span)
-            return attributes.id, True
+        if attributes.id is not None:
+            anchors.take(attributes.id.text[1:], attributes.id.span())
+            return attributes.id.text[1:], True
         return anchors.make(model.plain_text(children)), False
 
     def _fence(self, token: PositionedToken) -> model.Block:

@@ -38,13 +38,14 @@ JSON = FormatWords("an object", "objects")
 TOML = FormatWords("a table", "tables")
 
 
-_SIMPLE = {
-    "string": ("a string", "strings"),
-    "integer": ("an integer", "integers"),
-    "number": ("a number", "numbers"),
-    "bool": ("`true` or `false`", "`true` or `false`"),
-    "object": ("an object", "objects"),
+_SIMPLE: dict[str, tuple[str, str, type[Node]]] = {
+    "string": ("a string", "strings", StringNode),
+    "integer": ("an integer", "integers", NumberNode),
+    "number": ("a number", "numbers", NumberNode),
+    "bool": ("`true` or `false`", "`true` or `false`", BoolNode),
+    "object": ("an object", "objects", ObjectNode),
 }
+"""The kinds of values but arrays: one and several of them in words, and the node."""
 
 
 def _single(type: inspect.Type) -> list[inspect.Type]:
@@ -90,20 +91,10 @@ def _in_words(type: inspect.Type) -> tuple[str, str]:
             length = f"of {len(single.item_types)} values"
             words = (f"an array {length}", f"arrays {length}")
         else:
-            words = _SIMPLE[_kind(single)]
+            words = _SIMPLE[_kind(single)][:2]
         ones.append(words[0])
         many.append(words[1])
     return " or ".join(ones), " or ".join(many)
-
-
-_NODES: dict[str, type[Node]] = {
-    "string": StringNode,
-    "integer": NumberNode,
-    "number": NumberNode,
-    "bool": BoolNode,
-    "object": ObjectNode,
-    "array": ArrayNode,
-}
 
 
 def accepts(type: inspect.Type, node: Node) -> bool:
@@ -115,9 +106,9 @@ def accepts(type: inspect.Type, node: Node) -> bool:
     if isinstance(type, inspect.NoneType):
         return isinstance(node, NullNode)
     kind = _kind(type)
-    if kind == "integer" and isinstance(node, NumberNode) and isinstance(node.value, float):
-        return False
-    return isinstance(node, _NODES[kind])
+    if kind == "integer" and isinstance(node, NumberNode):
+        return isinstance(node.value, int)
+    return isinstance(node, ArrayNode if kind == "array" else _SIMPLE[kind][2])
 
 
 def short(text: str, limit: int = 40) -> str:
