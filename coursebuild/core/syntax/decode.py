@@ -1,6 +1,6 @@
 """From nodes to declared structs, with every mistake at its place.
 
-Entry points: `decode(node, type, name, words)` → `Decoding`; `description` of a field.
+Entry points: `decode(node, type, name, format)` → `Decoding`; `description` of a field.
 
 1. One walk over the nodes, led by what `msgspec.inspect` says of the type, reports everything that
    is wrong in one go: unknown and missing fields, wrong types, impossible values. (Repeated fields
@@ -34,7 +34,7 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
 )
 from coursebuild.core.syntax.wording import (
-    FormatWords,
+    Format,
     accepts,
     named,
     quoted,
@@ -71,9 +71,9 @@ class Decoding(Struct, Generic[S], frozen=True):
                 yield node, struct
 
 
-def decode(node: Node, type: type[S], name: str, words: FormatWords) -> Decoding[S]:
+def decode(node: Node, type: type[S], name: str, format: Format) -> Decoding[S]:
     """Read a node as a struct; messages call the whole `name`, as in `the quiz`."""
-    decoder = _Decoder(words)
+    decoder = _Decoder(format)
     value = decoder.value(node, _type_info(type), name)
     whole = value if isinstance(value, type) else None
     return Decoding(whole, tuple(decoder.diagnostics), decoder.structs, tuple(decoder.texts))
@@ -90,8 +90,8 @@ class _Decoder:
     `name` is what messages call the node.
     """
 
-    def __init__(self, words: FormatWords) -> None:
-        self.words = words
+    def __init__(self, format: Format) -> None:
+        self.format = format
         self.diagnostics: list[Diagnostic] = []
         self.structs: dict[ObjectNode, Struct] = {}
         self.texts: list[tuple[StringNode, str]] = []
@@ -103,7 +103,7 @@ class _Decoder:
     def wrong_type(self, node: Node, type: inspect.Type, name: str, help: str = "") -> object:
         if isinstance(node, ErrorNode):  # reported when it was read
             return _FAILED
-        message = wrong_type(node, name, type, self.words)
+        message = wrong_type(node, name, type, self.format)
         help = help or type_help(node, type) or _described(name, type)
         return self.report("field-type", node.mark, message, help)
 

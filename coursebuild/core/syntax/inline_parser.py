@@ -260,11 +260,7 @@ def _place(state: StateInline, before: int, at: int) -> None:
         assert isinstance(token, PositionedToken)
         if token.end >= 0:
             continue
-        if token.markup == "autolink":
-            opens = token.type == "link_open"
-            token.start, token.end = (at, at + 1) if opens else (after - 1, after)
-            cursor = at + 1
-        elif token.type in ("link_open", "term_open"):
+        if token.type in ("link_open", "term_open"):
             token.start, token.end = at, at + 1
         elif token.type != "text":
             token.end = after

@@ -1,16 +1,15 @@
 """How messages call types and the author's values.
 
-Entry points: `FormatWords` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`,
+Entry points: `Format` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`,
 `quoted`, `short`.
 """
 
 from __future__ import annotations
 
 import re
-from typing import assert_never
+from typing import Literal, TypeAlias, assert_never
 
 import msgspec.inspect as inspect
-from msgspec import Struct
 
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
@@ -27,16 +26,10 @@ from coursebuild.core.syntax.nodes import (
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
-class FormatWords(Struct, frozen=True):
-    """The nouns of a language for what the other calls an object."""
-
-    object: str
-    objects: str
-
-
-JSON = FormatWords("an object", "objects")
-TOML = FormatWords("a table", "tables")
-
+Format: TypeAlias = Literal["JSON", "TOML"]
+JSON: Format = "JSON"
+TOML: Format = "TOML"
+"""The language that a value is written in, by which messages call it an object or a table."""
 
 _SIMPLE: dict[str, tuple[str, str, type[Node]]] = {
     "string": ("a string", "strings", StringNode),
@@ -127,17 +120,18 @@ def quoted(node: Node) -> str:
     return f"`{short(node.value if isinstance(node, StringNode) else node.raw)}`"
 
 
-def wrong_type(node: Node, name: str, type: inspect.Type, words: FormatWords) -> str:
+def wrong_type(node: Node, name: str, type: inspect.Type, format: Format) -> str:
     """The message for a value of a type that its field does not take."""
-    expected = _in_words(type)[0].replace("an object", words.object)
-    expected = expected.replace("objects", words.objects)
-    return f"{named(name)} must be {expected}, not {_found(node, words)}"
+    wrong = f"must be {_in_words(type)[0]}, not {_found(node)}"
+    if format == TOML:
+        wrong = wrong.replace("an object", "a table").replace("objects", "tables")
+    return f"{named(name)} {wrong}"
 
 
-def _found(node: Node, words: FormatWords) -> str:
+def _found(node: Node) -> str:
     match node:
         case ObjectNode():
-            return words.object
+            return "an object"
         case ArrayNode():
             return "an array"
         case StringNode():

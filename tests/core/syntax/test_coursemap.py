@@ -133,7 +133,7 @@ def test_a_complete_map(newline: str) -> None:
 def test_the_least_that_a_map_needs() -> None:
     course = parse('[course]\ntitle = "T"\n').value
     assert course is not None
-    assert (course.language, course.engine, course.engine_span) == ("en", None, None)
+    assert (course.language, course.engine) == ("en", None)
     assert (course.base_url, course.repository, course.licence) == ("", "", "")
     assert course.comparison == Comparison()
     assert (course.filters, course.silences, course.levels, course.pages) == ((), (), (), ())
