@@ -1,7 +1,6 @@
 """What an author meant and nothing read: formulas, bound numbers, and markup of other tools.
 
-Entry points: `unread_markup`; `unread_formula`, a part of it. A page would show all of these as
-they are written.
+Entry point: `unread_markup`. A page would show all of these as they are written.
 """
 
 from __future__ import annotations
@@ -102,14 +101,14 @@ def unread_markup(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterato
     `texts` are its texts that are neither code nor formulas nor escaped, each with its place in the
     content, in order.
     """
-    dollar = unread_formula(texts)
+    dollar = _unread_formula(texts)
     if dollar is not None:
         what = "a dollar sign and TeX stand in the text: no formula was read here"
         yield diagnose("math-unread", content.span(dollar, dollar + 1), what, help=_MATH_HELP)
     yield from _foreign(content, texts)
 
 
-def unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
+def _unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
     """Where the first dollar sign of a formula is that was not read.
 
     `$5` is money and stays so. But a blank inside `$x = $`, or a list that begins in the middle of

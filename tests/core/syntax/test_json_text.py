@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 
-import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -41,23 +40,6 @@ def test_each_character_of_a_string_knows_its_place() -> None:
     assert simple.excerpt.span(2, 4).text == "ai"
     assert (simple.span.line, simple.span.column) == (2, 4)
     assert empty.excerpt.text == "" and text[empty.excerpt.span().start] == '"'
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        r'"a\nabout"',  # a line end before a word, no formula
-        r'"\nabla"',  # no dollar: not a text with formulas
-        r'"costs $5 and $6\nnu"',
-        r'"$x$\nnot"',  # after the formula
-        r'"$x$\tabc"',
-        r'"$\\tau$"',
-        r'"a\r\n$b$"',
-        r'"$a$ \b"',
-    ],
-)
-def test_escapes_that_may_be_meant_are_left_alone(text: str) -> None:
-    assert parse(text).diagnostics == ()
 
 
 # ------------------------------------------------------------------------------------- properties

@@ -6,36 +6,10 @@ from coursebuild.core.text.source import Excerpt, Source
 from coursebuild.core.text.units import check_unit
 
 USUAL = (
-    *(
-        "",
-        "1",
-        "1/s²",
-        "kg m^2",
-        "kg·m²",
-        "kg.m^2",
-        "N m/rad",
-        "m/s^{2}",
-        "m s^-2",
-        "m s⁻¹",
-        "m / s",
-    ),
-    *("J/(kg K)", "kg m²/(s K)", "m^(1/2)", "°", "°C", "%", "°/s", "kHz"),
+    *("", "1", "1/s²", "kg m^2", "kg·m²", "kg.m^2", "N m/rad", "m/s^{2}", "m s^-2", "m s⁻¹"),
+    *("m / s", "J/(kg K)", "kg m²/(s K)", "m^(1/2)", "°", "°C", "%", "°/s", "kHz"),
 )
-SELDOM = (
-    "sec",
-    "metres",
-    "ft",
-    "psi",
-    "eV",
-    "Å",
-    "rev/min",
-    "rpm",
-    "turn",
-    "Nm",
-    "µm",
-    "\u2126",
-    "‰",
-)
+SELDOM = "sec metres ft psi eV Å rev/min rpm turn Nm µm \u2126 ‰".split()
 WRONG = ("(m", "m//s", "m^", "m**2", "2 m", "9**9**9 m", "m^99999999", "$", "m" * 200, "1/", "/")
 
 
