@@ -55,11 +55,8 @@ def resolve(head: Head, known: Collection[str]) -> Parsed[str]:
         message = f"`{head.stray.text}` cannot follow the kind of a callout"
         help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
         return Parsed(FALLBACK, (diagnose("callout-unknown", head.stray, message, help=help),))
-    if name in known:
-        return Parsed(name)
-    for candidate in sorted(known):
-        if candidate.casefold() == name.casefold():
-            return Parsed(candidate)
+    if name.lower() in known:
+        return Parsed(name.lower())
     message = f"no callout kind `{name}`" if name else "the kind of this callout is missing"
     help = did_you_mean(name.lower(), known) or "known: " + ", ".join(
         f"`{k}`" for k in sorted(known)

@@ -65,21 +65,15 @@ def one_of(
     node: ObjectNode, type: type[Struct], names: tuple[str, ...], *, only: bool = True
 ) -> Iterator[Diagnostic]:
     """One of the fields is needed and, with `only`, no more than one is taken."""
-    there = [name for name in names if has_value(node, name)]
+    there = [member for name in names if (member := node.member(name)) and has_value(node, name)]
     if not there and not _misspelt(node, type, names):
         choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
         yield diagnose("field-missing", node.mark, f"{choice} is missing")
-    if only:
-        for name in there[1:]:
-            first, second = node.member(there[0]), node.member(name)
-            if first is not None and second is not None:
-                yield diagnose(
-                    "field-value",
-                    second.key.span,
-                    f"`{there[0]}` and `{name}` exclude each other",
-                    help="leave one of them out",
-                    notes=(Note("the other one is here", first.key.span),),
-                )
+    for second in there[1:] if only else ():
+        first, help = there[0].key, "leave one of them out"
+        notes = (Note("the other one is here", first.span),)
+        message = f"`{first.value}` and `{second.key.value}` exclude each other"
+        yield diagnose("field-value", second.key.span, message, help=help, notes=notes)
 
 
 def _misspelt(node: ObjectNode, type: type[Struct], names: tuple[str, ...]) -> bool:

@@ -115,7 +115,7 @@ class _Pass:
     def read(self, tokens: Iterable[PositionedToken]) -> tuple[Inline, ...]:
         for token in tokens:
             kind = token.type
-            if kind == "text" or kind == "text_special":
+            if kind in ("text", "text_special"):
                 text = token.content
                 if text:
                     literal = kind == "text" or text == token.markup
@@ -177,29 +177,26 @@ class _Pass:
             return
         opened, children = frame.token, tuple(frame.nodes)
         assert opened is not None
-        if token.type == "link_close":
-            self.links -= 1
-            link = self._link(opened, token, children)
-            into.extend(children if link is None else (link,))
-        elif token.type == "term_close":
-            self.links -= 1
-            term = self._term(opened, token, children)
-            into.extend(children if term is None else (term,))
-        elif token.type == "strong_close":
-            into.append(Strong(self.content.span(opened.start - 1, token.end + 1), children))
-        else:
-            span = self.content.span(opened.start, token.end)
-            into.append(
-                Emphasis(span, children)
-                if token.type == "em_close"
-                else Strikethrough(span, children)
-            )
+        span = self.content.span(opened.start, token.end)
+        node: Inline | None
+        match token.type:
+            case "link_close":
+                node = self._link(span, opened, token, children)
+            case "term_close":
+                node = self._term(span, token, children)
+            case "strong_close":
+                node = Strong(self.content.span(opened.start - 1, token.end + 1), children)
+            case "em_close":
+                node = Emphasis(span, children)
+            case _:
+                node = Strikethrough(span, children)
+        self.links -= token.type in ("link_close", "term_close")
+        into.extend(children if node is None else (node,))
 
     def _term(
-        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+        self, span: Span, closed: PositionedToken, children: tuple[Inline, ...]
     ) -> Term | None:
         assert closed.map is not None
-        span = self.content.span(opened.start, closed.end)
         report = self.reader.report
         given = read_term(self.content.slice(*closed.map), report)
         if given is None:
@@ -211,10 +208,13 @@ class _Pass:
         return Term(span, children, name, term_id(name), bool(given))
 
     def _link(
-        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+        self,
+        span: Span,
+        opened: PositionedToken,
+        closed: PositionedToken,
+        children: tuple[Inline, ...],
     ) -> Link | None:
         url = str(opened.attrs["href"])
-        span = self.content.span(opened.start, closed.end)
         destination = self.content.span(opened.start + 1, closed.end - 1)
         if opened.markup != "autolink":
             destination = self._destination(opened.start, closed.start, closed.end)
@@ -247,8 +247,7 @@ class _Pass:
     # -- leaves
 
     def _leaf(self, token: PositionedToken) -> None:
-        if self.run:
-            self._flush()
+        self._flush()
         span = self.content.span(token.start, token.end)
         node: Inline | None = None
         match token.type:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Sequence
-from itertools import accumulate
+from itertools import accumulate, groupby
 from typing import NamedTuple
 from urllib.parse import unquote
 
@@ -126,23 +126,14 @@ def may_mention(text: str) -> bool:
 def plain(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts and soft line ends."""
     out: list[Inline] = []
-    text: list[TextPiece] = []
-    for item in run:
-        if item.text != "\n":
-            text.append(item)
-            continue
-        if text:
-            out.append(_text(text, content))
-            text = []
-        out.append(SoftBreak(content.span(item.start, item.end)))
-    if text:
-        out.append(_text(text, content))
+    for is_line_end, group in groupby(run, key=lambda piece: piece.text == "\n"):
+        items = [*group]
+        if is_line_end:
+            out += [SoftBreak(content.span(item.start, item.end)) for item in items]
+        else:
+            span = content.span(items[0].start, items[-1].end)
+            out.append(Text(span, "".join([item.text for item in items])))
     return out
-
-
-def _text(items: list[TextPiece], content: Excerpt) -> Text:
-    joined = "".join([item.text for item in items])
-    return Text(content.span(items[0].start, items[-1].end), joined)
 
 
 def with_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:

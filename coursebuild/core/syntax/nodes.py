@@ -47,21 +47,13 @@ class _PositionedNode(Struct, frozen=True, eq=False):
 class StringNode(_PositionedNode, frozen=True, eq=False):
     """A string, a key included."""
 
-    value: str
-    """The text that is meant, escapes resolved."""
-    runs: tuple[tuple[int, int], ...]
-    """(offset in the value, offset in the body), growing, the first at 0: from there both advance
-    together."""
+    excerpt: Excerpt
+    """The text that is meant, each character with its place: an escape's is its backslash."""
 
     @property
-    def excerpt(self) -> Excerpt:
-        """The value, each character with its place in the source: an escape's is its backslash."""
-        pieces: list[tuple[int, int]] = []
-        stops = [*(at for at, _ in self.runs[1:]), len(self.value)]
-        for (at, place), stop in zip(self.runs, stops, strict=True):
-            part = self.body.slice(place, place + stop - at)
-            pieces += [(at + start, source_at) for start, source_at in part.pieces]
-        return Excerpt(self.body.source, self.value, tuple(pieces))
+    def value(self) -> str:
+        """The text that is meant, escapes resolved."""
+        return self.excerpt.text
 
 
 class NumberNode(_PositionedNode, frozen=True, eq=False):
@@ -183,33 +175,23 @@ def escaped_string(
     `escapes` are those in it, in order, and `meaning` says what each stands for. An escape that was
     surely meant for TeX is reported, with what `help` says of the command.
     """
-    parts: list[str] = []
-    runs: list[tuple[int, int]] = []
-    controls: list[tuple[int, str]] = []
-    length = 0
-
-    def add(part: str, place: int) -> None:
-        nonlocal length
-        if part:
-            runs.append((length, place))
-            parts.append(part)
-            length += len(part)
-
-    here, end = content
+    parts: list[Excerpt] = []
+    controls: list[tuple[int, re.Match[str]]] = []
+    at, (here, end) = 0, content
     for escape in escapes:
-        add(body.text[here : escape.start()], here)
+        before = body.slice(here, escape.start())
+        meant = Excerpt(body.source, meaning(escape), ((0, body.offset(escape.start())),))
         if escape[0] in ("\\t", "\\n", "\\b", "\\f", "\\r"):
-            controls.append((length, escape[0][1]))
-        add(meaning(escape), escape.start())
+            controls.append((at + len(before.text), escape))
+        parts += (before, meant)
+        at += len(before.text) + len(meant.text)
         here = escape.end()
-    add(body.text[here:end], here)
-    value = "".join(parts)
-    places = dict(runs)  # an escape is a run of its own
-    for at, command in _tex_escapes(value, controls):
-        span = body.span(places[at], places[at] + 1 + len(command))
+    text = Excerpt.join([*parts, body.slice(here, end)])
+    for start, command in _tex_escapes(text.text, controls):
+        span = body.span(start, start + 1 + len(command))
         message = f"`\\{command[0]}` of `\\{command}` is read as a control character"
         diagnostics.append(diagnose("field-value", span, message, help=help(command)))
-    return StringNode(body, *quoted, value, tuple(runs) or ((0, content[0]),))
+    return StringNode(body, *quoted, text)
 
 
 def tex_word(text: str, at: int) -> str:
@@ -218,25 +200,27 @@ def tex_word(text: str, at: int) -> str:
     return match[0] if match else ""
 
 
-def _tex_escapes(value: str, escapes: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+def _tex_escapes(
+    value: str, escapes: Iterable[tuple[int, re.Match[str]]]
+) -> Iterator[tuple[int, str]]:
     r"""Which escapes of a decoded string were meant for TeX.
 
     Both languages read `\t`, `\n`, `\b`, `\f` and `\r` as control characters, so that "$\tau$"
     silently becomes a tab and "au". A backspace, form feed or carriage return before a letter has
     no use in a course's text; a tab or a line end has, so these are reported only before the rest
-    of a known command. `escapes` are (offset in the value, letter of the escape); the result has
-    (offset in the value, the command).
+    of a known command. `escapes` come with their offset in the value; the result has where they are
+    written, and the command.
     """
     if "$" not in value:
         return
     dollars = [match.start() for match in _DOLLARS.finditer(value)]
-    for at, letter in escapes:
-        rest = tex_word(value, at + 1)
+    for at, escape in escapes:
+        letter, rest = escape[0][1], tex_word(value, at + 1)
         known = letter + rest in _COMMANDS
         in_math = bisect_left(dollars, at) % 2 == 1
         meant = (known and in_math) if letter == "n" else (known or in_math or letter in "bfr")
         if rest and meant:
-            yield at, letter + rest
+            yield escape.start(), letter + rest
 
 
 def odd_character(char: str) -> str:

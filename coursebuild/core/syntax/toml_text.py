@@ -209,7 +209,7 @@ class _Reader:
         if node.type == "quoted_key":
             return self.string(node)
         start, end = node.byte_range
-        return StringNode(self.body, start, end, self.text[start:end], ((0, start),))
+        return StringNode(self.body, start, end, self.body.slice(start, end))
 
     def value(self, node: tree_sitter.Node) -> Node:
         start, end = node.byte_range

@@ -131,9 +131,12 @@ class TextReader:
             return model.Paragraph(span, children, token.hidden, shown)
         return model.Paragraph(span, children, token.hidden)
 
+    def _next(self) -> PositionedToken | None:
+        return self.tokens[self.at] if self.at < len(self.tokens) else None
+
     def _next_kind(self) -> str | None:
         """The kind of the fence that follows, if one does."""
-        token = self.tokens[self.at] if self.at < len(self.tokens) else None
+        token = self._next()
         if token is None or token.type != "fence":
             return None
         return (token.info.split() or [""])[0]
@@ -297,20 +300,20 @@ class TextReader:
 
     def _recording(self, caption: tuple[model.Inline, ...], span: Span) -> model.Recording | None:
         """The recording whose caption was just read, if what follows is its body."""
-        token = self.tokens[self.at] if self.at < len(self.tokens) else None
-        kind = "" if token is None else token.type
-        if token is not None and kind == "table_open":
-            table, self.at = self._read_table(self.at)
-            return record_table(caption, span, table, self.session)
-        if token is not None and kind == "fence":
-            fence = read_fence(token, self.base, nested=False)
-            recording = record_fence(caption, span, fence, self.session)
-            self.at += recording is not None
-            return recording
-        if token is not None and kind == "code_block":
-            self.session.report(no_body(self._span(token).first_line(), "an indented block"))
-        else:
-            self.session.diagnostics += nothing_recorded(caption, span)
+        match self._next():
+            case PositionedToken(type="table_open"):
+                table, self.at = self._read_table(self.at)
+                return record_table(caption, span, table, self.session)
+            case PositionedToken(type="fence") as token:
+                fence = read_fence(token, self.base, nested=False)
+                recording = record_fence(caption, span, fence, self.session)
+                self.at += recording is not None
+                return recording
+            case PositionedToken(type="code_block") as token:
+                place = self._span(token).first_line()
+                self.session.report(no_body(place, "an indented block"))
+            case _:
+                self.session.diagnostics += nothing_recorded(caption, span)
         return None
 
 
