@@ -20,7 +20,7 @@ from typing import NamedTuple
 from coursebuild.core.model import MediaAddress
 from coursebuild.core.syntax.links import check_raw_scheme
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Excerpt, Span
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 _IMPLIED = frozenset("body colgroup head html tbody tfoot thead".split())
@@ -114,18 +114,18 @@ class Balance:
         """The text is over."""
         self._unwind(0)
 
-    def add(self, tag: Tag, text: str, place: Callable[[int, int], Span]) -> None:
-        """Take note of a tag of `text`; `place` says where a part of that text stands."""
-        name, span = tag.name, place(tag.start, tag.end)
+    def add(self, tag: Tag, html: Excerpt) -> None:
+        """Take note of a tag of a piece of HTML."""
+        name, span, text = tag.name, html.span(tag.start, tag.end), html.text
         for attribute, start, end in _attributes(text, tag):
             if attribute not in _LINKS:
                 continue
-            wrong = check_raw_scheme(unescape(text[start:end]), place(start, end))
+            wrong = check_raw_scheme(unescape(text[start:end]), html.span(start, end))
             if wrong is not None:
                 self._report(wrong)
         if text.startswith("<!--", tag.start) and text.find("-->", tag.start) < 0:
             message, help = "this comment is never closed", "close it with `-->`"
-            opening = place(tag.start, tag.start + 4)
+            opening = html.span(tag.start, tag.start + 4)
             self._report(diagnose("html-unbalanced", opening, message, help=help))
         if not name or tag.complete or name in VOID or name in _IMPLIED:
             return
@@ -164,15 +164,16 @@ class Balance:
         self._report(diagnose("html-unbalanced", span, message))
 
 
-def media_of(html: str, place: Callable[[int, int], Span]) -> tuple[MediaAddress, ...]:
-    """The addresses of files that HTML shows; `place` says where a part of it stands."""
+def media_of(html: Excerpt) -> tuple[MediaAddress, ...]:
+    """The addresses of files that HTML shows."""
+    text = html.text
     return tuple(
-        MediaAddress(start, end, unescape(html[start:end]), place(start, end))
-        for tag in tags(html)
+        MediaAddress(start, end, unescape(text[start:end]), html.span(start, end))
+        for tag in tags(text)
         if tag.name in _SHOWS
-        for attribute in _attributes(html, tag)
+        for attribute in _attributes(text, tag)
         if attribute[0] in _SHOWN
-        for start, end in _addresses(html, *attribute)
+        for start, end in _addresses(text, *attribute)
     )
 
 

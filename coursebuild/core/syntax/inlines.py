@@ -304,18 +304,15 @@ class _Pass:
         return NumberBinding(span, token.content, place, token.info or None)
 
     def _html(self, token: PositionedToken, span: Span) -> RawInline:
-        def place(start: int, end: int) -> Span:
-            return self.content.span(token.start + start, token.start + end)
-
-        for tag in tags(token.content):
-            self.reader.balance.add(tag, token.content, place)
+        html = self.content.slice(token.start, token.end)
+        for tag in tags(html.text):
+            self.reader.balance.add(tag, html)
             step = 0 if tag.complete else -1 if tag.closes else 1
             if tag.name == "a":
                 self.links = max(0, self.links + step)
             elif tag.name in LITERAL:
                 self.code = max(0, self.code + step)
-        media, forbidden = media_of(token.content, place), forbidden_in(token.content, place)
-        return RawInline(span, token.content, media, forbidden)
+        return RawInline(span, html.text, media_of(html), forbidden_in(html))
 
     def _image(self, token: PositionedToken, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])

@@ -10,11 +10,11 @@ Entry point: `forbidden_in`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from html import unescape
 
 from coursebuild.core.model.inlines import ForbiddenHtml
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Excerpt
 
 _ELEMENTS = frozenset(
     "a abbr address article aside audio b bdi bdo big blockquote br caption center cite code col "
@@ -70,11 +70,10 @@ _PLAIN = re.compile(
 """Text, the end of an element, a comment."""
 
 
-def forbidden_in(html: str, place: Callable[[int, int], Span]) -> tuple[ForbiddenHtml, ...]:
-    """The parts of HTML that a page must not hold; `place` gives the span of two offsets."""
-    return tuple(
-        ForbiddenHtml(place(start, end), message) for start, end, message in _forbidden(html)
-    )
+def forbidden_in(html: Excerpt) -> tuple[ForbiddenHtml, ...]:
+    """The parts of HTML that a page must not hold."""
+    found = _forbidden(html.text)
+    return tuple(ForbiddenHtml(html.span(start, end), message) for start, end, message in found)
 
 
 def _forbidden(html: str) -> Iterator[tuple[int, int, str]]:

@@ -209,10 +209,9 @@ class TextReader:
                 return model.HtmlFlow(content.span(), children)
         else:
             for tag in tags(html.text):
-                self.balance.add(tag, html.text, html.span)
+                self.balance.add(tag, html)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
-        media, forbidden = media_of(html.text, html.span), forbidden_in(html.text, html.span)
-        return model.HtmlBlock(self._span(token), text, media, forbidden)
+        return model.HtmlBlock(self._span(token), text, media_of(html), forbidden_in(html))
 
     def _rule(self, token: PositionedToken) -> model.ThematicBreak:
         return model.ThematicBreak(self._span(token))
