@@ -50,7 +50,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     title, if it opens with it, is not in the document. All mistakes are diagnostics, in the order
     of their places; the document holds all that could be read.
     """
-    session = ParsingState(source, callouts, lesson)
+    session = ParsingState(callouts, lesson)
     base = _without_front_matter(whole(source), session)
     title = None if lesson else title_line(source)
     if title is not None:

@@ -71,19 +71,14 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
     if scheme in _FORBIDDEN:
         if image and _PICTURE.match(url.strip()):
             return None
-        return diagnose(
-            "link-scheme",
-            span,
-            f"`{scheme}:` must not stand in a page",
-            help="link to an address with `https:`, to a file, or by "
-            "`lesson:`, `page:`, `model:`, `term:`",
-        )
+        help = "link to an address with `https:`, to a file, or by "
+        help += "`lesson:`, `page:`, `model:`, `term:`"
+        return diagnose("link-scheme", span, f"`{scheme}:` must not stand in a page", help=help)
     near = nearest(scheme, _OURS, cutoff=0.75)
     if near is None:
         return None
-    return diagnose(
-        "link-scheme", span, f"no link scheme `{found[1]}:`", help=f"did you mean `{near}:`?"
-    )
+    message, help = f"no link scheme `{found[1]}:`", f"did you mean `{near}:`?"
+    return diagnose("link-scheme", span, message, help=help)
 
 
 def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:

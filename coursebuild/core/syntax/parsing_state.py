@@ -16,7 +16,7 @@ from coursebuild.core.model import Block, Footnote, FootnoteRef
 from coursebuild.core.syntax.headings import Anchors
 from coursebuild.core.syntax.markdown import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
-from coursebuild.core.text.source import Source, Span
+from coursebuild.core.text.source import Span
 
 T = TypeVar("T")
 
@@ -24,8 +24,7 @@ T = TypeVar("T")
 class ParsingState:
     """One reading of one document."""
 
-    def __init__(self, source: Source, callouts: frozenset[str], lesson: bool) -> None:
-        self.source = source
+    def __init__(self, callouts: frozenset[str], lesson: bool) -> None:
         self.callouts = callouts
         self.lesson = lesson
         self.references: References = {}

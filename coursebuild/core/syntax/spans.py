@@ -76,8 +76,6 @@ class BlockState(StateBlock):
     def _row(self, line: int, indent: int, line_end: bool) -> SourceSlice:
         src, first = self.src, self.bMarks[line]
         last = self.eMarks[line] + 1 if line_end else self.eMarks[line]
-        if indent <= 0:
-            return SourceSlice(first, last)
         shift = self.tShift[line]
         begin, column = first, 0
         while column < indent and first < last:
@@ -89,7 +87,7 @@ class BlockState(StateBlock):
             else:
                 break
             first += 1
-        return SourceSlice(first, last, max(0, column - indent))
+        return SourceSlice(first, last, max(0, column - max(0, indent)))
 
 
 class InlineState(StateInline):
