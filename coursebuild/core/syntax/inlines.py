@@ -177,26 +177,26 @@ class _Pass:
             return
         opened, children = frame.token, tuple(frame.nodes)
         assert opened is not None
-        span = self.content.span(opened.start, token.end)
         node: Inline | None
         match token.type:
             case "link_close":
-                node = self._link(span, opened, token, children)
+                node = self._link(opened, token, children)
             case "term_close":
-                node = self._term(span, token, children)
+                node = self._term(opened, token, children)
             case "strong_close":
                 node = Strong(self.content.span(opened.start - 1, token.end + 1), children)
             case "em_close":
-                node = Emphasis(span, children)
+                node = Emphasis(self.content.span(opened.start, token.end), children)
             case _:
-                node = Strikethrough(span, children)
+                node = Strikethrough(self.content.span(opened.start, token.end), children)
         self.links -= token.type in ("link_close", "term_close")
         into.extend(children if node is None else (node,))
 
     def _term(
-        self, span: Span, closed: PositionedToken, children: tuple[Inline, ...]
+        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
     ) -> Term | None:
         assert closed.map is not None
+        span = self.content.span(opened.start, closed.end)
         report = self.reader.report
         given = read_term(self.content.slice(*closed.map), report)
         if given is None:
@@ -208,13 +208,10 @@ class _Pass:
         return Term(span, children, name, term_id(name), bool(given))
 
     def _link(
-        self,
-        span: Span,
-        opened: PositionedToken,
-        closed: PositionedToken,
-        children: tuple[Inline, ...],
+        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
     ) -> Link | None:
         url = str(opened.attrs["href"])
+        span = self.content.span(opened.start, closed.end)
         destination = self.content.span(opened.start + 1, closed.end - 1)
         if opened.markup != "autolink":
             destination = self._destination(opened.start, closed.start, closed.end)
