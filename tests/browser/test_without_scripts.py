@@ -25,8 +25,11 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
 
 
 UNSEEN = """async () => {
-  // What a window of another width shows, what is for paper, and a form that needs a script.
-  const ELSEWHERE = 'annotation, template, noscript, nav, .graph-narrow, .lab-paper, form'
+  // What a window of another width shows, what is for paper or for screen readers, a form that
+  // needs a script, and the contents of a document that only a code host shows.
+  const ELSEWHERE =
+    'annotation, template, noscript, nav, form, .graph-narrow, .plot-narrow, .lab-paper, ' +
+    'svg title, svg desc, .prose > div[hidden]'
   for (const one of document.querySelectorAll('main details')) one.open = true
   const words = ({ data }) => /\\S/.test(data ?? '')
   const texts = [...document.querySelectorAll('main *')].filter((one) =>
@@ -37,7 +40,8 @@ UNSEEN = """async () => {
     one.loading = 'eager'
     await one.decode()
   }
-  const labs = [...document.querySelectorAll('main [data-lab][data-config]')].filter((lab) =>
+  const LAB = 'main :is([data-kind="simlab"], [data-kind="mjcf"])'
+  const labs = [...document.querySelectorAll(LAB)].filter((lab) =>
     !lab.querySelector('img, svg')?.checkVisibility())
   return [...texts, ...pictures.filter((one) => !one.naturalWidth), ...labs]
     .map((one) => one.outerHTML.slice(0, 99))
