@@ -4,39 +4,80 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 
 1. A first run in small steps says what acts in a scenario and how far it can be told (`pilot`).
 2. The reference is made, and made again in another way (`references`).
-3. Every setting is run and compared (`rows`), then timed beside the model's own (`timing`).
+3. Every setting is run, judged and compared, then timed beside the model's own (`timing`). The
+   error of a run that was lost is not given; no other is below ten floors of the reference. Errors
+   count to the horizon, and what should be conserved is watched to the end. Errors are also said as
+   a learner sees them: by how far bodies are displaced or turned in a picture, where 1 is just
+   visible.
 4. Orders are fitted, stability limits looked for, the front drawn (`front`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
-from msgspec.structs import replace
+from msgspec import Struct
+from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.detector import driving_force
-from coursebuild.numerics.engine import refsafe_from
+from coursebuild.numerics.engine import (
+    EngineStates,
+    Run,
+    motion_of,
+    refsafe_active,
+    refsafe_from,
+    simulate,
+)
 from coursebuild.numerics.front import front, verdict
-from coursebuild.numerics.measure import Errors, fitted_orders
-from coursebuild.numerics.observe import quantity_name
-from coursebuild.numerics.pilot import pilot
+from coursebuild.numerics.measure import energy_drift, errors, fitted_orders, momentum_drift
+from coursebuild.numerics.observe import quantity_name, quantity_values, slip, visible_error
+from coursebuild.numerics.pilot import Pilot, pilot
 from coursebuild.numerics.problem import STANDARD, Sizes
-from coursebuild.numerics.references import conserved, energy_beyond, references
+from coursebuild.numerics.references import (
+    Cone,
+    KnownMotion,
+    energy_beyond,
+    find_conserved,
+    references,
+)
 from coursebuild.numerics.reports.bench import (
+    FLOORS,
+    MeasuredSetting,
     OrderRow,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.text import setting_text, solving
-from coursebuild.numerics.rows import Basis, MeasuredRow, measured
-from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.settings import own_setting, settings, stable
+from coursebuild.numerics.reports.text import setting_text
+from coursebuild.numerics.scene import Scene, thickness
+from coursebuild.numerics.settings import own_setting, settings, stable, with_setting
+from coursebuild.numerics.stability import run_trial
 from coursebuild.numerics.timing import Clock, costs
 from mjcourse.spatial import angular_distance
+
+
+class Basis(Struct, frozen=True, eq=False):
+    """All that is known of a scene before its settings are measured."""
+
+    model: Any
+    first: Pilot
+    own: MeasuredSetting
+    """The scene's own setting."""
+    cones: Mapping[str, Cone]
+    energy: float | None
+    """What changes of energy are large against, J; `None` where energy is not conserved."""
+    momentum_conserved: bool
+    beyond: float | None
+    """Mean kinetic energy beyond the horizon, J; `None` where nothing is beyond."""
+
+    @property
+    def known(self) -> KnownMotion:
+        """The reference of the scene's own setting."""
+        return self.cones[self.own.cone].known
 
 
 def measure_scenario(
@@ -65,20 +106,20 @@ def measure_scenario(
     cones = references(model, first, quick=quick)
     own = own_setting(model, first)
     known = cones[own.cone].known
-    invariant, beyond = conserved(model, first, known), energy_beyond(model, first, known)
-    basis = Basis(model, first, own, cones, invariant, beyond)
+    conserved, beyond = find_conserved(model, first, known), energy_beyond(model, first, known)
+    basis = Basis(model, first, own, cones, *conserved, beyond)
     found = []
     for setting in settings(model, first, quick=quick):
         tell(f"{scene.name}: {setting_text(setting)}")
-        found.append(measured(basis, setting))
-    rows = tuple(one.row for one in found)
+        found.append(_measured(basis, setting))
+    rows = tuple(row for row, _ in found)
     if clock is not None:
         tell(f"{scene.name}: times")
         rows = _timed(basis, rows, clock, quick)
     tell(f"{scene.name}: stable timesteps")
     largest = stable(model, first, quick=quick)
     rows = front(rows)
-    judged = verdict(rows, [_noticeable(basis, one) for one in found])
+    judged = verdict(rows, [noticeable for _, noticeable in found])
     if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
         rows = tuple(replace(row, cost=None) for row in rows)
     return ScenarioReport(
@@ -126,13 +167,6 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
     return tuple(note for note in notes if note)
 
 
-def _noticeable(basis: Basis, one: MeasuredRow) -> bool | None:
-    """Whether a learner sees the error of a row, for the scene's own with that of its cone."""
-    if one.row.own and one.ok and basis.cones[basis.own.cone].seen >= 1:
-        return True
-    return one.noticeable
-
-
 def _timed(
     basis: Basis, rows: Sequence[WorkPrecisionRow], clock: Clock, quick: bool
 ) -> tuple[WorkPrecisionRow, ...]:
@@ -163,9 +197,100 @@ def _orders(basis: Basis, found: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, 
     orders = []
     for integrator in STANDARD:
         runs = [
-            (row.setting.timestep, Errors(row.position, row.attitude, row.velocity))
+            (row.setting.timestep, row)
             for row in found
-            if (row.setting.integrator, solving(row.setting)) == (integrator.value, solving(own))
+            if (row.setting.integrator, row.setting.solving) == (integrator.value, own.solving)
         ]
         orders.append(fitted_orders(integrator.value, runs, known.floor, extent))
     return tuple(orders)
+
+
+def _measured(basis: Basis, setting: MeasuredSetting) -> tuple[WorkPrecisionRow, bool | None]:
+    """Run a scene under a setting, and compare it with its reference; its cost is not known yet.
+
+    Also whether a learner sees the error of the setting, for the scene's own with that of its cone;
+    `None` where the reference is not known well enough.
+    """
+    model, first, cone = basis.model, basis.first, basis.cones[setting.cone]
+    one = with_setting(model, setting)
+    steps, energy = round(first.scene.scenario.duration / setting.timestep), basis.energy
+    unknown = dict.fromkeys(("figure", "energy_drift", "momentum_drift", "slip", "cost", "seconds"))
+    unknown |= dict.fromkeys(("position", "attitude", "velocity", "growth", "dominated_by"))
+    row = WorkPrecisionRow(  # as of a run that MuJoCo refuses
+        **unknown,
+        setting=setting,
+        status="diverged",
+        reasons=(),
+        penetration=0.0,
+        model_error=cone.model_error,
+        refsafe=first.constrained and refsafe_active(one),
+        steps=steps,
+        own=setting == basis.own,
+        front=False,
+    )
+    try:
+        run = simulate(first.setup, one, thickness(model))
+    except mujoco.FatalError as error:
+        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
+    row = replace(
+        row,
+        status=run.judgement.status.value,
+        reasons=run.judgement.reasons,
+        energy_drift=None if energy is None else energy_drift(run, energy),
+        momentum_drift=momentum_drift(run) if basis.momentum_conserved else None,
+        mean_energy=_mean_energy(run, cone.known.horizon, basis.beyond),
+        penetration=run.penetration,
+    )
+    if not run.judgement.ok:
+        return replace(row, growth=_growth(basis, setting)), None
+    return _with_errors(basis, row, run)
+
+
+def _with_errors(
+    basis: Basis, row: WorkPrecisionRow, run: Run
+) -> tuple[WorkPrecisionRow, bool | None]:
+    """With the errors of a run that went well."""
+    model, scene, cone = basis.model, basis.first.scene, basis.cones[row.setting.cone]
+    known = cone.known
+    states = run.states.head(len(known.states.times))
+    found = errors(motion_of(model, states), known.motion, known.floor)
+    floor = FLOORS * visible_error(model, scene, known.states, known.other)
+    shown = visible_error(model, scene, states, known.states)
+    noticeable = None if max(1, shown) <= floor else shown >= 1
+    if row.own and cone.seen >= 1:
+        noticeable = True
+    creep = None if cone.sticks is None else slip(model, scene, states, cone.sticks)
+    row = replace(
+        row,
+        **asdict(found),
+        figure=_quantity(basis, states, known),
+        seen=max(shown, floor) + cone.seen,
+        slip=creep,
+    )
+    return row, noticeable
+
+
+def _mean_energy(run: Run, horizon: float, expected: float | None) -> float | None:
+    """Mean kinetic energy from the horizon to the end, relative to what it should be, less 1."""
+    later = run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1]
+    if expected is None or len(later) < 2 or not np.isfinite(later).all():
+        return None
+    return float(later.mean()) / expected - 1
+
+
+def _growth(basis: Basis, setting: MeasuredSetting) -> float | None:
+    """By what velocities were multiplied in a step, where they grew."""
+    first, model = basis.first, with_setting(basis.model, setting)
+    growth = run_trial(first.setup, model, first.setup.scenario.duration).growth
+    return growth if math.isfinite(growth) and growth > 1 else None
+
+
+def _quantity(basis: Basis, states: EngineStates, known: KnownMotion) -> tuple[float, float] | None:
+    """The error of what the scenario declares to be measured."""
+    model, scene = basis.model, basis.first.scene
+    if not quantity_name(model, scene):
+        return None
+    exact, other = (quantity_values(model, scene, s) for s in (known.states, known.other))
+    floor = FLOORS * float(np.linalg.norm(exact - other, axis=1).max())
+    apart = np.linalg.norm(quantity_values(model, scene, states) - exact, axis=1)
+    return max(float(apart.max()), floor), max(float(apart[-1]), floor)

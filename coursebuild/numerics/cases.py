@@ -16,26 +16,27 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec.structs import asdict, astuple
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import (
     EngineStates,
-    compiled,
+    compile_model,
     full_state,
     initial_data,
     motion_of,
     refsafe_active,
     simulate,
 )
+from coursebuild.numerics.forward import forward_motion
 from coursebuild.numerics.measure import (
-    Errors,
     energy_drift,
     errors,
     fitted_orders,
+    largest_errors,
     momentum_drift,
-    raised,
     reference_motion,
 )
 from coursebuild.numerics.problem import (
@@ -47,10 +48,11 @@ from coursebuild.numerics.problem import (
     Problem,
     ScalarCheck,
     Scenario,
+    SecondReference,
     Sizes,
 )
 from coursebuild.numerics.problems import problem_named
-from coursebuild.numerics.reports.bench import OrderRow
+from coursebuild.numerics.reports.bench import Errors, OrderRow
 from coursebuild.numerics.reports.cases import (
     CaseReport,
     ErrorLine,
@@ -60,8 +62,11 @@ from coursebuild.numerics.reports.cases import (
 )
 from coursebuild.numerics.scene import Scene, SceneError
 from coursebuild.numerics.stability import boundaries
-from coursebuild.numerics.timing import Clock, scenario_job, timed
+from coursebuild.numerics.timing import Clock, scenario_job, time_jobs
 from mjcourse.spatial import quat_conj, quat_mul
+
+_ENGINE = SecondReference("MuJoCo’s accelerations over the MJCF, DOP853", forward_motion)
+"""Shares nothing with MuJoCo's integrators."""
 
 
 class DisagreementError(ArithmeticError):
@@ -74,7 +79,8 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
     Raises:
         DisagreementError: its two references differ by more than they may.
     """
-    reference = _reference(problem)
+    first, second = problem.reference, _second_reference(problem)
+    reference = ReferenceLine(first.kind, first.source, second.source, *astuple(floor(problem)))
     runs = {one: [measure(problem, one, h) for h in problem.timesteps] for one in STANDARD}
     return CaseReport(
         name=problem.name,
@@ -103,12 +109,12 @@ def _costs(
     for integrator, lines in runs.items():
         step = next((one.timestep for one in lines if one.status == "ok"), None)
         if step is not None:
-            model = compiled(problem.mjcf, integrator, step)
+            model = compile_model(problem.mjcf, integrator, step)
             state = full_state(model, initial_data(problem.scenario, model))
             jobs.append(scenario_job(model, [(problem.scenario, state)], step))
             names.append(integrator.value)
             counts.append(round(problem.scenario.duration / step))
-    found = timed(jobs, 0, clock, quick=True) if jobs else ()
+    found = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
     return tuple(
         StepCost(name, one.nanoseconds.scaled(1e-9 / count))
         for name, count, one in zip(names, counts, found, strict=True)
@@ -116,7 +122,7 @@ def _costs(
 
 
 def _note(problem: Problem) -> str:
-    model = compiled(problem.mjcf, Integrator.EULER, 1e-3)
+    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     driven = problem.search and driving_force(model, problem.scenario)
     said = (problem.note, f"energy is not judged: {driven}" if driven else "")
     return "; ".join(one for one in said if one)
@@ -128,20 +134,18 @@ def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorL
     Raises:
         ValueError: the timestep (s) does not divide the interval of the looks.
     """
-    model = compiled(problem.mjcf, integrator, timestep)
+    model = compile_model(problem.mjcf, integrator, timestep)
     run = simulate(problem, model)
     found = Errors(None, None, None)
     if run.judgement.ok:
         exact = reference_motion(problem.reference, tuple(run.states.times.tolist()))
-        found = raised(errors(motion_of(model, run.states), exact), floor(problem))
+        found = errors(motion_of(model, run.states), exact, floor(problem))
     return ErrorLine(
+        **asdict(found),
         integrator=integrator.value,
         timestep=timestep,
         status=run.judgement.status.value,
         reasons=run.judgement.reasons,
-        position=found.position,
-        attitude=found.attitude,
-        velocity=found.velocity,
         energy_drift=energy_drift(run) if problem.energy_conserved else None,
         momentum_drift=momentum_drift(run) if problem.momentum_conserved else None,
         penetration=run.penetration,
@@ -157,7 +161,7 @@ def orders(problem: Problem, lines: Sequence[ErrorLine]) -> OrderRow:
     integrator = lines[0].integrator
     if not problem.smooth:
         return OrderRow(integrator, None, None, None)
-    runs = [(one.timestep, Errors(one.position, one.attitude, one.velocity)) for one in lines]
+    runs = [(one.timestep, one) for one in lines]
     return fitted_orders(integrator, runs, floor(problem))
 
 
@@ -168,7 +172,10 @@ def floor(problem: Problem) -> Sizes:
     Raises:
         DisagreementError: they differ by more than they may, so that one of them is wrong.
     """
-    gap = agreement(problem)
+    times = problem.scenario.times
+    exact = reference_motion(problem.reference, tuple(times.tolist()))
+    second = _second_reference(problem).motion(problem.mjcf, problem.scenario, times)
+    gap = largest_errors(errors(second, exact))
     for part in ("position", "attitude", "velocity"):
         found, most = getattr(gap, part), getattr(problem.precision, part)
         if not found <= most:
@@ -177,17 +184,8 @@ def floor(problem: Problem) -> Sizes:
     return gap.at_least(ROUNDING)
 
 
-def agreement(problem: Problem) -> Sizes:
-    """The largest differences of the problem's two references over its duration."""
-    times = problem.scenario.times
-    exact = reference_motion(problem.reference, tuple(times.tolist()))
-    return errors(problem.second.motion(problem.mjcf, problem.scenario, times), exact).largest
-
-
-def _reference(problem: Problem) -> ReferenceLine:
-    known, first = floor(problem), problem.reference
-    sizes = known.position, known.attitude, known.velocity
-    return ReferenceLine(first.kind, first.source, problem.second.source, *sizes)
+def _second_reference(problem: Problem) -> SecondReference:
+    return problem.second or _ENGINE
 
 
 def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
@@ -207,9 +205,6 @@ def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
     )
 
 
-# ----------------------------------------------------------------------------------- closed forms
-
-
 def closed_motion(
     model: Any, scene: Scene, declared: DeclaredScenario, times: Array
 ) -> tuple[Problem, Motion]:
@@ -219,20 +214,15 @@ def closed_motion(
         SceneError: the scene begins otherwise than the hard case, but for the place of free bodies.
     """
     problem, place = problem_named(declared.closed), declared.place("reference")
-    there = compiled(problem.mjcf, Integrator.EULER, 1e-3)
+    there = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     if (there.jnt_type.tolist(), there.nq) != (model.jnt_type.tolist(), model.nq):
         message = f"the model has other joints than the hard case `{declared.closed}`"
         raise SceneError(message, place)
     here, start = _start(model, scene.scenario), _start(there, problem.scenario)
     shift = here.position - start.position
-    free = np.concatenate(
-        [
-            np.full(3 if kind == mujoco.mjtJoint.mjJNT_FREE else 1, kind == 0)
-            for kind in model.jnt_type
-            if kind != mujoco.mjtJoint.mjJNT_BALL
-        ]
-        or [np.zeros(0, dtype=bool)]
-    )
+    of_free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    widths = np.where(of_free, 3, model.jnt_type != mujoco.mjtJoint.mjJNT_BALL)
+    free = np.repeat(of_free, widths)
     speeds = np.abs(here.velocity - start.velocity).max(initial=0.0)
     if np.abs(shift[:, ~free]).max(initial=0.0) > 1e-9 or speeds > 1e-9:
         message = f"the scenario begins otherwise than the hard case `{declared.closed}`"

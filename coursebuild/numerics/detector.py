@@ -33,7 +33,7 @@ _BAD = {
 
 
 class RunStatus(enum.Enum):
-    """How a run went."""
+    """How a run went, the worst last."""
 
     OK = "ok"
     SLOW_GROWTH = "slow-growth"
@@ -54,9 +54,6 @@ class RunJudgement(Struct, frozen=True):
     def ok(self) -> bool:
         """Whether the run may be used."""
         return self.status is RunStatus.OK
-
-
-_WORSE = (RunStatus.OK, RunStatus.SLOW_GROWTH, RunStatus.DIVERGED, RunStatus.RESET)
 
 
 class Peaks(Struct, frozen=True):
@@ -155,7 +152,7 @@ def judge(
     if not deep <= 1.0:
         said = f"bodies lie {deep:.3g} times as deep in each other as they may"
         shown.append((RunStatus.DIVERGED, said))
-    worst = max((status for status, _ in shown), key=_WORSE.index, default=RunStatus.OK)
+    worst = max((status for status, _ in shown), key=list(RunStatus).index, default=RunStatus.OK)
     return RunJudgement(worst, tuple(said for _, said in shown))
 
 

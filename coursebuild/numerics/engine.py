@@ -1,7 +1,7 @@
 """MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
 
-Entry points: `compiled`, `varied`, `initial_data`, `simulate`, `advance`, `watched`, `motion_of`,
-`refsafe_active`.
+Entry points: `compile_model`, `with_integrator`, `initial_data`, `simulate`, `advance`,
+`advance_watching`, `motion_of`, `refsafe_active`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
@@ -45,24 +45,24 @@ def _original(mjcf: str) -> Any:
     return mujoco.MjModel.from_xml_string(mjcf)
 
 
-def compiled(mjcf: str, integrator: Integrator, timestep: float) -> Any:
+def compile_model(mjcf: str, integrator: Integrator, timestep: float) -> Any:
     """A `mjModel` of its own with this integrator and timestep (s), and automatic reset off.
 
     Raises:
         ValueError: the MJCF is wrong.
     """
-    return varied(_original(mjcf), integrator, timestep)
+    return with_integrator(_original(mjcf), integrator, timestep)
 
 
-def varied(model: Any, integrator: Integrator, timestep: float) -> Any:
+def with_integrator(model: Any, integrator: Integrator, timestep: float) -> Any:
     """A copy of a `mjModel` with this integrator and timestep (s), and automatic reset off."""
     model = copy.copy(model)
-    choose(model, integrator, timestep)
+    set_integrator(model, integrator, timestep)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model
 
 
-def choose(model: Any, integrator: Integrator, timestep: float) -> None:
+def set_integrator(model: Any, integrator: Integrator, timestep: float) -> None:
     """Give a model this integrator and timestep (s)."""
     model.opt.integrator = int(_CODE[integrator])
     model.opt.timestep = timestep
@@ -94,7 +94,7 @@ def advance(model: Any, data: Any, steps: int = 1) -> None:
         mujoco.mj_step(model, data, steps)
 
 
-def watched(
+def advance_watching(
     model: Any,
     data: Any,
     steps: int,
@@ -139,9 +139,6 @@ def full_state(model: Any, data: Any) -> Array:
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     return state
-
-
-# ------------------------------------------------------------------------------------------ states
 
 
 class EngineStates(Struct, frozen=True):
@@ -198,9 +195,6 @@ def states_of(model: Any, motion: Motion, like: EngineStates) -> EngineStates:
     return EngineStates(motion.times, qpos, motion.velocity, like.act)
 
 
-# ------------------------------------------------------------------------------------- simulations
-
-
 class Run(Struct, frozen=True):
     """A simulation, looked at n times."""
 
@@ -230,7 +224,7 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
     for index in range(len(times)):
         if scenario.controls:
             data.ctrl[:] = scenario.command(index)
-        seen, done = watched(model, data, every, seen, thickness)
+        seen, done = advance_watching(model, data, every, seen, thickness)
         steps += done
         if not seen.finite:
             break
@@ -255,9 +249,6 @@ def invariants(model: Any, other: Any, qpos: Array, qvel: Array) -> Array:
     mujoco.mj_energyVel(model, other)
     mujoco.mj_subtreeVel(model, other)
     return np.concatenate([other.energy, other.subtree_angmom[0]])
-
-
-# ----------------------------------------------------------------------------------------- refsafe
 
 
 def refsafe_active(model: Any) -> bool:

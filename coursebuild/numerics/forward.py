@@ -20,20 +20,15 @@ import numpy as np
 
 from coursebuild.numerics.engine import (
     EngineStates,
-    compiled,
+    compile_model,
     coordinates,
     initial_data,
     motion_of,
     simulate,
-    varied,
+    with_integrator,
 )
-from coursebuild.numerics.integrate import (
-    NoConvergenceError,
-    Rate,
-    State,
-    dop853,
-)
-from coursebuild.numerics.pilot import apart
+from coursebuild.numerics.integrate import NoConvergenceError, Rate, State, dop853
+from coursebuild.numerics.pilot import position_distances
 from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
 
 AGREED = 1e-6
@@ -55,7 +50,7 @@ def forward_motion(mjcf: str, scenario: Scenario, times: Array) -> Motion:
         ValueError: the MJCF is wrong.
         NoConvergenceError: the scene is not smooth.
     """
-    model = compiled(mjcf, Integrator.EULER, 1e-3)
+    model = compile_model(mjcf, Integrator.EULER, 1e-3)
     return motion_of(model, forward_states(model, scenario, times, dop853))
 
 
@@ -110,15 +105,11 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
     """d(qpos, qvel, act)/dt of a state (nq + nv + na,), for so many evaluations at most."""
     nq, end = int(model.nq), int(model.nq + model.nv)
     places, turns = coordinates(model)
-    balls = [int(kind) in _TURNING for kind in model.jnt_type]
+    turning = np.isin(model.jnt_type, _TURNING)
     # A free joint has three velocities of its place before those that turn it.
-    first = [
-        int(dof) + (3 if kind == mujoco.mjtJoint.mjJNT_FREE else 0)
-        for kind, dof, ball in zip(model.jnt_type, model.jnt_dofadr, balls, strict=True)
-        if ball
-    ]
-    spins = {dof + k for dof in first for k in range(3)}
-    moves = [dof for dof in range(int(model.nv)) if dof not in spins]
+    free = model.jnt_type[turning] == mujoco.mjtJoint.mjJNT_FREE
+    first = (model.jnt_dofadr[turning] + 3 * free).tolist()
+    moves = np.setdiff1d(np.arange(model.nv), [dof + k for dof in first for k in range(3)])
     done = 0
 
     def rate(state: State) -> State:
@@ -146,9 +137,6 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
 
 
 _TURNING = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
-
-
-# ------------------------------------------------------------- what the engine itself tends to
 
 
 def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parted: float) -> bool:
@@ -179,13 +167,12 @@ def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parted
 
 
 def _gaps(model: Any, setup: Setup, states: EngineStates, step: float) -> Array:
-    """How far the engine is from these states at every sample: (n,); see `apart`."""
+    """How far the engine is from these states at every sample: (n,); see `position_distance`."""
     for integrator in (Integrator.RK4, Integrator.IMPLICITFAST):
         try:
-            found = simulate(setup, varied(model, integrator, step)).states
+            found = simulate(setup, with_integrator(model, integrator, step)).states
         except mujoco.FatalError:  # it does not run with everything
             continue
         if np.isfinite(found.qpos).all():
-            pairs = zip(found.qpos, states.qpos, strict=True)
-            return np.array([apart(model, mine, theirs) for mine, theirs in pairs])
+            return position_distances(model, found.qpos, states.qpos)
     return np.full(len(states.times), np.inf)

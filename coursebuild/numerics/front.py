@@ -66,9 +66,6 @@ def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
     return tuple(found)
 
 
-# --------------------------------------------------------------------------------------- verdict
-
-
 def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
     """What the measurement says of the scene's own setting.
 

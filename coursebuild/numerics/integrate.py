@@ -61,7 +61,7 @@ def bulirsch_stoer(
     """
     exact = start.dtype == object
     y, now, trial = start.copy(), Decimal(0) if exact else 0.0, first
-    carry = np.zeros_like(y) if not exact else None
+    carry = np.zeros_like(y)
     found = []
     for time in times.tolist():
         goal: Any = Decimal(time) if exact else time
@@ -77,13 +77,9 @@ def bulirsch_stoer(
                 if trial < 1e-12 * first:
                     raise NoConvergenceError(f"no step is small enough at {float(now):.6g} s")
                 continue
-            if carry is None:
-                y = y + change
-            else:  # Kahan's sum: many small steps must not add up roundings
-                change = change - carry
-                total = y + change
-                carry = (total - y) - change
-                y = total
+            change = change - carry  # Kahan's sum: many small steps must not add up roundings
+            total = y + change
+            y, carry = total, (total - y) - change
             now = goal if whole else now + step
             grown = float(step) * min(_GROW, _SAFETY * max(ratio, 1e-12) ** (-1 / (2 * columns)))
             trial = max(trial, grown) if whole else grown
@@ -111,8 +107,6 @@ def _midpoint(rate: Rate, y: State, slope: State, step: Any, n: int) -> State:
     """The change of y by Gragg's smoothed midpoint rule with n (even) substeps."""
     h = step / n
     before, change = np.zeros_like(y), h * slope
-    if y.dtype == object:
-        before = before + Decimal(0)
     for _ in range(n - 1):
         before, change = change, before + 2 * h * rate(y + change)
     last = h * rate(y + change)
@@ -145,8 +139,6 @@ def dop853(rate: Rate, start: Array, times: Array) -> Array:
         found.append(y)
     return np.array(found)
 
-
-# -------------------------------------------------------------------------------------- quadrature
 
 _NODES = 20
 

@@ -1,6 +1,6 @@
 """How far a motion is from its reference, what orders that shows, and what drifts.
 
-Entry points: `errors`, `raised`, `fitted_orders`; `energy_drift`, `momentum_drift`.
+Entry points: `errors`, `largest_errors`, `fitted_orders`; `energy_drift`, `momentum_drift`.
 
 1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
    of fourth order in velocity and of second in attitude.
@@ -15,14 +15,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TypeAlias
 
 import numpy as np
-from msgspec import Struct
 
 from coursebuild.numerics.engine import Run
 from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
-from coursebuild.numerics.reports.bench import FLOORS, FittedOrder, OrderRow
+from coursebuild.numerics.reports.bench import FLOORS, Errors, FittedOrder, OrderRow
 from mjcourse.spatial import angular_distance
 
 _LOWEST, _HIGHEST = 100.0, 0.1
@@ -32,28 +30,7 @@ _FEWEST = 4
 _UNCERTAIN, _BENT = 0.25, 0.25
 """The widest half interval of an order, and the largest bend, with which it is told."""
 
-Pair: TypeAlias = tuple[float, float]
-"""An error at its largest over the whole duration, and at its end."""
-
-
-ONES = Sizes(1.0, 1.0, 1.0)
-
-
-class Errors(Struct, frozen=True):
-    """The difference of two motions; `None` for what they do not have."""
-
-    position: Pair | None
-    """m or rad: Euclidean norm over coordinates."""
-    attitude: Pair | None
-    """rad: the largest angle of any body."""
-    velocity: Pair | None
-    """m/s or rad/s: Euclidean norm."""
-
-    @property
-    def largest(self) -> Sizes:
-        """The largest of each; 0 for what is not there."""
-        parts = (self.position, self.attitude, self.velocity)
-        return Sizes(*(0.0 if part is None else part[0] for part in parts))
+_ZEROS, _ONES = Sizes(0.0, 0.0, 0.0), Sizes(1.0, 1.0, 1.0)
 
 
 @lru_cache(maxsize=64)
@@ -62,34 +39,26 @@ def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
     return reference.solution.motion(np.array(times))
 
 
-def errors(motion: Motion, exact: Motion) -> Errors:
-    """How far a motion is from another at the same times."""
+def errors(motion: Motion, exact: Motion, floor: Sizes = _ZEROS) -> Errors:
+    """How far a motion is from another at the same times; no error is below ten floors."""
+    moved, faster = motion.position - exact.position, motion.velocity - exact.velocity
     turned = angular_distance(exact.attitude, motion.attitude)
+
+    def pair(distances: Array, floor: float) -> tuple[float, float]:
+        least = FLOORS * floor
+        return max(float(np.max(distances)), least), max(float(distances[-1]), least)
+
     return Errors(
-        _pair(np.linalg.norm(motion.position - exact.position, axis=1), motion.position.size),
-        _pair(np.max(turned, axis=1, initial=0.0), turned.size),
-        _pair(np.linalg.norm(motion.velocity - exact.velocity, axis=1), motion.velocity.size),
+        pair(np.linalg.norm(moved, axis=1), floor.position) if moved.size else None,
+        pair(np.max(turned, axis=1), floor.attitude) if turned.size else None,
+        pair(np.linalg.norm(faster, axis=1), floor.velocity) if faster.size else None,
     )
 
 
-def _pair(distances: Array, present: int) -> Pair | None:
-    return (float(np.max(distances)), float(distances[-1])) if present else None
-
-
-def raised(found: Errors, floor: Sizes) -> Errors:
-    """Errors, none below ten floors."""
-
-    def up(pair: Pair | None, floor: float) -> Pair | None:
-        return pair and (max(pair[0], FLOORS * floor), max(pair[1], FLOORS * floor))
-
-    return Errors(
-        up(found.position, floor.position),
-        up(found.attitude, floor.attitude),
-        up(found.velocity, floor.velocity),
-    )
-
-
-# ------------------------------------------------------------------------------------------ orders
+def largest_errors(found: Errors) -> Sizes:
+    """The largest of each; 0 for what is not there."""
+    parts = (found.position, found.attitude, found.velocity)
+    return Sizes(*(0.0 if part is None else part[0] for part in parts))
 
 
 def fitted_order(
@@ -107,6 +76,8 @@ def fitted_order(
         `None` where fewer than four errors are between a hundred floors and a tenth of 1 and of the
         extent, or where they do not lie on a line: there is no order to be told then.
     """
+    from scipy.special import stdtrit
+
     usable = [
         (math.log(h), math.log(error))
         for h, error in sorted(zip(timesteps, found, strict=True))
@@ -120,22 +91,16 @@ def fitted_order(
     freedom = len(x) - 2
     deviation = math.sqrt(float(np.sum((y - slope * x - shift) ** 2)) / freedom)
     error = deviation / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
-    fit = FittedOrder(float(slope), _student(freedom) * error, float(np.ptp(slopes)))
+    student = float(stdtrit(freedom, 0.975))  # an interval of 95 %
+    fit = FittedOrder(float(slope), student * error, float(np.ptp(slopes)))
     return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
-
-
-def _student(freedom: int) -> float:
-    """Student's factor of an interval of 95 %."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, 0.975))
 
 
 def fitted_orders(
     integrator: str,
-    runs: Sequence[tuple[float, Errors | None]],
+    runs: Sequence[tuple[float, Errors]],
     floor: Sizes,
-    extent: Sizes = ONES,
+    extent: Sizes = _ONES,
 ) -> OrderRow:
     """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count.
 
@@ -143,15 +108,11 @@ def fitted_orders(
     """
 
     def fitted(part: str) -> FittedOrder | None:
-        pairs = [(h, getattr(one, part)) for h, one in runs if one is not None]
-        kept = [(h, pair[0]) for h, pair in pairs if pair is not None]
-        steps, largest = [h for h, _ in kept], [error for _, error in kept]
-        return fitted_order(steps, largest, getattr(floor, part), getattr(extent, part))
+        known = [(h, pair[0]) for h, one in runs if (pair := getattr(one, part)) is not None]
+        steps, found = [h for h, _ in known], [error for _, error in known]
+        return fitted_order(steps, found, getattr(floor, part), getattr(extent, part))
 
     return OrderRow(integrator, fitted("position"), fitted("attitude"), fitted("velocity"))
-
-
-# ------------------------------------------------------------------------------------------ drifts
 
 
 def energy_drift(run: Run, scale: float | None = None) -> float | None:

@@ -108,9 +108,6 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     return np.array(found)
 
 
-# --------------------------------------------------------------------------------------- contacts
-
-
 Pair: TypeAlias = tuple[int, int]
 """Two geoms, by number."""
 Sticks: TypeAlias = tuple[frozenset[Pair], ...]
@@ -154,18 +151,14 @@ def speeds_of(model: Any, scene: Scene, states: EngineStates) -> list[dict[Pair,
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
-        found.append(_speeds(model, data))
+        least: dict[Pair, float] = {}
+        for contact in touching(data):
+            if contact.dim >= 3:  # with friction
+                pair = (int(contact.geom[0]), int(contact.geom[1]))
+                _, along = speeds(model, data, contact)
+                least[pair] = min(along, least.get(pair, math.inf))
+        found.append(least)
     return found
-
-
-def _speeds(model: Any, data: Any) -> dict[Pair, float]:
-    least: dict[Pair, float] = {}
-    for contact in touching(data):
-        if contact.dim >= 3:  # with friction
-            pair = (int(contact.geom[0]), int(contact.geom[1]))
-            _, along = speeds(model, data, contact)
-            least[pair] = min(along, least.get(pair, math.inf))
-    return least
 
 
 def touching(data: Any) -> list[Any]:

@@ -21,7 +21,7 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.detector import Peaks, driving_force, peaks
-from coursebuild.numerics.engine import advance, initial_data, integrator_of, varied
+from coursebuild.numerics.engine import advance, initial_data, integrator_of, with_integrator
 from coursebuild.numerics.problem import ROOM, Array, Scenario, Setup
 from coursebuild.numerics.scene import Scene, SceneError
 
@@ -73,10 +73,10 @@ def pilot(model: Any, scene: Scene) -> Pilot:
         SceneError: it diverges even there.
     """
     step, scenario = min(scene.timesteps), scene.scenario
-    own = varied(model, integrator_of(model), step)
+    own = with_integrator(model, integrator_of(model), step)
     own.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data, twins = initial_data(scenario, own), _twins(own, scenario)
-    look = _Look(own)
+    look = _Observer(own)
     seen = Peaks()
     times, every = scenario.times, scenario.steps(step)
     gaps = np.full((len(twins), len(times)), np.nan)
@@ -94,7 +94,7 @@ def pilot(model: Any, scene: Scene) -> Pilot:
         for twin, gap in zip(twins, gaps, strict=True):
             if index == 0 or gap[index - 1] < APART:
                 advance(own, twin, every)
-                gap[index] = apart(own, data.qpos, twin.qpos)
+                gap[index] = position_distance(own, data.qpos, twin.qpos)
     horizons, rates = zip(*(_horizon(times, gap) for gap in gaps), strict=True)
     grown = [rate for rate in rates if rate is not None]
     return Pilot(
@@ -108,7 +108,7 @@ def pilot(model: Any, scene: Scene) -> Pilot:
     )
 
 
-def apart(model: Any, first: Array, second: Array) -> float:
+def position_distance(model: Any, first: Array, second: Array) -> float:
     """How far two positions (nq,) are from each other, at the joint where they differ most.
 
     In rad for hinges and attitudes, relative to the model's extent for slides and free places.
@@ -116,6 +116,12 @@ def apart(model: Any, first: Array, second: Array) -> float:
     difference = np.zeros(int(model.nv))
     mujoco.mj_differentiatePos(model, difference, 1.0, first, second)
     return float(np.max(np.abs(difference / scales(model)), initial=0.0))
+
+
+def position_distances(model: Any, first: Array, second: Array) -> Array:
+    """The same of two motions (n, nq), at each time: (n,)."""
+    pairs = zip(first, second, strict=True)
+    return np.array([position_distance(model, one, other) for one, other in pairs])
 
 
 def scales(model: Any) -> Array:
@@ -130,7 +136,7 @@ def scales(model: Any) -> Array:
     return found
 
 
-class _Look:
+class _Observer:
     """Looks at every state, and keeps what acted."""
 
     def __init__(self, model: Any) -> None:

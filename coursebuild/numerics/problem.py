@@ -19,6 +19,8 @@ from msgspec import Struct
 from msgspec.structs import astuple
 from numpy.typing import NDArray
 
+from coursebuild.core.model.scenarios import is_multiple
+
 Array: TypeAlias = NDArray[np.float64]
 
 ROOM = 10.0
@@ -39,7 +41,6 @@ class Integrator(enum.Enum):
     DISCRETE = "discrete"
 
 
-INTEGRATORS: tuple[Integrator, ...] = tuple(Integrator)
 STANDARD: tuple[Integrator, ...] = tuple(
     one for one in Integrator if one is not Integrator.EULER_EXPLICIT
 )
@@ -103,11 +104,10 @@ def whole_number(length: float, part: float, length_name: str, part_name: str) -
     Raises:
         ValueError: not a whole number of times, so that an end would not be reached.
     """
-    count = round(length / part)
-    if count < 1 or abs(count * part - length) > 1e-9 * length:
+    if not is_multiple(length, part):
         message = f"{length_name} ({length:g} s) is no multiple of {part_name} ({part:g} s)"
         raise ValueError(message)
-    return count
+    return round(length / part)
 
 
 class Motion(Struct, frozen=True):
@@ -231,7 +231,8 @@ class Problem(Setup, frozen=True, kw_only=True):
     mjcf: str
     """Minimal, without timestep and integrator."""
     reference: Reference
-    second: SecondReference
+    second: SecondReference | None = None
+    """`None`: MuJoCo's accelerations, integrated."""
     precision: Sizes = Sizes(1e-10, 1e-10, 1e-10)
     """What the two may differ by, at most: beyond it one of them is wrong."""
     timesteps: tuple[float, ...] = ()

@@ -1,7 +1,7 @@
 """What a scene's motion is measured against, and how well that is known.
 
-Entry points: `know(model, first)`, the reference of a scene; `references(model, first)`, by cone
-where something touches; `conserved(…)`, `energy_beyond(…)`.
+Entry points: `find_reference(model, first)`, the reference of a scene; `references(model, first)`,
+by cone where something touches; `find_conserved(…)`, `energy_beyond(…)`.
 
 1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
    again. Their difference is what the reference may be wrong by. Both take the same accelerations,
@@ -41,17 +41,19 @@ from coursebuild.numerics.engine import (
     motion_of,
     simulate,
     states_of,
-    varied,
+    with_integrator,
 )
 from coursebuild.numerics.forward import Method, forward_states, tends_to
-from coursebuild.numerics.integrate import (
-    NoConvergenceError,
-    bulirsch_stoer,
-    dop853,
+from coursebuild.numerics.integrate import NoConvergenceError, bulirsch_stoer, dop853
+from coursebuild.numerics.measure import (
+    energy_drift,
+    energy_scale,
+    errors,
+    largest_errors,
+    momentum_drift,
 )
-from coursebuild.numerics.measure import energy_drift, energy_scale, errors, momentum_drift
 from coursebuild.numerics.observe import Sticks, sticking, visible_error
-from coursebuild.numerics.pilot import Pilot, apart
+from coursebuild.numerics.pilot import Pilot, position_distances
 from coursebuild.numerics.problem import ROUNDING, Integrator, Motion, Setup, Sizes
 from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
@@ -73,7 +75,7 @@ _STEP = 1e-6
 _ELSEWHERE = "the engine in small steps tends elsewhere"
 
 
-class Known(Struct, frozen=True):
+class KnownMotion(Struct, frozen=True):
     """The reference of a scene, from the first sample to the horizon."""
 
     kind: str
@@ -95,7 +97,7 @@ class Known(Struct, frozen=True):
     """Why it is no better one; empty where it is the best there is."""
 
 
-def know(model: Any, first: Pilot, *, quick: bool = False) -> Known:
+def find_reference(model: Any, first: Pilot, *, quick: bool = False) -> KnownMotion:
     """The reference of a scene.
 
     Raises:
@@ -115,7 +117,7 @@ def know(model: Any, first: Pilot, *, quick: bool = False) -> Known:
     elif wanted and wanted.reference == "ode":
         raise _no_integration(f"there is {' and '.join(first.jumps)}", wanted)
     if found is None:
-        found = replace(itself(model, first, quick=quick), note=note)
+        found = replace(self_reference(model, first, quick=quick), note=note)
     if wanted and wanted.closed:
         problem, motion = closed_motion(model, first.scene, wanted, found.states.times)
         what, place = f"the closed form of `{wanted.closed}`", wanted.place("reference")
@@ -130,7 +132,7 @@ def know(model: Any, first: Pilot, *, quick: bool = False) -> Known:
     )
 
 
-def _exact_motion(model: Any, first: Pilot, exact: ExactMotion, second: Known) -> Motion:
+def _exact_motion(model: Any, first: Pilot, exact: ExactMotion, second: KnownMotion) -> Motion:
     """What the course says of the motion; velocities of the second reference where it says none."""
     data, states = initial_data(first.scene.scenario, model), second.states
     qpos, qvel = exact.states(states.times, data.qpos.copy(), data.qvel.copy())
@@ -147,11 +149,11 @@ def _no_integration(why: str, declared: DeclaredScenario) -> SceneError:
     return SceneError(message, declared.place("reference"), help)
 
 
-def _integrated(model: Any, first: Pilot, quick: bool) -> Known:
+def _integrated(model: Any, first: Pilot, quick: bool) -> KnownMotion:
     """By two methods over the engine's accelerations."""
     times = first.setup.scenario.times
     times = times[times <= first.horizon * (1 + 1e-9)]
-    exact = varied(model, Integrator.EULER, _STEP)
+    exact = with_integrator(model, Integrator.EULER, _STEP)
     exact.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     exact.opt.iterations, exact.opt.tolerance = max(100, int(exact.opt.iterations)), 0.0
     exact.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
@@ -164,20 +166,20 @@ def _integrated(model: Any, first: Pilot, quick: bool) -> Known:
     states = run(partial(bulirsch_stoer, tolerance=1e-13))
     source = "Bulirsch–Stoer over mj_forward"
     other, second = run(dop853), "DOP853 over mj_forward"
-    return _compared(model, "ode", source, states, second, other, first.horizon)
+    return _compared(model, "ode", source, states, second, other)
 
 
-def _tended(model: Any, first: Pilot, found: Known) -> bool:
+def _tended(model: Any, first: Pilot, found: KnownMotion) -> bool:
     setup = _until(first.setup, float(found.states.times[-1]))
     return tends_to(model, setup, found.states, min(first.scene.timesteps), PARTED)
 
 
-def itself(model: Any, first: Pilot, *, quick: bool = False) -> Known:
+def self_reference(model: Any, first: Pilot, *, quick: bool = False) -> KnownMotion:
     """By the engine itself in small steps, and in steps twice as long under another integrator."""
     step = min(first.scene.timesteps) / (QUICK_FINER if quick else FINER)
     found = []
     for integrator, length in ((Integrator.IMPLICITFAST, step), (Integrator.EULER, 2 * step)):
-        fine = varied(model, integrator, length)
+        fine = with_integrator(model, integrator, length)
         fine.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         fine.opt.iterations = max(100, int(fine.opt.iterations))
         fine.opt.tolerance = min(1e-10, float(fine.opt.tolerance))
@@ -185,12 +187,12 @@ def itself(model: Any, first: Pilot, *, quick: bool = False) -> Known:
         if not np.isfinite(run.states.qpos).all():
             raise SceneError(f"it diverges even at {step:g} s a step")
         found.append(run.states)
-    gaps = [apart(model, a, b) for a, b in zip(found[0].qpos, found[1].qpos, strict=True)]
-    good = next((i for i, gap in enumerate(gaps) if gap > PARTED), len(gaps))
-    states, other = (one.head(max(1, good)) for one in found)
+    beyond = np.flatnonzero(position_distances(model, found[0].qpos, found[1].qpos) > PARTED)
+    good = max(1, int(beyond[0])) if beyond.size else len(found[0].times)
+    states, other = (one.head(good) for one in found)
     source = f"the engine itself: implicitfast at {step:g} s, Newton's solver"
     second = f"the same under Euler at {2 * step:g} s"
-    return _compared(model, "self", source, states, second, other, float(states.times[-1]))
+    return _compared(model, "self", source, states, second, other)
 
 
 def _until(setup: Setup, horizon: float) -> Setup:
@@ -205,22 +207,26 @@ def _compared(
     states: EngineStates,
     second: str,
     other: EngineStates,
-    horizon: float,
-) -> Known:
-    motion = motion_of(model, states)
-    gap = errors(motion, motion_of(model, other)).largest
+) -> KnownMotion:
+    motion, horizon = motion_of(model, states), float(states.times[-1])
+    gap = largest_errors(errors(motion, motion_of(model, other)))
     floor = gap.at_least(ROUNDING)
-    return Known(kind, source, states, other, motion, floor, second, gap.largest, horizon)
+    return KnownMotion(kind, source, states, other, motion, floor, second, gap.largest, horizon)
 
 
 def _closed(
-    model: Any, second: Known, motion: Motion, source: str, least: Sizes, what: str, place: Span
-) -> Known:
+    model: Any,
+    second: KnownMotion,
+    motion: Motion,
+    source: str,
+    least: Sizes,
+    what: str,
+    place: Span,
+) -> KnownMotion:
     """A closed form, with what was integrated as the second reference."""
-    gap = errors(motion, second.motion).largest
+    gap = largest_errors(errors(motion, second.motion))
     states = states_of(model, motion, second.states)
-    pairs = zip(states.qpos, second.states.qpos, strict=True)
-    away = max((apart(model, a, b) for a, b in pairs), default=0.0)
+    away = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
     known = least
     if second.kind == "ode":
         if not away <= FOREIGN:
@@ -242,13 +248,10 @@ def _closed(
     )
 
 
-# ------------------------------------------------------------------------------------------- cones
-
-
 class Cone(Struct, frozen=True):
     """What errors under a cone are measured against."""
 
-    known: Known
+    known: KnownMotion
     model_error: float | None
     """What remains of the error however small the timestep, m or rad."""
     seen: float
@@ -259,14 +262,14 @@ class Cone(Struct, frozen=True):
 
 def references(model: Any, first: Pilot, *, quick: bool = False) -> dict[str, Cone]:
     """By cone; by "" where nothing touches."""
-    known, scene = know(model, first, quick=quick), first.scene
+    known, scene = find_reference(model, first, quick=quick), first.scene
     if not first.contact:
         return {"": Cone(known, None, 0.0)}
     limits = {}
     for cone, number in CONES.items():
-        other = varied(model, Integrator.EULER, scene.own)
+        other = with_integrator(model, Integrator.EULER, scene.own)
         other.opt.cone = number
-        limits[cone] = itself(other, first, quick=quick)
+        limits[cone] = self_reference(other, first, quick=quick)
     found = {}
     for cone, limit in limits.items():
         truth = known if known.kind == "closed" else limits["elliptic"]
@@ -276,7 +279,7 @@ def references(model: Any, first: Pilot, *, quick: bool = False) -> dict[str, Co
             continue
         count = min(len(limit.states.times), len(truth.states.times))
         near, true = limit.states.head(count), truth.states.head(count)
-        gap = errors(motion_of(model, near), motion_of(model, true)).largest.place
+        gap = largest_errors(errors(motion_of(model, near), motion_of(model, true))).place
         least = FLOORS * max(limit.floor.place, truth.floor.place)
         if truth is known:
             found[cone] = Cone(known, max(gap, least), 0.0, sticks)
@@ -286,20 +289,12 @@ def references(model: Any, first: Pilot, *, quick: bool = False) -> dict[str, Co
     return found
 
 
-# --------------------------------------------------------------------------------------- invariants
+def find_conserved(model: Any, first: Pilot, known: KnownMotion) -> tuple[float | None, bool]:
+    """What the author says is conserved, or else what the reference conserves.
 
-
-class Conserved(Struct, frozen=True):
-    """What does not change in a scene."""
-
-    energy: float | None
-    """What changes of energy are large against, J; `None` where energy is not conserved."""
-    momentum: bool
-    """Whether the angular momentum about the centre of mass is."""
-
-
-def conserved(model: Any, first: Pilot, known: Known) -> Conserved:
-    """What the author says is conserved, or else what the reference conserves."""
+    What changes of energy are large against, J, and `None` where energy is not conserved; whether
+    the angular momentum about the centre of mass is.
+    """
     scenario = first.scene.scenario
     declared = first.scene.declared.conserved if first.scene.declared is not None else None
     data, other = initial_data(scenario, model), initial_data(scenario, model)
@@ -309,21 +304,21 @@ def conserved(model: Any, first: Pilot, known: Known) -> Conserved:
     scale = energy_scale(run)
     if declared is not None:
         energy = "energy" in declared and scale > 0
-        return Conserved(scale if energy else None, "angular-momentum" in declared)
+        return scale if energy else None, "angular-momentum" in declared
     if not first.smooth or known.kind == "self":
-        return Conserved(None, momentum=False)
+        return None, False
     drifts = energy_drift(run), momentum_drift(run)
     steady = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
-    return Conserved(scale if steady[0] else None, steady[1])
+    return scale if steady[0] else None, steady[1]
 
 
-def energy_beyond(model: Any, first: Pilot, known: Known) -> float | None:
+def energy_beyond(model: Any, first: Pilot, known: KnownMotion) -> float | None:
     """Mean kinetic energy beyond the horizon, J, in the smallest steps; `None` without such."""
     scenario = first.scene.scenario
     if known.horizon > scenario.duration - scenario.sample * 1.5:
         return None
     integrator = Integrator.RK4 if first.smooth else Integrator.IMPLICITFAST
-    fine = varied(model, integrator, min(first.scene.timesteps) / 2)
+    fine = with_integrator(model, integrator, min(first.scene.timesteps) / 2)
     run = simulate(first.setup, fine)
     mean = float(run.energy[1:][run.states.times > known.horizon * (1 + 1e-9), 1].mean())
     return mean if math.isfinite(mean) and mean > 0 else None

@@ -17,6 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import (
     DURATION,
@@ -24,6 +25,7 @@ from coursebuild.core.model.scenarios import (
     Declarations,
     DeclaredScenario,
     Visible,
+    is_multiple,
     keyframe_scenarios,
 )
 from coursebuild.core.text.source import Span
@@ -105,7 +107,7 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
     for key in range(int(model.nkey)) or (-1,):
         name = names[max(key, 0)]
         title = "from the model's own state" if key < 0 else f"from the keyframe {name}"
-        one = Scenario(scenario.duration, scenario.sample, keyframe=key)
+        one = replace(scenario, keyframe=key)
         found.append(Scene(name, title, one, _ladder(one, step, steps), step, visible, None))
     return tuple(found)
 
@@ -115,12 +117,10 @@ def thickness(model: Any) -> Array:
 
     That of a plane or a height field is infinite: nothing is on its other side.
     """
-    half = np.full(int(model.ngeom) + 1, np.inf)
-    bottomless = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-    for geom in range(int(model.ngeom)):
-        if int(model.geom_type[geom]) not in bottomless:
-            half[geom] = float(model.geom_aabb[geom, 3:].min()) or np.inf
-    return half
+    half = model.geom_aabb[:, 3:].min(axis=1)
+    planes = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    bottomless = np.isin(model.geom_type, planes)
+    return np.append(np.where(bottomless | (half == 0), np.inf, half), np.inf)
 
 
 def _declared(
@@ -128,18 +128,15 @@ def _declared(
 ) -> Scene:
     step = float(model.opt.timestep)
     times = _timed(step, declared.duration, declared.sample, declared.hold, declared.controls)
-    scenario = Scenario(
-        duration=times.duration,
-        sample=times.sample,
+    scenario = replace(
+        times,
         qpos=_unit(model, declared.qpos),
         qvel=declared.qvel,
         controls=declared.controls,
-        hold=times.hold,
         keyframe=_keyframe(model, declared.keyframe),
     )
     for one in declared.timesteps:
-        count = round(scenario.sample / one)
-        if count < 1 or abs(count * one - scenario.sample) > 1e-9 * scenario.sample:
+        if not is_multiple(scenario.sample, one):
             message = f"the timestep {one:g} s does not divide the sample, {scenario.sample:g} s"
             help = "give `sample` a value that all timesteps divide"
             raise SceneError(message, declared.place("timesteps"), help)
@@ -165,9 +162,6 @@ def _unit(model: Any, qpos: tuple[float, ...]) -> tuple[float, ...]:
     found = np.array(qpos)
     mujoco.mj_normalizeQuat(model, found)
     return tuple(found.tolist())
-
-
-# ----------------------------------------------------------------------------------------- times
 
 
 def _timed(
@@ -207,11 +201,11 @@ def _decimal(seconds: float) -> float:
 
 
 def _steps(length: float, step: float, name: str) -> int:
-    count = round(length / step)
-    if count < 1 or abs(count * step - length) > 1e-9 * length:
-        message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
-        raise SceneError(message)
-    return count
+    if not is_multiple(length, step):
+        raise SceneError(
+            f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
+        )
+    return round(length / step)
 
 
 def _looks(basis: int, total: int) -> int:

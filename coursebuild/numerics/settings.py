@@ -10,28 +10,18 @@ full product would take hours and say little more.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import mujoco
 from msgspec.structs import replace
 
-from coursebuild.numerics.detector import RunStatus
-from coursebuild.numerics.engine import choose, integrator_of, varied
+from coursebuild.numerics.engine import integrator_of, set_integrator, with_integrator
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import STANDARD, Integrator
 from coursebuild.numerics.reports.bench import MeasuredSetting, StableRow
 from coursebuild.numerics.reports.text import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
-from coursebuild.numerics.stability import (
-    DENSE,
-    MOST_STEPS,
-    Density,
-    StabilityTrial,
-    attempted,
-    scan,
-    stable_row,
-)
+from coursebuild.numerics.stability import MOST_STEPS, StabilityTrial, run_trial, scan, stable_row
 
 _SOLVERS = {
     "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
@@ -81,7 +71,7 @@ def settings(model: Any, first: Pilot, *, quick: bool = False) -> tuple[Measured
 
 def apply(model: Any, setting: MeasuredSetting) -> None:
     """Give a `mjModel` a setting; what is empty in it stays as it is."""
-    choose(model, Integrator(setting.integrator), setting.timestep)
+    set_integrator(model, Integrator(setting.integrator), setting.timestep)
     if setting.solver:
         model.opt.solver = _SOLVERS[setting.solver]
         model.opt.iterations = setting.iterations
@@ -91,7 +81,7 @@ def apply(model: Any, setting: MeasuredSetting) -> None:
 
 def with_setting(model: Any, setting: MeasuredSetting) -> Any:
     """A copy of a `mjModel` with a setting, and automatic reset off."""
-    one = varied(model, Integrator(setting.integrator), setting.timestep)
+    one = with_integrator(model, Integrator(setting.integrator), setting.timestep)
     apply(one, setting)
     return one
 
@@ -107,18 +97,12 @@ def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow,
     search = (max(low, duration / MOST_STEPS), min(high, duration / FEWEST_STEPS))
     if search[1] <= search[0]:
         return ()
-    one, thick = varied(model, Integrator.EULER, first.scene.own), thickness(model)
-    density = Density(6, 8, 1e-2) if quick else DENSE
-    rows = []
-    for integrator in STANDARD:
+    thick = thickness(model)
 
-        def attempt(step: float, integrator: Integrator = integrator) -> StabilityTrial:
-            choose(one, integrator, step)
-            try:
-                return attempted(first.setup, one, duration, thick)
-            except mujoco.FatalError:
-                return StabilityTrial(step, RunStatus.DIVERGED, math.nan)
+    def row(integrator: Integrator) -> StableRow:
+        def attempt(step: float) -> StabilityTrial:
+            return run_trial(first.setup, with_integrator(model, integrator, step), duration, thick)
 
-        found = scan(attempt, search, density)
-        rows.append(stable_row(integrator, found, first.setup, duration))
-    return tuple(rows)
+        return stable_row(integrator, scan(attempt, search, quick=quick), first.setup, duration)
+
+    return tuple(map(row, STANDARD))

@@ -1,7 +1,7 @@
 """The largest stable timestep for each integrator, and how fast a run grows beyond.
 
-Entry points: `boundaries(problem)`, of a hard case; `scan(attempt, search)`, `attempted(setup,
-model, span)` and `stable_row`, for any scene; `bounded(problem)`, with the energy that can be.
+Entry points: `boundaries(problem)`, of a hard case; `scan(attempt, search)`, `run_trial(setup,
+model, span)` and `stable_row`, for any scene; `with_energy_bound(problem)`.
 
 1. Stable is what stays within what can be over a simulated time that is the same for all timesteps,
    by the judgement that every run gets: finite, within bounds, and where nothing drives the motion,
@@ -17,17 +17,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
-from coursebuild.numerics.engine import compiled, initial_data, simulate, watched
+from coursebuild.numerics.engine import advance_watching, compile_model, initial_data, simulate
 from coursebuild.numerics.problem import (
-    INTEGRATORS,
     STANDARD,
     Array,
     Integrator,
@@ -49,20 +49,9 @@ _PARTS, _LOOKS = 20, 1000
 """Of a run: looks at how fast it grows, and at whether it is lost."""
 _SMALL_STEPS = 100_000
 """Steps of the run that says how much energy there can be, at most."""
-
-
-class Density(Struct, frozen=True):
-    """How densely timesteps are tried."""
-
-    grid: int = 24
-    """In a decade."""
-    near: int = 32
-    """Just below the largest stable one."""
-    resolution: float = 1e-4
-    """Relative width at which the bisection ends."""
-
-
-DENSE = Density()
+_DENSE, _QUICK = (24, 32, 1e-4), (6, 8, 1e-2)
+"""How many timesteps are tried in a decade and just below the largest stable one, and the relative
+width at which the bisection ends."""
 
 
 class StabilityTrial(Struct, frozen=True):
@@ -81,9 +70,6 @@ class StabilityTrial(Struct, frozen=True):
         return self.status is RunStatus.OK
 
 
-# ------------------------------------------------------------------------------------- hard cases
-
-
 def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
     """The boundaries of all integrators for which they may differ.
 
@@ -92,20 +78,20 @@ def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
     if problem.search is None:
         return ()
     # Only joints with damping know `eulerdamp`.
-    damped = bool(np.any(compiled(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
-    problem = bounded(problem)
-    return tuple(boundary(problem, one) for one in (INTEGRATORS if damped else STANDARD))
+    damped = bool(np.any(compile_model(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
+    problem = with_energy_bound(problem)
+    return tuple(boundary(problem, one) for one in (Integrator if damped else STANDARD))
 
 
-def bounded(problem: Problem) -> Problem:
+def with_energy_bound(problem: Problem) -> Problem:
     """The problem with the energy that can be: by its motion in small steps, over its span."""
-    if driving_force(compiled(problem.mjcf, Integrator.RK4, 1e-3), problem.scenario):
+    if driving_force(compile_model(problem.mjcf, Integrator.RK4, 1e-3), problem.scenario):
         return problem
     step, scenario = min(problem.timesteps), problem.scenario
     looks = math.floor(min(problem.span, _SMALL_STEPS * step) / scenario.sample)
     duration = max(looks * scenario.sample, scenario.duration)
     longer = replace(problem, scenario=replace(scenario, duration=duration))
-    energy = simulate(longer, compiled(problem.mjcf, Integrator.RK4, step)).energy
+    energy = simulate(longer, compile_model(problem.mjcf, Integrator.RK4, step)).energy
     most = energy.sum(axis=1).max() + problem.room * energy[:, 1].max()
     return replace(problem, energy_bound=float(most))
 
@@ -118,7 +104,7 @@ def boundary(problem: Problem, integrator: Integrator) -> BoundaryLine:
     found = scan(lambda step: attempt(problem, integrator, step), search)
     row = stable_row(integrator, found, problem, problem.span)
     theory = None if problem.limit is None else problem.limit(integrator)
-    lost = found.lost
+    lost = _first_lost(found)
     return BoundaryLine(
         **asdict(row),
         theory=None if theory is None else _finite(theory.timestep),
@@ -140,38 +126,29 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-# ----------------------------------------------------------------------------------------- search
-
-
-class Scan(Struct, frozen=True):
-    """What a search found."""
-
-    trials: tuple[StabilityTrial, ...]
-    """Of all timesteps that were tried, rising."""
-
-    @property
-    def lost(self) -> StabilityTrial | None:
-        """The first that is not stable."""
-        return next((one for one in self.trials if not one.stable), None)
-
-
 def scan(
     attempt: Callable[[float], StabilityTrial],
     search: tuple[float, float],
-    density: Density = DENSE,
-) -> Scan:
-    """Look for the largest stable timestep between two (s)."""
+    *,
+    quick: bool = False,
+) -> tuple[StabilityTrial, ...]:
+    """Look for the largest stable timestep between two (s); all that was tried, rising."""
     low, high = search
-    count = max(2, round(density.grid * math.log10(high / low)) + 1)
+    in_a_decade, near, resolution = _QUICK if quick else _DENSE
+    count = max(2, round(in_a_decade * math.log10(high / low)) + 1)
     grid = np.geomspace(low, high, count).tolist()
     tried: dict[float, StabilityTrial] = {}
-    while (step := _next(tried, grid, density)) is not None:
+    while (step := _next(tried, grid, near, resolution)) is not None:
         tried[step] = attempt(step)
-    return Scan(tuple(tried[step] for step in sorted(tried)))
+    return tuple(tried[step] for step in sorted(tried))
+
+
+def _first_lost(trials: Sequence[StabilityTrial]) -> StabilityTrial | None:
+    return next((one for one in trials if not one.stable), None)
 
 
 def _next(
-    tried: Mapping[float, StabilityTrial], grid: list[float], density: Density
+    tried: Mapping[float, StabilityTrial], grid: list[float], near: int, resolution: float
 ) -> float | None:
     """The timestep to try next; `None` when the largest stable one is known."""
     lost = min((step for step, one in tried.items() if not one.stable), default=math.inf)
@@ -179,22 +156,23 @@ def _next(
     fresh = [step for step in grid if step >= least and step not in tried]
     stable = max((step for step in tried if step < lost), default=0.0)
     if not fresh and stable and not math.isinf(lost):
-        if lost / stable > 1 + density.resolution:
+        if lost / stable > 1 + resolution:
             return math.sqrt(lost * stable)
-        shares = np.geomspace(_NEAREST, _FARTHEST, density.near).tolist()
-        near = [stable * (1 - share) for share in shares]
-        fresh = [step for step in near if step > grid[0] and step not in tried]
+        below = [stable * (1 - x) for x in np.geomspace(_NEAREST, _FARTHEST, near).tolist()]
+        fresh = [step for step in below if step > grid[0] and step not in tried]
     return max(fresh, default=None)
 
 
-def stable_row(integrator: Integrator, found: Scan, setup: Setup, span: float) -> StableRow:
+def stable_row(
+    integrator: Integrator, trials: Sequence[StabilityTrial], setup: Setup, span: float
+) -> StableRow:
     """What a search found for an integrator, over a span (s) of simulated time."""
-    steps = [one.timestep for one in found.trials]
-    below, largest = steps, None
-    if found.lost is not None:
-        below = [step for step in steps if step < found.lost.timestep]
+    steps = [one.timestep for one in trials]
+    below, largest, lost = steps, None, _first_lost(trials)
+    if lost is not None:
+        below = [step for step in steps if step < lost.timestep]
         largest = max(below, default=0.0)
-    islands = [one.timestep for one in found.trials[len(below) :] if one.stable]
+    islands = [one.timestep for one in trials[len(below) :] if one.stable]
     return StableRow(
         integrator=integrator.value,
         largest=largest,
@@ -212,15 +190,12 @@ def step_count(span: float, timestep: float) -> int:
     return math.ceil(span / timestep * (1 - 1e-12))
 
 
-# ----------------------------------------------------------------------------------------- trials
-
-
 def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
     """Run the problem over its span at a timestep (s)."""
-    return attempted(problem, compiled(problem.mjcf, integrator, timestep), problem.span)
+    return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
 
 
-def attempted(
+def run_trial(
     setup: Setup, model: Any, span: float, thickness: Array | None = None
 ) -> StabilityTrial:
     """Run a model over a span (s) with its own timestep, or until it is lost.
@@ -236,7 +211,12 @@ def attempted(
     seen, total = Peaks(), 0
     for begin, end in itertools.pairwise(_edges(setup.scenario, timestep, steps)):
         _command(setup.scenario, data, begin * timestep)
-        seen, done = watched(model, data, end - begin, seen, thickness, every=every, setup=setup)
+        try:
+            seen, done = advance_watching(
+                model, data, end - begin, seen, thickness, every=every, setup=setup
+            )
+        except mujoco.FatalError:  # MuJoCo does not run it
+            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan)
         total += done
         with np.errstate(over="ignore"):
             sizes.append((total, float(np.linalg.norm(data.qvel))))

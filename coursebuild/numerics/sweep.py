@@ -31,7 +31,7 @@ from coursebuild.numerics.engine import (
     integrator_of,
     silent,
     simulate,
-    varied,
+    with_integrator,
 )
 from coursebuild.numerics.observe import (
     Pair,
@@ -45,7 +45,7 @@ from coursebuild.numerics.problem import Scenario, Setup
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.sweep import SweepReport, SweepRow
 from coursebuild.numerics.scene import Scene, SceneError, thickness
-from coursebuild.numerics.timing import Clock, Job, scenario_job, timed
+from coursebuild.numerics.timing import Clock, Job, scenario_job, time_jobs
 
 THREADS = "threads"
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(:(?P<name>.+))?\.(?P<field>\w+)(\[(?P<at>\d+)\])?")
@@ -87,7 +87,7 @@ def measure_sweep(
         one
         for part in sweep.vary
         if part.parameter != THREADS
-        for one in _of(spec, scene.scenario, part)
+        for one in _variants(spec, scene.scenario, part)
     ]
     own = _motion(scene, base)
     rows = [_measured(scene, base, own, one) for one in variants]
@@ -103,10 +103,7 @@ def measure_sweep(
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, sweep.show, tuple(rows))
 
 
-# ---------------------------------------------------------------------------------------- variants
-
-
-def _of(spec: Any, scenario: Scenario, part: Variation) -> Iterator[Variant]:
+def _variants(spec: Any, scenario: Scenario, part: Variation) -> Iterator[Variant]:
     """The model with the parameter at each of its values."""
     for value in part.values:
         changed = spec.copy()
@@ -171,10 +168,7 @@ def _text(value: SweepValue) -> str:
 
 def _runnable(model: Any) -> Any:
     """A copy of a model with automatic reset off."""
-    return varied(model, integrator_of(model), float(model.opt.timestep))
-
-
-# -------------------------------------------------------------------------------------------- runs
+    return with_integrator(model, integrator_of(model), float(model.opt.timestep))
 
 
 def _motion(scene: Scene, one: Variant) -> EngineStates | None:
@@ -250,7 +244,8 @@ def _contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
             deepest = max(deepest, -float(contact.dist))
         for hit in before.values():
             hit.apart = max(0.0, speeds(one, other, hit.contact)[0])
-    hardest = max((hit for hit in hits if hit.closing > 0), key=_closing, default=None)
+    closing = (hit for hit in hits if hit.closing > 0)
+    hardest = max(closing, key=lambda hit: hit.closing, default=None)
     return replace(
         row,
         penetration=deepest if hits else None,
@@ -261,13 +256,6 @@ def _contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     )
 
 
-def _closing(hit: _Hit) -> float:
-    return hit.closing
-
-
-# ------------------------------------------------------------------------------------------- times
-
-
 def _timed(
     scene: Scene, variants: list[Variant], rows: list[SweepRow], clock: Clock, *, quick: bool
 ) -> list[SweepRow]:
@@ -275,7 +263,7 @@ def _timed(
     usable = [n for n, row in enumerate(rows) if row.status == "ok"]
     jobs = [_job(scene.scenario, variants[0].model)]
     jobs += [_job(scene.scenario, variants[n + 1].model) for n in usable]
-    for n, timing in zip(usable, timed(jobs, 0, clock, quick=quick)[1:], strict=True):
+    for n, timing in zip(usable, time_jobs(jobs, 0, clock, quick=quick)[1:], strict=True):
         rows[n] = replace(rows[n], cost=timing.ratio)
     return rows
 
@@ -305,7 +293,7 @@ def _rollouts(
 
     pools = [mujoco.rollout.Rollout(nthread=count) for count in counts]
     try:
-        found = timed([job(pool) for pool in pools], 0, clock, quick=quick)
+        found = time_jobs([job(pool) for pool in pools], 0, clock, quick=quick)
     finally:
         for pool in pools:
             pool.close()

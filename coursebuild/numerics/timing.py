@@ -1,7 +1,7 @@
 """What scenarios cost, relative to each other, on a machine that does other things too.
 
-Entry points: `timed(jobs, own, clock)`; `costs(model, scene, settings, …)`, of settings of a scene;
-`scenario_job(model, scenes)`, a model's whole scenarios as a job.
+Entry points: `time_jobs(jobs, own, clock)`; `costs(model, scene, settings, …)`, of settings of a
+scene; `scenario_job(model, scenes)`, a model's whole scenarios as a job.
 
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
@@ -64,7 +64,7 @@ class Timing(Struct, frozen=True):
         return off and abs(self.ratio.value - 1.0) > 0.03
 
 
-def timed(
+def time_jobs(
     jobs: Sequence[Job], own: int, clock: Clock, *, quick: bool = False
 ) -> tuple[Timing, ...]:
     """Time jobs, of which number `own` is what others are compared with."""
@@ -124,9 +124,6 @@ def _interval(value: float, drawn: Array) -> Interval:
     return Interval(float(value), min(low, float(value)), max(high, float(value)))
 
 
-# --------------------------------------------------------------------------------------- scenarios
-
-
 def costs(
     model: Any,
     scene: Scene,
@@ -150,7 +147,7 @@ def costs(
         return work
 
     with silent():
-        return timed([job(setting) for setting in chosen], own, clock, quick=quick)
+        return time_jobs([job(setting) for setting in chosen], own, clock, quick=quick)
 
 
 def scenario_job(

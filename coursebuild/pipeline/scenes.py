@@ -32,7 +32,7 @@ from coursebuild.core.text.diagnostics import (
     nearest,
     sort_diagnostics,
 )
-from coursebuild.numerics.reports.course_cases import exact_file
+from coursebuild.numerics.reports.cases import exact_file
 from coursebuild.pipeline.options import UsageError
 
 _PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)

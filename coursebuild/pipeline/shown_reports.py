@@ -131,7 +131,7 @@ def read_record(root: Path, kind: ReportKind[_T], model: str = "") -> _T | Repor
     except EffectError as error:
         return ReportFailure(error.message, error.help)
     except RecordError as error:
-        return ReportFailure(f"{path} {error.message}", f"make it again with `{make}`")
+        return ReportFailure(f"{path} {error}", f"make it again with `{make}`")
     return report
 
 

@@ -158,9 +158,6 @@ def test_orders_that_can_be_fitted_no_more() -> None:
     assert found == Departure("swing", "RK4", "order of position", "1", "nothing", "± 0.05")
 
 
-# --- hard cases
-
-
 def test_a_case_that_is_gone_is_a_departure() -> None:
     assert case_departures([case()], [case()], BANDS) == ()
     (gone,) = case_departures([case()], [], BANDS)

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure
 from coursebuild.numerics.detector import RunStatus, driving_force, judge
-from coursebuild.numerics.engine import advance, compiled, simulate
+from coursebuild.numerics.engine import advance, compile_model, simulate
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
 from coursebuild.numerics.problems import problem_named
 from coursebuild.numerics.stability import attempt
@@ -69,7 +69,7 @@ def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
     sunk = problem_named("stack-10000")
     soft = replace(sunk, mjcf=sunk.mjcf.replace('solref="0.004 1"', 'solref="0.04 1"'))
     soft = replace(soft, scenario=replace(soft.scenario, qpos=(0.0, 0.0)))
-    run = simulate(soft, compiled(soft.mjcf, Integrator.EULER, 1e-3))
+    run = simulate(soft, compile_model(soft.mjcf, Integrator.EULER, 1e-3))
     assert run.judgement.status is RunStatus.DIVERGED
     assert len(run.judgement.reasons) == 1
     assert "as deep in each other" in run.judgement.reasons[0]

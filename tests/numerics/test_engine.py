@@ -5,15 +5,15 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import compiled, refsafe_active, simulate
+from coursebuild.numerics.engine import compile_model, refsafe_active, simulate
 from coursebuild.numerics.problem import Integrator
 from coursebuild.numerics.problems import problem_named
 
 
 def test_measuring_does_not_disturb_the_run() -> None:
     problem = problem_named("stack-10")
-    run = simulate(problem, compiled(problem.mjcf, Integrator.EULER, 1e-3))
-    model = compiled(problem.mjcf, Integrator.EULER, 1e-3)
+    run = simulate(problem, compile_model(problem.mjcf, Integrator.EULER, 1e-3))
+    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     data = mujoco.MjData(model)
     data.qpos[:] = problem.scenario.qpos
     mujoco.mj_step(model, data, round(problem.scenario.duration / 1e-3))
@@ -23,8 +23,8 @@ def test_measuring_does_not_disturb_the_run() -> None:
 
 def test_commands_are_those_of_their_hold() -> None:
     problem = problem_named("stiff-servo-1")
-    run = simulate(problem, compiled(problem.mjcf, Integrator.IMPLICIT, 1e-4))
-    model = compiled(problem.mjcf, Integrator.IMPLICIT, 1e-4)
+    run = simulate(problem, compile_model(problem.mjcf, Integrator.IMPLICIT, 1e-4))
+    model = compile_model(problem.mjcf, Integrator.IMPLICIT, 1e-4)
     data = mujoco.MjData(model)
     for (command,) in problem.scenario.controls:
         data.ctrl[0] = command
@@ -43,10 +43,10 @@ def test_refsafe_is_told() -> None:
         ("tumbling-box", 1.0, False),  # contact is off
         ("damped-spring-1", 1.0, False),
     ):
-        model = compiled(problem_named(name).mjcf, Integrator.EULER, timestep)
+        model = compile_model(problem_named(name).mjcf, Integrator.EULER, timestep)
         assert refsafe_active(model) is active, (name, timestep)
     for attributes in ('limited="true" range="-1 1"', 'frictionloss="1"'):
         joint = f"<joint type='slide' {attributes}/>"
         text = f"<mujoco><worldbody><body>{joint}<geom size='.1'/></body></worldbody></mujoco>"
-        assert refsafe_active(compiled(text, Integrator.EULER, 0.011)), attributes
-        assert not refsafe_active(compiled(text, Integrator.EULER, 0.009)), attributes
+        assert refsafe_active(compile_model(text, Integrator.EULER, 0.011)), attributes
+        assert not refsafe_active(compile_model(text, Integrator.EULER, 0.009)), attributes

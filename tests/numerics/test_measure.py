@@ -12,14 +12,9 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure, orders
-from coursebuild.numerics.measure import Errors, Sizes, errors, fitted_order, raised
-from coursebuild.numerics.problem import STANDARD, Integrator, Motion
-from coursebuild.numerics.problems import (
-    double_pendulum,
-    impact,
-    problem_named,
-    scales,
-)
+from coursebuild.numerics.measure import errors, fitted_order
+from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Sizes
+from coursebuild.numerics.problems import double_pendulum, impact, problem_named, scales
 from coursebuild.numerics.reports.cases import ErrorLine
 
 FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)
@@ -36,9 +31,6 @@ def slopes(name: str, integrator: Integrator) -> dict[str, float]:
     found = orders(problem_named(name), measured(name, integrator))
     parts = {"position": found.position, "attitude": found.attitude, "velocity": found.velocity}
     return {part: one.value for part, one in parts.items() if one is not None}
-
-
-# --- orders
 
 
 @pytest.mark.site
@@ -89,9 +81,6 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     assert told is not None and abs(told.value - 2) < told.uncertainty < 0.05
 
 
-# --- errors and floors
-
-
 def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
     times = np.array([1.0, 2.0])
     level = np.broadcast_to(np.array([1.0, 0, 0, 0]), (2, 1, 4))
@@ -104,7 +93,7 @@ def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
     assert found.attitude[0] == pytest.approx(0.1, abs=1e-15)
     assert found.attitude[1] == 0.0
     assert found.velocity == (5.0, 1.0)
-    assert raised(Errors(None, None, (5.0, 1.0)), Sizes(0, 0, 0.2)).velocity == (5.0, 2.0)
+    assert errors(b, a, Sizes(0, 0, 0.2)).velocity == (5.0, 2.0)
 
 
 def test_a_timestep_that_misses_the_end_is_refused() -> None:
@@ -114,9 +103,6 @@ def test_a_timestep_that_misses_the_end_is_refused() -> None:
     longer = replace(problem, scenario=replace(problem.scenario, duration=1.05))
     with pytest.raises(ValueError, match=r"the duration \(1\.05 s\) is no multiple"):
         measure(longer, Integrator.EULER, 0.01)
-
-
-# --- invariants
 
 
 def test_energy_belongs_to_the_moment_it_is_given_for() -> None:
@@ -134,9 +120,6 @@ def test_energy_may_hold_where_attitude_does_not() -> None:
     assert found.attitude[0] > 1e-5
     assert found.momentum_drift is not None
     assert found.momentum_drift > 1e-7
-
-
-# --- figures of the cases
 
 
 EULER, IMPLICIT, RK4 = Integrator.EULER, Integrator.IMPLICITFAST, Integrator.RK4

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import DisagreementError, floor
-from coursebuild.numerics.engine import compiled
+from coursebuild.numerics.engine import compile_model
 from coursebuild.numerics.problem import Integrator, Problem
 from coursebuild.numerics.problems import all_problems, problem_named, problem_names
 
@@ -128,5 +128,5 @@ def test_problems_are_small_models_that_timesteps_divide(
     for problem in all_problems():
         assert all(problem.scenario.steps(step) for step in problem.timesteps)
         assert not re.search("timestep|integrator|file=", problem.mjcf), problem.name
-        assert compiled(problem.mjcf, Integrator.RK4, 1e-3).nbody <= 12
+        assert compile_model(problem.mjcf, Integrator.RK4, 1e-3).nbody <= 12
     assert list(tmp_path.iterdir()) == []

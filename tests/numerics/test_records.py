@@ -67,7 +67,7 @@ def test_a_row_is_a_line_and_keys_are_sorted() -> None:
 def test_what_is_no_report(data: bytes, message: str) -> None:
     with pytest.raises(RecordError) as caught:
         BENCH.decode(data)
-    assert caught.value.message.startswith(message)
+    assert str(caught.value).startswith(message)
 
 
 def test_two_cases_of_one_name() -> None:

@@ -14,7 +14,7 @@ from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.pilot import pilot
 from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.references import Known, know
+from coursebuild.numerics.references import KnownMotion, find_reference
 from coursebuild.numerics.scene import SceneError, scenes
 
 pytestmark = pytest.mark.site
@@ -42,19 +42,16 @@ def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str
     return mujoco.MjModel.from_xml_string(text)
 
 
-def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') -> Known:
+def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') -> KnownMotion:
     parsed = parse_declarations(Source("models/m.toml", "[[scenario]]\n" + text))
     assert parsed.value is not None, parsed.diagnostics
     (scene,) = scenes(model, parsed.value, quick=True)
-    return know(model, pilot(model, scene), quick=True)
+    return find_reference(model, pilot(model, scene), quick=True)
 
 
 def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
     closed = [p.name for p in all_problems() if p.reference.kind == "closed"]
     assert list(CLOSED_FORMS) == closed
-
-
-# ------------------------------------------------------------------------------------- references
 
 
 def test_a_smooth_scene_is_integrated_twice() -> None:
@@ -79,7 +76,7 @@ def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, why: 
     (scene,) = scenes(model, None, quick=True)
     first = pilot(model, scene)
     assert first.jumps == (why,)
-    found = know(model, first, quick=True)
+    found = find_reference(model, first, quick=True)
     assert found.kind == "self"
     step = min(scene.timesteps) / 8
     assert found.source == f"the engine itself: implicitfast at {step:g} s, Newton's solver"
@@ -98,10 +95,10 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     (scene,) = scenes(model, None, quick=True)
     first = pilot(model, scene)
     assert first.jumps == ("an activation at its limit",)
-    found = know(model, first, quick=True)
+    found = find_reference(model, first, quick=True)
     assert (found.kind, found.states.act[-1, 0]) == ("self", 0.3)
     unseen = replace(first, jumps=())  # as of something that is not looked for
-    found = know(model, unseen, quick=True)
+    found = find_reference(model, unseen, quick=True)
     assert found.kind == "self"
     assert found.note == "no integration: the engine in small steps tends elsewhere"
 
@@ -137,9 +134,6 @@ def test_an_author_may_choose() -> None:
     with pytest.raises(SceneError) as caught:
         known(pendulum(floor=-0.5), 'name = "a"\nkeyframe = 0\nreference = "ode"')
     assert caught.value.message == "no integration can be the reference: there is contact"
-
-
-# ----------------------------------------------------------------------------------- closed forms
 
 
 SPRING = """\

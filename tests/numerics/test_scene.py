@@ -10,7 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Declarations
-from coursebuild.core.syntax.scenarios import parse_declarations, whole
+from coursebuild.core.model.scenarios import is_multiple
+from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.scene import Scene, SceneError, scenes
 
@@ -99,10 +100,10 @@ def test_all_times_are_whole_numbers_of_each_other(
     assume(parsed.value is not None)
     (found,) = scenes(arm(step), parsed.value, quick=quick)
     scenario = found.scenario
-    assert whole(scenario.duration, scenario.sample)
-    assert whole(scenario.sample, found.own)
+    assert is_multiple(scenario.duration, scenario.sample)
+    assert is_multiple(scenario.sample, found.own)
     if hold is not None:
-        assert whole(scenario.hold, scenario.sample)
+        assert is_multiple(scenario.hold, scenario.sample)
     if steps is not None:
         assert scenario.duration == pytest.approx(steps * step)
     else:
@@ -112,7 +113,7 @@ def test_all_times_are_whole_numbers_of_each_other(
     assert found.own in found.timesteps
     assert sorted(set(found.timesteps)) == list(found.timesteps)
     for one in found.timesteps:
-        assert whole(scenario.sample, one)
+        assert is_multiple(scenario.sample, one)
 
 
 def test_a_tiny_timestep_makes_a_short_scenario_from_the_models_own_state() -> None:

@@ -136,9 +136,6 @@ def test_a_lost_run_says_why() -> None:
     assert row.status != "ok" and row.reasons and row.change is None
 
 
-# --- what is made of it
-
-
 def table(*rows: SweepRow, show: tuple[str, ...] = ()) -> SweepReport:
     return SweepReport("soft", "How <soft>", "swing", show, rows)
 

@@ -11,7 +11,7 @@ import pytest
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.timing import FEWEST, Job, costs, timed
+from coursebuild.numerics.timing import FEWEST, Job, costs, time_jobs
 
 
 class Machine:
@@ -58,7 +58,7 @@ class Neighbours:
 
 def test_a_quiet_machine_is_asked_as_seldom_as_can_be() -> None:
     machine = Machine()
-    found = timed([machine.job(c) for c in (2e6, 1e6, 5e6)], 1, machine.clock)
+    found = time_jobs([machine.job(c) for c in (2e6, 1e6, 5e6)], 1, machine.clock)
     assert [one.ratio for one in found] == [Interval(c, c, c) for c in (2.0, 1.0, 5.0)]
     assert [one.nanoseconds.value for one in found] == [2e6, 1e6, 5e6]
     assert len(machine.done) == 3 * (FEWEST + 1), "and once before, to warm up"
@@ -70,7 +70,7 @@ def test_ratios_on_a_noisy_machine_lie_in_their_intervals(seed: int) -> None:
     inside = []
     for half in (0, 1):
         machine = Machine(Neighbours(2 * seed + half))
-        found = timed([machine.job(1e7 * c) for c in true], 2, machine.clock)
+        found = time_jobs([machine.job(1e7 * c) for c in true], 2, machine.clock)
         assert sum(machine.slowed) > 0.2 * len(machine.slowed), "there was noise"
         for one, cost in zip(found, true, strict=True):
             assert one.ratio.value == pytest.approx(cost, rel=0.03)
@@ -81,7 +81,7 @@ def test_ratios_on_a_noisy_machine_lie_in_their_intervals(seed: int) -> None:
 
 def test_a_slow_model_is_not_timed_for_ever() -> None:
     machine = Machine(Neighbours(3))
-    timed([machine.job(c) for c in (2e9, 4e9)], 0, machine.clock)
+    time_jobs([machine.job(c) for c in (2e9, 4e9)], 0, machine.clock)
     assert len(machine.done) == 2 * (FEWEST + 1)
 
 

@@ -11,7 +11,6 @@ from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
-from coursebuild.numerics.reports.text import usual_setting
 from coursebuild.numerics.scene import scenes
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -28,9 +27,8 @@ def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[Scenar
 
 
 def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisionRow:
-    usual = usual_setting(report.rows)
-    assert usual is not None
-    like = replace(usual, integrator=integrator, timestep=timestep)
+    assert report.own is not None
+    like = replace(report.own, integrator=integrator, timestep=timestep)
     (found,) = (one for one in report.rows if one.setting == like)
     return found
 

@@ -6,15 +6,16 @@ from collections.abc import Mapping
 
 import mujoco
 
-from coursebuild.core.model.scenarios import Declarations
+from coursebuild.core.model.scenarios import Declarations, Keep
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
-from coursebuild.numerics.pruning.readers import Readers, read_code
+from coursebuild.numerics.pruning.readers import read_code
 from coursebuild.numerics.pruning.survey import Order, Survey, survey
 from coursebuild.numerics.reports.diet import Finding
 from coursebuild.numerics.timing import Clock
+from support.bench_reports import MACHINE
 
 PATH = "models/a.xml"
 SETTINGS = ("cone", "island", "sleep", "solver")
@@ -72,31 +73,34 @@ def tried(
     *,
     lesson: str = "",
     keeps: Mapping[str, str] | None = None,
-    locked: Mapping[str, str] | None = None,
     has_commands: bool = False,
     declared: Declarations | None = None,
     quick: bool = True,
     clock: Clock | None = None,
-) -> tuple[ModelText, Survey]:
-    """The model, and what was found in it; `lesson` is a script that uses it."""
+) -> Survey:
+    """What was found in a model; `lesson` is a script that uses it."""
     model = opened(text if isinstance(text, Mapping) else {PATH: text})
+    place = Source("models/a.toml", "").span(0, 0)
     order = Order(
+        "a",
+        "",
+        MACHINE,
         model,
         pruning_scenes(model.model, declared, quick=quick),
-        Readers((read_code("examples/a.py", lesson),) if lesson else ()),
-        keeps or {},
-        locked or {},
+        (read_code("examples/a.py", lesson),) if lesson else (),
+        {key: Keep(place, key, reason, place) for key, reason in (keeps or {}).items()},
+        {},
         has_commands,
         clock,
         quick,
         lambda _: None,
     )
-    return model, survey(order)
+    return survey(order)
 
 
 def found(survey: Survey) -> dict[str, Finding]:
     """Findings that are no settings, by kind; where nothing is timed, all that there is."""
-    things = [one for one in survey.findings if one.kind not in SETTINGS]
+    things = [one for one in survey.report.findings if one.kind not in SETTINGS]
     kinds = [one.kind for one in things]
     assert len(set(kinds)) == len(kinds)
     return {one.kind: one for one in things}
@@ -107,10 +111,7 @@ def names(finding: Finding) -> list[str]:
     return [place.name for place in finding.places]
 
 
-def fixed(model: ModelText, survey: Survey, path: str = PATH) -> str:
+def fixed(survey: Survey, path: str = PATH) -> str:
     """The file after all that is proved was changed."""
-    files = model.files(survey.edits)
-    data = files.get(path)
-    if data is None:
-        data = next(one.data for one in model.documents if one.path == path)
-    return data.decode()
+    files = {one.path: one.data for one in survey.text.documents}
+    return (files | survey.text.files(survey.edits))[path].decode()

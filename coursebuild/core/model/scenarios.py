@@ -1,7 +1,7 @@
 """What a file `models/NAME.toml` says of the model beside it: scenarios, and findings to keep.
 
-Entry points: `Declarations`; `keyframe_scenarios`, where there is no such file. What is left out is
-`None` or empty: whoever measures fills it in from the model.
+Entry points: `Declarations`; `keyframe_scenarios`, where there is no such file; `is_multiple`, of
+times. What is left out is `None` or empty: whoever measures fills it in from the model.
 """
 
 from __future__ import annotations
@@ -31,6 +31,12 @@ def keyframe_scenarios(keyframes: Sequence[str]) -> tuple[str, ...]:
             name += "-"
         found.append(name)
     return tuple(found) or ("start",)
+
+
+def is_multiple(length: float, part: float) -> bool:
+    """Whether `part` goes into `length` a whole number of times, rounding aside."""
+    count = round(length / part) if length / part < 1e15 else 0
+    return count >= 1 and abs(count * part - length) <= 1e-9 * length
 
 
 class Visible(Struct, frozen=True):

@@ -32,6 +32,7 @@ from coursebuild.core.model.scenarios import (
     SweepValue,
     Variation,
     Visible,
+    is_multiple,
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
 from coursebuild.core.syntax.course_schema import Slug
@@ -192,12 +193,6 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
     return Parsed(_declarations(source, root, decoding.value), ())
 
 
-def whole(length: float, part: float) -> bool:
-    """Whether `part` goes into `length` a whole number of times, at least once."""
-    count = round(length / part) if length / part < 1e15 else 0
-    return count >= 1 and abs(count * part - length) <= _SLACK * length
-
-
 # ---------------------------------------------------------------------------------------- values
 
 
@@ -303,7 +298,7 @@ def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]
     if sample is None:
         return
     for name, length in (("duration", duration), ("hold", table.hold)):
-        if length is not None and not whole(length, sample):
+        if length is not None and not is_multiple(length, sample):
             message = f"`{name}` ({length:g} s) is no multiple of `sample` ({sample:g} s)"
             help = "the state is looked at in even steps, and a command changes at such a look"
             yield diagnose("field-value", node.place(name), message, help=help)
@@ -317,7 +312,7 @@ def _check_timesteps(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnos
     spans = [item.mark for item in node.items("timesteps")]
     pairs = list(zip(table.timesteps, spans, strict=True))
     for (length, name), (step, span) in itertools.product(_lengths(table), pairs):
-        if not whole(length, step):
+        if not is_multiple(length, step):
             message = f"the timestep {step:g} s does not divide `{name}` ({length:g} s)"
             help = "every timestep must end at the same times, or errors cannot be compared"
             yield diagnose("field-value", span, message, help=help)

@@ -1,20 +1,18 @@
 """Measured figures as a page sets them: numbers in words of a book, and tables.
 
 Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, numbers; `said`,
-`sentence`, `about_reference`.
+`sentence`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.strings import Strings
-from coursebuild.numerics.reports.bench import ScenarioReport
 
 _MINUS = "\u2212"
 _THIN = "\u2009"
@@ -165,13 +163,3 @@ def sentence(text: str) -> str:
     """A clause as a sentence of its own."""
     text = text[:1].upper() + text[1:]
     return text if not text or text.endswith((".", "?", "!")) else f"{text}."
-
-
-def about_reference(words: Strings, report: ScenarioReport) -> Iterator[str]:
-    """What errors were measured against, in sentences."""
-    floor = power(report.floor, 1)
-    yield said(words, f"measured.reference_{report.reference}", source=report.source, floor=floor)
-    if report.second:
-        yield words("measured.second", source=report.second)
-    if report.agreement is not None:
-        yield said(words, "measured.agreement", difference=power(report.agreement, 2))

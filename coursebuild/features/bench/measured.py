@@ -16,13 +16,7 @@ from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import factor, power, sentence, size, where, whole
 from coursebuild.features.bench.model import declared_scenarios
-from coursebuild.features.bench.scenarios import (
-    ScenarioView,
-    SweepView,
-    plots,
-    scenario_view,
-    sweep_view,
-)
+from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
 from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
 from coursebuild.numerics.reports.records import BENCH, DIET
 
@@ -42,7 +36,6 @@ class DietView(Struct, frozen=True):
     summary: str
     findings: tuple[FindingView, ...]
     where: str
-    command: str
     file: str
     """The address of the report."""
 
@@ -63,7 +56,7 @@ class MeasuredView(Struct, frozen=True):
     diet_command: str
     numerics: str
     """The address of the hard cases; empty where there are none."""
-    sweeps: tuple[SweepView, ...]
+    sweeps: tuple[ScenarioView, ...]
 
 
 def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasuredView:
@@ -91,7 +84,7 @@ def measured_view(library: Library, place: urls.Place, model: MjcfModel) -> Meas
         diet_command=DIET.command(name),
         numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
         sweeps=tuple(
-            sweep_view(words, one, scenario_anchor(f"sweep-{one.name}")) for one in sweeps
+            scenario_view(words, one, scenario_anchor(f"sweep-{one.name}")) for one in sweeps
         ),
     )
 
@@ -100,7 +93,7 @@ def draw_measured(renderer: Renderer, view: MeasuredView) -> Markup:
     """The part of the page."""
     drawn = tuple(plots(f"_plot-{n}", one.report) for n, one in enumerate(view.scenarios, 1))
     swept = tuple(plots(f"_sweep-{n}", one.report) for n, one in enumerate(view.sweeps, 1))
-    return renderer.render("bench/measured.html", measured=view, plots=drawn, sweep_plots=swept)
+    return renderer.render("bench/measured.html", measured=view, plots=drawn + swept)
 
 
 def measured_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str], ...]:
@@ -124,9 +117,6 @@ def measured_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str],
     return tuple((words(f"measured.{name}"), said) for name, said in told.items())
 
 
-# --- the diet
-
-
 def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
     open_ones = sum(one.counts for one in diet.findings)
     summary = words("measured.diet_open", n=open_ones) if open_ones else words("measured.slim")
@@ -137,7 +127,6 @@ def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
         summary,
         tuple(_finding(words, one) for one in diet.findings),
         where(words, diet.machine),
-        DIET.command(diet.model),
         place.href(urls.file_path(DIET.path(diet.model))),
     )
 

@@ -22,7 +22,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escaped, guarded
 from coursebuild.features.bench.figures import Grid, where
 from coursebuild.features.bench.model import Bench, declared_scenarios
-from coursebuild.features.bench.scenarios import plots, scenario_view, sweep_view
+from coursebuild.features.bench.scenarios import plots, scenario_view
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.records import BENCH
 from coursebuild.numerics.reports.sweep import SweepReport
@@ -123,31 +123,20 @@ def _view(page: PageContext, block: Bench) -> BenchView:
     nothing = BenchView(block.model, shown.href, BENCH.command(block.model))
     if shown.report is None or shown.machine is None:
         return nothing
-    made = where(words, shown.machine)
-    alone = block.shows == ("table",)
-    if isinstance(shown.report, SweepReport):
-        swept = sweep_view(words, shown.report)
-        return replace(
-            nothing,
-            title=swept.title,
-            notes=swept.notes,
-            tables=(swept.table,) if alone else (),
-            folded=None if alone else swept.table,
-            where=made,
-        )
-    view = scenario_view(words, shown.report, "")
+    view = scenario_view(words, shown.report)
+    alone, swept = block.shows == ("table",), isinstance(shown.report, SweepReport)
     grids = {"stable": view.stable, "orders": view.orders}
     tables = [grid for name in block.shows if (grid := grids.get(name)) is not None]
-    settings = bool({"plot", "table"}.intersection(block.shows))
+    settings = swept or not {"plot", "table"}.isdisjoint(block.shows)
     return replace(
         nothing,
         title=view.title,
         verdict=view.verdict if settings else "",
         notes=view.notes if settings else (),
         tables=(view.settings,) if alone else tuple(tables),
-        folded=view.settings if "table" in block.shows and not alone else None,
+        folded=view.settings if not alone and (swept or "table" in block.shows) else None,
         about=view.about,
-        where=made,
+        where=where(words, shown.machine),
     )
 
 

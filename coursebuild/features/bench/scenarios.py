@@ -14,7 +14,6 @@ from msgspec import Struct
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import (
     Grid,
-    about_reference,
     bounded,
     factor,
     grid,
@@ -25,12 +24,12 @@ from coursebuild.features.bench.figures import (
 )
 from coursebuild.numerics.reports.bench import (
     FittedOrder,
+    MeasuredRun,
     OrderRow,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.cases import ErrorLine
 from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, SweepRow, cell, shown_figures
 from coursebuild.numerics.reports.text import (
     FEWEST_STEPS,
@@ -42,7 +41,6 @@ from coursebuild.numerics.reports.text import (
     setting_text,
     solving_parts,
     status_text,
-    usual_setting,
 )
 
 _QUANTITIES = {
@@ -60,29 +58,32 @@ ORDERS = (
 
 
 class ScenarioView(Struct, frozen=True):
-    """A scenario."""
+    """A scenario, or a sweep."""
 
     anchor: str
     """Its id."""
-    name: str
     title: str
-    about: tuple[str, ...]
-    """How long it takes and what it was held against, a sentence each."""
-    verdict: str
     settings: Grid
+    """Of a sweep the values of its parameters."""
     notes: tuple[str, ...]
     """Of runs that say nothing, or of another model."""
-    orders: Grid | None
-    stable: Grid | None
-    report: ScenarioReport
+    report: ScenarioReport | SweepReport
     """For its plot."""
+    about: tuple[str, ...] = ()
+    """How long it takes and what it was held against, a sentence each."""
+    verdict: str = ""
+    orders: Grid | None = None
+    stable: Grid | None = None
 
 
-def scenario_view(words: Strings, report: ScenarioReport, anchor: str) -> ScenarioView:
-    """What a page shows of a scenario; `anchor` is its id there, if it has one."""
+def scenario_view(
+    words: Strings, report: ScenarioReport | SweepReport, anchor: str = ""
+) -> ScenarioView:
+    """What a page shows of a scenario, or of a sweep; `anchor` is its id there, if it has one."""
+    if isinstance(report, SweepReport):
+        return _sweep_view(words, report, anchor)
     return ScenarioView(
         anchor=anchor,
-        name=report.name,
         title=report.title or report.name,
         about=tuple(_about(words, report)),
         verdict=sentence(report.verdict.text),
@@ -95,7 +96,7 @@ def scenario_view(words: Strings, report: ScenarioReport, anchor: str) -> Scenar
 
 
 def _about(words: Strings, report: ScenarioReport) -> list[str]:
-    told = [words("measured.duration", time=seconds_text(report.duration))]
+    told: list[str] = [words("measured.duration", time=seconds_text(report.duration))]
     if report.horizon < report.duration:
         told.append(words("measured.horizon", time=seconds_text(report.horizon)))
         if report.lyapunov is not None and report.horizons is not None:
@@ -104,15 +105,20 @@ def _about(words: Strings, report: ScenarioReport) -> list[str]:
             told.append(said(words, "measured.chaotic", first=first, last=last, rate=rate))
     if report.hold:
         told.append(words("measured.hold", time=seconds_text(report.hold)))
-    usual = usual_setting(report.rows)
-    parts = [] if usual is None else solving_parts(usual)
+    parts = [] if report.own is None else solving_parts(report.own)
     if parts:
         told.append(words("measured.usual", setting=", ".join(parts)))
-    return [*told, *about_reference(words, report)]
+    reference, floor = f"measured.reference_{report.reference}", power(report.floor, 1)
+    told.append(said(words, reference, source=report.source, floor=floor))
+    if report.second:
+        told.append(words("measured.second", source=report.second))
+    if report.agreement is not None:
+        told.append(said(words, "measured.agreement", difference=power(report.agreement, 2)))
+    return told
 
 
 def _settings(words: Strings, report: ScenarioReport) -> Grid:
-    rows, usual = report.rows, usual_setting(report.rows)
+    rows = report.rows
 
     def error(quantity: Quantity) -> tuple[str, list[str]]:
         found: list[str] = [bounded(quantity.of(row), quantity.least) for row in rows]
@@ -121,10 +127,10 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
 
     remarks, speed, time = map(words, ("measured.remark", "measured.realtime", "measured.seconds"))
     columns: list[tuple[str, list[str]]] = [
-        (words("measured.setting"), [setting_text(row.setting, usual) for row in rows]),
+        (words("measured.setting"), [setting_text(row.setting, report.own) for row in rows]),
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [factor(row.realtime) for row in rows]),
-        (time, [_time(row) for row in rows]),
+        (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
         *(error(quantity) for quantity in quantities(report) if quantity.tells(rows)),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
@@ -136,10 +142,6 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
     marked = tuple(n for n, row in enumerate(rows) if row.own)
     label = words("measured.settings", title=report.title or report.name)
     return grid(label, columns, words=(remarks,), minor=(speed, time), marked=marked)
-
-
-def _time(row: WorkPrecisionRow) -> str:
-    return "" if row.seconds is None else seconds_text(row.seconds.value, 3)
 
 
 def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:
@@ -158,15 +160,14 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
 
 def _notes(words: Strings, report: ScenarioReport) -> list[str]:
     """Why runs were lost, and which are of another model."""
-    usual = usual_setting(report.rows)
-    notes = lost_runs((setting_text(row.setting, usual), row) for row in report.rows)
-    softened = [setting_text(row.setting, usual) for row in report.rows if row.refsafe]
+    notes = lost_runs((setting_text(row.setting, report.own), row) for row in report.rows)
+    softened = [setting_text(row.setting, report.own) for row in report.rows if row.refsafe]
     if softened:
         notes.append(words("measured.refsafe", settings="; ".join(softened)))
     return notes
 
 
-def lost_runs(runs: Iterable[tuple[str, WorkPrecisionRow | ErrorLine | SweepRow]]) -> list[str]:
+def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
     """Why runs were lost, those with the same reasons together; each with its name."""
     together: dict[tuple[str, ...], list[str]] = {}
     for name, run in runs:
@@ -238,19 +239,7 @@ def stable_again(words: Strings, row: StableRow) -> str:
     return words("measured.islands", first=first, last=last)
 
 
-class SweepView(Struct, frozen=True):
-    """Parameters at other values."""
-
-    anchor: str
-    title: str
-    table: Grid
-    notes: tuple[str, ...]
-    report: SweepReport
-    """For its plot."""
-
-
-def sweep_view(words: Strings, sweep: SweepReport, anchor: str = "") -> SweepView:
-    """What a page shows of a sweep."""
+def _sweep_view(words: Strings, sweep: SweepReport, anchor: str) -> ScenarioView:
     columns = [
         (words("measured.parameter"), [row.parameter for row in sweep.rows]),
         (words("measured.value"), [row.value for row in sweep.rows]),
@@ -260,7 +249,7 @@ def sweep_view(words: Strings, sweep: SweepReport, anchor: str = "") -> SweepVie
     marked = tuple(n for n, row in enumerate(sweep.rows) if row.own)
     notes = lost_runs((f"{row.parameter} {row.value}", row) for row in sweep.rows)
     table = grid(sweep.title, columns, minor=minor, marked=marked)
-    return SweepView(anchor, sweep.title, table, tuple(notes), sweep)
+    return ScenarioView(anchor, sweep.title, table, tuple(notes), sweep)
 
 
 def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[Markup, ...]:

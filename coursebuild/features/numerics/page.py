@@ -34,15 +34,15 @@ from coursebuild.features.bench.scenarios import (
     stable_cells,
     stable_title,
 )
-from coursebuild.numerics.reports.case_plot import case_quantities, case_svg
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
     Cells,
     FigureLine,
+    course_cases,
     merged,
 )
-from coursebuild.numerics.reports.course_cases import course_cases
+from coursebuild.numerics.reports.plot import case_quantities, case_svg
 from coursebuild.numerics.reports.records import STABILITY
 from coursebuild.numerics.reports.text import KNOWN, Quantity, seconds_text, status_text
 
@@ -62,21 +62,14 @@ _Rows = list[tuple[str, Cells]]
 """Integrators, and what is said of each."""
 
 
-class MatrixRow(Struct, frozen=True):
-    """A case, in the table of all of them."""
-
-    name: str
-    """The id of the case below."""
-    title: str
-    cells: tuple[tuple[str, ...], ...]
-    """Orders, largest stable timesteps, and costs, by integrator."""
-
-
 class CaseView(Struct, frozen=True):
     """A hard case."""
 
     name: str
+    """Its id."""
     title: str
+    matrix: tuple[tuple[str, ...], ...]
+    """In the table of all cases: orders, largest stable timesteps, and costs, by integrator."""
     about: tuple[str, ...]
     """What the plots say, and what the case is, a sentence each."""
     plots: tuple[Markup, ...]
@@ -93,7 +86,6 @@ class CaseGroup(Struct, frozen=True):
     number: int
     """0: of the course's own."""
     title: str
-    rows: tuple[MatrixRow, ...]
     cases: tuple[CaseView, ...]
 
 
@@ -121,25 +113,20 @@ def _group(
     key = f"numerics.case_{number}"
     several = not number or len(cases) > 1
     title = words(key) if several and words.has(key) else cases[0].title
-    rows = tuple(_matrix_row(words, one) for one in cases)
-    return CaseGroup(number, title, rows, tuple(case_view(words, place, one) for one in cases))
+    return CaseGroup(number, title, tuple(case_view(words, place, one) for one in cases))
 
 
-def _matrix_row(words: Strings, report: CaseReport) -> MatrixRow:
+def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
     shown = next(iter(case_quantities(report)), None)
     part = None if shown is None or shown.name == "energy_drift" else shown.name
     fits = {one.integrator: getattr(one, part) for one in report.orders} if part else {}
     limits = {one.integrator: one for one in report.boundaries}
     orders = (fits.get(one) for one in KNOWN)
     costs = (report.cost_to(one, _RIGHT) for one in KNOWN)
-    return MatrixRow(
-        urls.encode(report.name),
-        report.title,
-        (
-            tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
-            tuple(_limit(words, limits.get(one)) for one in KNOWN),
-            tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
-        ),
+    return (
+        tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
+        tuple(_limit(words, limits.get(one)) for one in KNOWN),
+        tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
     )
 
 
@@ -151,9 +138,6 @@ def _limit(words: Strings, line: BoundaryLine | None) -> str:
     return seconds_text(line.largest, _DIGITS)
 
 
-# ------------------------------------------------------------------------------------------ a case
-
-
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
     """What the page shows of a case."""
     model = "" if report.case else report.name.rpartition("/")[0]
@@ -163,6 +147,7 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
     return CaseView(
         name,
         report.title,
+        _matrix(words, report),
         tuple(_about(words, report, shown)),
         tuple(Markup(case_svg(report, one, f"{name}-{one.name}")) for one in shown),
         tuple(one for one in grids if one is not None),

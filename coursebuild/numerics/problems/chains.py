@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import Array, Motion, Problem, Reference, Scenario, Sizes
-from coursebuild.numerics.problems.common import ENGINE, NO_CONTACT, model_text
+from coursebuild.numerics.problems.common import NO_CONTACT, model_text
 from mjcourse.spatial import quat_conj, quat_mul, quat_to_mat
 
 
@@ -32,9 +32,7 @@ class Chain(Struct, frozen=True):
     bend: float = 0.5
     """Of the first joint at the beginning, rad."""
     length: float = 0.1
-    """m."""
     gravity: float = 9.81
-    """m/s²."""
 
     def motion(self, times: Array) -> Motion:
         """At the rising times (n,) s."""
@@ -155,7 +153,6 @@ def _problem(
         position_bound=100.0,
         velocity_bound=1e4,
         reference=Reference("ode", "Newton's and Euler's equations, Bulirsch–Stoer", CHAINS[name]),
-        second=ENGINE,
         precision=precision,
         timesteps=tuple(scenario.sample / n for n in (25, 50, 100, 200, 400)),
         search=search,

@@ -1,7 +1,6 @@
-"""What the hard cases share: their models' text, simulating for a while, a second reference.
+"""What the hard cases share: their models' text, simulating for a while, motions.
 
-Entry points: `model_text`, `simulated`, `divisions`; `motion_without_attitude`, `turning_at_rest`;
-`ENGINE`, the second reference of most cases.
+Entry points: `model_text`, `run_steps`, `divisions`; `motion_without_attitude`, `turning_at_rest`.
 """
 
 from __future__ import annotations
@@ -10,15 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
-from coursebuild.numerics.forward import forward_motion
-from coursebuild.numerics.problem import (
-    Array,
-    Integrator,
-    Motion,
-    Scenario,
-    SecondReference,
-)
+from coursebuild.numerics.engine import advance, compile_model, initial_data
+from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario
 
 NO_CONTACT = '<flag contact="disable"/>'
 NO_GRAVITY = 'gravity="0 0 0"'
@@ -35,11 +27,11 @@ def model_text(world: str, option: str = "", inner: str = "", rest: str = "") ->
     )
 
 
-def simulated(
+def run_steps(
     mjcf: str, scenario: Scenario, integrator: Integrator, timestep: float, steps: int
 ) -> Any:
     """`mjData` after so many steps from where a scenario begins."""
-    model = compiled(mjcf, integrator, timestep)
+    model = compile_model(mjcf, integrator, timestep)
     data = initial_data(scenario, model)
     advance(model, data, steps)
     return data
@@ -59,7 +51,3 @@ def turning_at_rest(times: Array, attitude: Array, omega: Array) -> Motion:
     """Of a free body whose centre rests: attitude (n, 4) and angular velocity (n, 3), rad/s."""
     still = np.zeros((len(times), 3))
     return Motion(times, still, attitude[:, None], np.concatenate([still, omega], axis=1))
-
-
-ENGINE = SecondReference("MuJoCo’s accelerations over the MJCF, DOP853", forward_motion)
-"""Shares nothing with MuJoCo's integrators."""

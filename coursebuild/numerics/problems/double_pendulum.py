@@ -20,7 +20,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import advance, compiled, initial_data, simulate
+from coursebuild.numerics.engine import advance, compile_model, initial_data, simulate
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.measure import reference_motion
 from coursebuild.numerics.problem import (
@@ -34,7 +34,6 @@ from coursebuild.numerics.problem import (
     Sizes,
 )
 from coursebuild.numerics.problems.common import (
-    ENGINE,
     NO_CONTACT,
     divisions,
     model_text,
@@ -62,11 +61,8 @@ class DoublePendulum(Struct, frozen=True):
     lower: float = 0.5
     """Relative to the upper one, rad."""
     gravity: float = 9.81
-    """m/s²."""
     mass: float = 1.0
-    """kg."""
     length: float = 1.0
-    """m."""
     inertia: float = 0.01
     """Of each bob about its centre of mass, kg m²."""
 
@@ -118,7 +114,7 @@ def _ensemble() -> list[DoublePendulum]:
 
 def horizons(integrator: Integrator) -> list[float]:
     """When the error of the angles first passes 0.1 rad, s, for each member of the ensemble."""
-    model, found = compiled(MJCF, integrator, _STEP), []
+    model, found = compile_model(MJCF, integrator, _STEP), []
     for member in _ensemble():
         scenario = Scenario(20.0, 0.05, (member.upper, member.lower))
         run = simulate(replace(problem(), scenario=scenario), model).states
@@ -134,7 +130,7 @@ def exponents(integrator: Integrator) -> list[float]:
 
     Two runs of each, brought near to each other again and again.
     """
-    model, found = compiled(MJCF, integrator, _STEP), []
+    model, found = compile_model(MJCF, integrator, _STEP), []
     for member in _ensemble():
         scenario = Scenario(_SPAN, 0.5, (member.upper, member.lower))
         data, near = initial_data(scenario, model), initial_data(scenario, model)
@@ -163,7 +159,6 @@ def problem() -> Problem:
         position_bound=1e3,
         velocity_bound=1e2,
         reference=REFERENCE,
-        second=ENGINE,
         precision=Sizes(1e-7, 0.0, 1e-6),
         timesteps=divisions(0.05, 10, 20, 40, 80, 160, 320, 640),
         checks=(

@@ -12,6 +12,7 @@ without slipping has a = 5/7 g sin α (L. D. Landau, E. M. Lifshitz, Mechanics, 
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Literal
 
 import mujoco
@@ -19,7 +20,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import compiled
+from coursebuild.numerics.engine import compile_model
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -30,7 +31,7 @@ from coursebuild.numerics.problem import (
     Scenario,
     SecondReference,
 )
-from coursebuild.numerics.problems.common import model_text, simulated
+from coursebuild.numerics.problems.common import model_text, run_steps
 from mjcourse.spatial import axis_angle_to_quat
 
 Cone = Literal["pyramidal", "elliptic"]
@@ -59,13 +60,11 @@ class Incline(Struct, frozen=True):
     """A steady acceleration from rest, down a slope."""
 
     slope: float
-    """rad."""
     friction: float | None
     """Of a block; `None`: it is a ball, and rolls."""
     across: bool = False
     """Whether it goes half-way between the axes."""
     gravity: float = 9.81
-    """m/s²."""
     height: float = 0.05
     """Of the centre, m."""
 
@@ -91,7 +90,7 @@ class Incline(Struct, frozen=True):
 
 def _rigid(text: str, _: Scenario, times: Array) -> Motion:
     """What rigid contacts would do with a model's numbers."""
-    model = compiled(text, Integrator.EULER, _STEP)
+    model = compile_model(text, Integrator.EULER, _STEP)
     pull, normal = model.opt.gravity[:2], -float(model.opt.gravity[2])
     size, spin = float(np.hypot(*pull)), np.zeros(3)
     rolls = model.geom_type[1] == mujoco.mjtGeom.mjGEOM_SPHERE
@@ -118,14 +117,9 @@ def acceleration(text: str, integrator: Integrator) -> float:
     return (whole - half) / 0.5
 
 
-def creep(text: str, integrator: Integrator) -> float:
-    """The velocity at which a block slips that should stick, m/s: after two seconds at 1 ms."""
-    return _speed(text, integrator, 2.0)
-
-
 def _speed(text: str, integrator: Integrator, seconds: float) -> float:
     """Along the slope after so many seconds from rest, m/s."""
-    data = simulated(text, _SCENARIO, integrator, _STEP, round(seconds / _STEP))
+    data = run_steps(text, _SCENARIO, integrator, _STEP, round(seconds / _STEP))
     return math.hypot(data.qvel[0], data.qvel[1])
 
 
@@ -176,24 +170,21 @@ def _rolling(cone: Cone) -> Problem:
 
 def _sticking(cone: Cone) -> Problem:
     text = mjcf("box", STICKING, cone, "0.5")
-
-    def slipped(integrator: Integrator) -> float:
-        return creep(text, integrator)
-
+    creep = partial(_speed, text, seconds=2.0)
     law = "Coulomb's law: tan α < μ, so that it rests"
     found = _problem(
         f"sticking-block-{cone}",
         f"Block that should stick, {cone} cone",
         text,
         Reference("closed", law, Incline(math.radians(15), 0.5)),
-        (ScalarCheck("creep after 2 s at 1 ms", "m/s", 0.0, slipped, "Coulomb's law"),),
+        (ScalarCheck("creep after 2 s at 1 ms", "m/s", 0.0, creep, "Coulomb's law"),),
         "soft friction gives way at a steady velocity",
     )
     return replace(found, scenario=Scenario(2.0, 0.1), position_bound=1.0, velocity_bound=1.0)
 
 
 def _acceleration(name: str, text: str, exact: float, law: str) -> ScalarCheck:
-    return ScalarCheck(name, "m/s²", exact, lambda integrator: acceleration(text, integrator), law)
+    return ScalarCheck(name, "m/s²", exact, partial(acceleration, text), law)
 
 
 def _problem(

@@ -34,7 +34,6 @@ from coursebuild.numerics.problem import (
     Scenario,
 )
 from coursebuild.numerics.problems.common import (
-    ENGINE,
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
@@ -65,9 +64,6 @@ def problems() -> tuple[Problem, ...]:
     )
 
 
-# --------------------------------------------------------------------------------------- solutions
-
-
 class Oscillation(Struct, frozen=True):
     """x″ + 2ζωx′ + ω²x = 0."""
 
@@ -76,9 +72,7 @@ class Oscillation(Struct, frozen=True):
     rate: float
     """ω, rad/s."""
     x0: float = 1.0
-    """m."""
     v0: float = 5.0
-    """m/s."""
 
     def motion(self, times: Array) -> Motion:
         """At the times (n,) s."""
@@ -107,11 +101,8 @@ class Pursuit(Struct, frozen=True):
 
     ratio: float
     rate: float
-    """rad/s."""
     targets: tuple[float, ...] = (0.1, -0.05)
-    """m."""
     hold: float = 0.05
-    """s."""
 
     def motion(self, times: Array) -> Motion:
         """At the times (n,) s."""
@@ -125,9 +116,6 @@ class Pursuit(Struct, frozen=True):
             x, v = float(part.position[-1, 0]) + target, float(part.velocity[-1, 0])
             begin += self.hold
         return motion_without_attitude(times, place, speed)
-
-
-# ------------------------------------------------------------------------------------------ limits
 
 
 def limit_of(ratio: float, rate: float, integrator: Integrator, *explicit: Integrator) -> Limit:
@@ -167,9 +155,6 @@ def rk4_factor(z: complex) -> complex:
     return 1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))
 
 
-# ---------------------------------------------------------------------------------------- problems
-
-
 def _spring(ratio: float) -> Problem:
     rate, explicit = SPRING_RATE, Integrator.EULER_EXPLICIT
     damper = f'stiffness="100" damping="{_DAMPING[ratio]}"'
@@ -183,7 +168,6 @@ def _spring(ratio: float) -> Problem:
         position_bound=BOUND,
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
         reference=Reference("closed", "the linear oscillator", Oscillation(ratio, rate)),
-        second=ENGINE,
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
         limit=lambda one: limit_of(ratio, rate, one, explicit),
         energy_conserved=ratio == 0,
@@ -208,7 +192,6 @@ def _servo(ratio: float) -> Problem:
         position_bound=bound,
         velocity_bound=bound * rate * (1 + 4 * ratio),
         reference=Reference("closed", source, Pursuit(ratio, rate)),
-        second=ENGINE,
         timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e2 / rate),
@@ -233,7 +216,6 @@ def _equality(ratio: float) -> Problem:
         position_bound=BOUND,
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
         reference=Reference("closed", source, Oscillation(ratio, rate)),
-        second=ENGINE,
         timesteps=divisions(0.02, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda one: limit_of(ratio, rate, one, *explicit),
         search=(1e-2 / rate, 1e1 / rate),

@@ -19,13 +19,7 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
 )
-from coursebuild.numerics.problems.common import (
-    ENGINE,
-    NO_CONTACT,
-    divisions,
-    model_text,
-    simulated,
-)
+from coursebuild.numerics.problems.common import NO_CONTACT, divisions, model_text, run_steps
 
 _STEP = 0.01
 _SCENARIO = Scenario(1.0, 0.1, qvel=(3.0, 0.0, 4.0, 0.0, 0.0, 0.0))
@@ -38,9 +32,7 @@ class Parabola(Struct, frozen=True):
     """x = v₀t + gt²/2, thrown from the origin."""
 
     launch: tuple[float, float, float]
-    """m/s."""
     gravity: float
-    """m/s²."""
 
     def motion(self, times: Array) -> Motion:
         """At the times (n,) s."""
@@ -56,7 +48,7 @@ PARABOLA = Parabola((3.0, 0.0, 4.0), 9.81)
 
 def fall_error(integrator: Integrator) -> float:
     """Error of the height after a second at 10 ms, m: simulated less exact."""
-    data = simulated(MJCF, _SCENARIO, integrator, _STEP, round(1.0 / _STEP))
+    data = run_steps(MJCF, _SCENARIO, integrator, _STEP, round(1.0 / _STEP))
     return float(data.qpos[2] - PARABOLA.motion(np.ones(1)).position[0, 2])
 
 
@@ -76,7 +68,6 @@ def problem() -> Problem:
         position_bound=100.0,
         velocity_bound=100.0,
         reference=Reference("closed", "x = v₀t + gt²/2", PARABOLA),
-        second=ENGINE,
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
         energy_conserved=True,
         checks=(

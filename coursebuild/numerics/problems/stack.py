@@ -26,12 +26,7 @@ from coursebuild.numerics.problem import (
     Scenario,
     Sizes,
 )
-from coursebuild.numerics.problems.common import (
-    ENGINE,
-    model_text,
-    motion_without_attitude,
-    simulated,
-)
+from coursebuild.numerics.problems.common import model_text, motion_without_attitude, run_steps
 
 RATIOS = (1.0, 1e1, 1e2, 1e3, 1e4)
 """Mass of the upper body in kg; the lower one has 1 kg."""
@@ -63,14 +58,10 @@ class RestingStack(Struct, frozen=True):
     """As deep as its contacts give way."""
 
     upper: float
-    """kg."""
     lower: float = 1.0
-    """kg."""
     gravity: float = 9.81
-    """m/s²."""
     impedance: float = 0.99
     timeconst: float = 0.004
-    """s."""
 
     @property
     def depths(self) -> Array:
@@ -89,16 +80,7 @@ class RestingStack(Struct, frozen=True):
 def _settled(integrator: Integrator, ratio: float) -> Any:
     """`mjData` of the stack, let go without overlap and left to itself for a while."""
     scenario = Scenario(1.0, 0.1, (0.0, 0.0))
-    return simulated(mjcf(ratio), scenario, integrator, 1e-3, round(_SETTLED / 1e-3))
-
-
-def _sunk(integrator: Integrator, ratio: float) -> float:
-    # Not what the contacts say, which the collision of balls that passed each other would hide.
-    return float(-_settled(integrator, ratio).qpos[1])
-
-
-def _speed(integrator: Integrator, ratio: float) -> float:
-    return float(np.max(np.abs(_settled(integrator, ratio).qvel)))
+    return run_steps(mjcf(ratio), scenario, integrator, 1e-3, round(_SETTLED / 1e-3))
 
 
 def problems() -> tuple[Problem, ...]:
@@ -117,12 +99,7 @@ def _problem(ratio: float) -> Problem:
         scenario=Scenario(0.2, 0.002, _RESTS[ratio]),
         position_bound=1.0,
         velocity_bound=10.0,
-        reference=Reference(
-            "closed",
-            "r = f (1 − d) Â/(k d²)",
-            known,
-        ),
-        second=ENGINE,
+        reference=Reference("closed", "r = f (1 − d) Â/(k d²)", known),
         precision=Sizes(1e-13, 0.0, 1e-11),
         timesteps=(2e-3, 1e-3, 5e-4),
         checks=(
@@ -130,14 +107,15 @@ def _problem(ratio: float) -> Problem:
                 f"how far the upper body sinks, let go without overlap, {_SETTLED:g} s at 1 ms",
                 "m",
                 float(depth),
-                lambda integrator: _sunk(integrator, ratio),
+                # Contacts would not say it of balls that passed each other.
+                lambda integrator: float(-_settled(integrator, ratio).qpos[1]),
                 "r = f (1 − d) Â/(k d²), both contacts",
             ),
             ScalarCheck(
                 "velocity that is left then",
                 "m/s",
                 0.0,
-                lambda integrator: _speed(integrator, ratio),
+                lambda integrator: float(np.max(np.abs(_settled(integrator, ratio).qvel))),
                 "at rest",
             ),
         ),

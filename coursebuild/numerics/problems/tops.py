@@ -31,12 +31,11 @@ from coursebuild.numerics.problem import (
     Scenario,
 )
 from coursebuild.numerics.problems.common import (
-    ENGINE,
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
     model_text,
-    simulated,
+    run_steps,
     turning_at_rest,
 )
 from coursebuild.numerics.problems.oscillators import rk4_factor
@@ -50,9 +49,6 @@ _Y, _Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 def problems() -> tuple[Problem, ...]:
     """The free ones, and the heavy top."""
     return (*(_free(name) for name in TOPS), _heavy())
-
-
-# ------------------------------------------------------------------------------------------- free
 
 
 class FreeTop(Struct, frozen=True):
@@ -141,7 +137,7 @@ def measured_growth(name: str, integrator: Integrator, z: float) -> float:
     """The mean growth over some steps, by which the first and the last velocity differ."""
     top = TOPS[name]
     _, mjcf, scenario = _FREE[name]
-    data = simulated(mjcf, scenario, integrator, z / abs(top.rate), _STEPS)
+    data = run_steps(mjcf, scenario, integrator, z / abs(top.rate), _STEPS)
     first = math.hypot(*top.omega[:2])
     return float((math.hypot(data.qvel[3], data.qvel[4]) / first) ** (1 / _STEPS))
 
@@ -168,7 +164,6 @@ def _free(name: str) -> Problem:
         position_bound=1.5,
         velocity_bound=10 * abs(top.omega[2]),
         reference=known_turn(top),
-        second=ENGINE,
         timesteps=divisions(0.05, 40, 60, 80, 120, 160, 320, 640, 1280),
         checks=tuple(_growth(name, z) for z in (0.03, 0.1, 0.3)),
         limit=lambda integrator: _limit(top, integrator),
@@ -180,16 +175,11 @@ def _free(name: str) -> Problem:
     )
 
 
-# ------------------------------------------------------------------------------------------ heavy
-
-
 class HeavyTop(Struct, frozen=True):
     """Lagrange's top, let go with spin only."""
 
     gravity: float
-    """m/s²."""
     mass: float
-    """kg."""
     height: float
     """m, from the pivot to the centre of mass."""
     axial: float
@@ -197,7 +187,6 @@ class HeavyTop(Struct, frozen=True):
     central: float
     """Moment across it through the centre of mass, kg m²."""
     spin: float
-    """rad/s."""
     tilt: float
     """From the vertical, rad."""
 
@@ -271,7 +260,6 @@ def _heavy() -> Problem:
         position_bound=1.5,
         velocity_bound=1000.0,
         reference=Reference("closed", "Lagrange's top, Goldstein, 5.7, with quadratures", _TOP),
-        second=ENGINE,
         timesteps=divisions(0.02, 40, 80, 160, 320, 640, 1280),
         search=(1e-5, 1.0),
         span=2.0,

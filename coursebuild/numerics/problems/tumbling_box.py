@@ -15,7 +15,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import advance, compiled, initial_data
+from coursebuild.numerics.engine import advance, compile_model, initial_data
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
     Array,
@@ -27,12 +27,11 @@ from coursebuild.numerics.problem import (
     Scenario,
 )
 from coursebuild.numerics.problems.common import (
-    ENGINE,
     NO_CONTACT,
     NO_GRAVITY,
     divisions,
     model_text,
-    simulated,
+    run_steps,
     turning_at_rest,
 )
 from coursebuild.numerics.problems.tops import NEVER_STABLE
@@ -56,9 +55,7 @@ class Tumbling(Struct, frozen=True):
     nudge: float
     """rad/s, not 0: with 0 the body turns about its axis forever, and any rounding ends that."""
     spin: float = SPIN
-    """rad/s."""
     half_sizes: tuple[float, float, float] = (0.1, 0.05, 0.02)
-    """m."""
 
     @property
     def moments(self) -> Array:
@@ -162,7 +159,7 @@ def measured_crossing(integrator: Integrator, nudge: float) -> float:
     from scipy.optimize import brentq
 
     one, timestep = _begun_with(nudge), 2e-3
-    model = compiled(one.mjcf, integrator, timestep)
+    model = compile_model(one.mjcf, integrator, timestep)
     data = initial_data(one.scenario, model)
     mujoco.mj_forward(model, data)
     before, slope = float(data.qvel[4]), float(data.qacc[4])
@@ -184,7 +181,7 @@ def kinetic_drift(integrator: Integrator) -> float:
     The last states after some flips depend on the last digit of the first one; this does not.
     """
     one = _begun_with(1e-3)
-    data = simulated(one.mjcf, one.scenario, integrator, 2e-3, 10_000)
+    data = run_steps(one.mjcf, one.scenario, integrator, 2e-3, 10_000)
     inertia = Tumbling(1e-3).moments
     final = float(inertia @ np.array(data.qvel[3:]) ** 2)
     first = float(inertia @ np.array(one.scenario.qvel[3:]) ** 2)
@@ -215,7 +212,6 @@ def problem() -> Problem:
             "Landau & Lifshitz, Mechanics, § 37 (Jacobi's elliptic functions, a quadrature)",
             Tumbling(0.1),
         ),
-        second=ENGINE,
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
         checks=(
             ScalarCheck(

@@ -22,15 +22,11 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.compare import Seen
-from coursebuild.numerics.pruning.edits import (
-    ModelEdit,
-    set_attributes,
-    set_option,
-)
+from coursebuild.numerics.pruning.compare import WatchedRun
+from coursebuild.numerics.pruning.edits import ModelEdit, set_attributes, set_option
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import ModelText, section_of
-from coursebuild.numerics.pruning.reachability import each_pair, separate
+from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
 
 MOST_PAIRS = 100_000
 """Pairs of geoms beyond which nothing is said of them."""
@@ -111,9 +107,6 @@ _MESSAGES = {
 }
 
 
-# ------------------------------------------------------------------------------------ every state
-
-
 _ASSETS = {"material": "Material", "texture": "Texture", "mesh": "Mesh", "hfield": "Hfield"}
 _ASSETS |= {"model": ""}
 _FLAGS = ("energy", "fwdinv")
@@ -145,7 +138,7 @@ def _unread_kind(
 
     Users come before what they use, so that this can go with them.
     """
-    thing, tag, name = text.ids(element), element.tag, called(element)
+    thing, tag, name = text.ids(element), element.tag, display_name(element)
     section = section_of(element)
     if section == "sensor" and tag not in ("user", "plugin"):
         return "sensor-unread", "Sensor", name, 0
@@ -165,7 +158,7 @@ def _unread_kind(
     return None
 
 
-def called(element: Element) -> str:
+def display_name(element: Element) -> str:
     """The name of an element, or the way to it where it has none."""
     return element.get("name") or place_of(element)
 
@@ -205,55 +198,46 @@ def _slack(model: Any, ids: Collection[int]) -> bool:
     return not any(np.any(getattr(model, f"tendon_{name}")[i]) for name in _OF_TENDONS for i in ids)
 
 
-# ---------------------------------------------------------------------------------------- contact
-
-
 def contacts(text: ModelText) -> list[Item]:
     """Contact as a whole, or that of geoms, where a bound says that nothing can touch."""
-    model = text.model
-    pairs = frozenset(islice(each_pair(model), MOST_PAIRS))
-    if model.nflex or not pairs or len(pairs) == MOST_PAIRS:
+    pairs = frozenset(islice(each_pair(text.model), MOST_PAIRS))
+    if len(pairs) == MOST_PAIRS:
         return []
-    apart = separate(model, pairs)
-    if apart == pairs:
-        return [_contact_off(text, "contact-off")]
-    near = {geom for pair in pairs - apart for geom in pair}
-    far = {geom for pair in apart for geom in pair} - near
-    return [_collide_not("collision-unreachable", one) for one in _colliding(text, far)]
+    near = pairs - separate(text.model, pairs)
+    return _without_contact(text, pairs, near, "contact-off", "collision-unreachable")
 
 
-def idle_contacts(text: ModelText, seen: Collection[Seen]) -> list[Item]:
+def idle_contacts(text: ModelText, seen: Collection[WatchedRun]) -> list[Item]:
     """The same where nothing touched."""
     pairs = frozenset(islice(each_pair(text.model), MOST_PAIRS))
     touching = frozenset(pair for one in seen for pair in one.touching)
+    return _without_contact(text, pairs, touching, "contact-idle", "collision-idle")
+
+
+def _without_contact(
+    text: ModelText, pairs: Collection[Pair], touching: Collection[Pair], whole: str, part: str
+) -> list[Item]:
+    """Contact as a whole where none of these pairs touch, else that of geoms in no pair that does.
+
+    Geoms of an explicit pair are left alone. `whole` and `part` are kinds of findings.
+    """
     if text.model.nflex or not pairs:
         return []
     if not touching:
-        return [_contact_off(text, "contact-idle")]
-    idle = {geom for pair in pairs for geom in pair} - {geom for pair in touching for geom in pair}
-    return [_collide_not("collision-idle", one) for one in _colliding(text, idle)]
-
-
-def _contact_off(text: ModelText, kind: str) -> Item:
-    return Item(kind, "contact", None, edits=set_option(text.main, "flag", "contact", "disable"))
-
-
-def _colliding(text: ModelText, geoms: Collection[int]) -> Iterator[Element]:
-    """Elements that became only such geoms, none of them of an explicit pair."""
+        off = set_option(text.main, "flag", "contact", "disable")
+        return [Item(whole, "contact", None, edits=off)]
     explicit = {int(g) for g in (*text.model.pair_geom1, *text.model.pair_geom2)}
-    left = set(geoms) - explicit
-    return (element for element, ids in text.things("geom") if left.issuperset(ids))
+    idle = {geom for pair in pairs for geom in pair} - explicit
+    idle -= {geom for pair in touching for geom in pair}
+    none = (("contype", "0"), ("conaffinity", "0"))
+    return [
+        Item(part, display_name(element), element, edits=set_attributes(element, none))
+        for element, ids in text.things("geom")
+        if idle.issuperset(ids)
+    ]
 
 
-def _collide_not(kind: str, element: Element) -> Item:
-    edits = set_attributes(element, (("contype", "0"), ("conaffinity", "0")))
-    return Item(kind, called(element), element, edits=edits)
-
-
-# ---------------------------------------------------------------------------- what runs speak for
-
-
-def far_bodies(text: ModelText, said: Collection[str], seen: Collection[Seen]) -> list[Item]:
+def far_bodies(text: ModelText, said: Collection[str], seen: Collection[WatchedRun]) -> list[Item]:
     """Bodies that the scene is not about.
 
     It is about trees of bodies that are driven or couple with others, are set in motion, or of
@@ -279,7 +263,7 @@ def far_bodies(text: ModelText, said: Collection[str], seen: Collection[Seen]) -
         looks = any(one.tag in ("camera", "light") for one in element.walk())
         if not looks and all(ranks[number] < most for number in numbers):
             gone = (element, *_referring(text, element))
-            found.append(Item("far-body", called(element), element, gone, view="Body"))
+            found.append(Item("far-body", display_name(element), element, gone, view="Body"))
     return found
 
 
@@ -304,7 +288,7 @@ def _referring(text: ModelText, body: Element) -> list[Element]:
     ]
 
 
-def _thrown(model: Any, seen: Collection[Seen]) -> set[int]:
+def _thrown(model: Any, seen: Collection[WatchedRun]) -> set[int]:
     """The trees that a scenario sets in motion."""
     found: set[int] = set()
     for case in (one.scene.scenario for one in seen):
@@ -325,7 +309,7 @@ _SETTINGS = {
 }
 
 
-def settings(text: ModelText, seen: Collection[Seen]) -> list[Item]:
+def settings(text: ModelText, seen: Collection[WatchedRun]) -> list[Item]:
     """Other ways to compute the same, for a model in which a constraint was ever active."""
     if not any(one.constrained for one in seen):
         return []

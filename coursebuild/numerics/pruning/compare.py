@@ -170,7 +170,7 @@ def _shots(base: Any, changed: Any, index: IndexMap, scene: Scene, *, whole: boo
     return worst if judge(changed, other, float(other.time)).ok else math.inf
 
 
-class Seen(Struct, frozen=True, eq=False):
+class WatchedRun(Struct, frozen=True, eq=False):
     """What a run of the whole model showed."""
 
     scene: Scene
@@ -181,7 +181,7 @@ class Seen(Struct, frozen=True, eq=False):
     """Whether a constraint was ever active."""
 
 
-def watch(model: Any, scene: Scene) -> Seen:
+def watch(model: Any, scene: Scene) -> WatchedRun:
     """Run the whole model once."""
     without_reset(model)
     data = initial_data(scene.scenario, model)
@@ -201,4 +201,4 @@ def watch(model: Any, scene: Scene) -> Seen:
         if not most.finite:
             break
     judgement = judge(model, data, start + made * scene.own, most)
-    return Seen(scene, judgement, frozenset(touching), constrained)
+    return WatchedRun(scene, judgement, frozenset(touching), constrained)

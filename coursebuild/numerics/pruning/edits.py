@@ -15,6 +15,7 @@ import re
 from collections.abc import Collection, Iterable
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.numerics.pruning.markup import Element, Markup
 
@@ -37,16 +38,14 @@ class ModelEdit(Struct, frozen=True, order=True):
 
 
 def apply_edits(data: bytes, edits: Iterable[ModelEdit]) -> bytes:
-    """The bytes with all edits of one file; an edit inside of what another one removes is void.
+    """The bytes with all edits of one file.
 
     Raises:
         ValueError: two of them contradict each other.
     """
     parts: list[bytes] = []
     last = 0
-    for edit in sorted(set(edits), key=lambda one: (one.start, -one.end, one.new)):
-        if edit.end <= last and edit.start < last:
-            continue
+    for edit in merge_edits(edits):
         if edit.start < last:
             raise ValueError(f"two changes overlap at byte {edit.start} of {edit.path}")
         parts += [data[last : edit.start], edit.new]
@@ -55,13 +54,15 @@ def apply_edits(data: bytes, edits: Iterable[ModelEdit]) -> bytes:
 
 
 def merge_edits(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
-    """The same changes in order, with removals that follow each other in one."""
+    """The same changes in order: removals that follow each other in one, and none inside of one."""
     found: list[ModelEdit] = []
-    for edit in sorted(set(edits)):
+    for edit in sorted(set(edits), key=lambda one: (one.path, one.start, -one.end, one.new)):
         last = found[-1] if found else None
-        joins = last is not None and (last.path, last.end) == (edit.path, edit.start)
-        if last is not None and joins and not (last.new or edit.new):
-            found[-1] = ModelEdit(last.path, last.start, edit.end, b"")
+        removed = last is not None and last.path == edit.path and not last.new
+        if last is not None and removed and edit.start < last.end and edit.end <= last.end:
+            continue
+        if last is not None and removed and edit.start == last.end and not edit.new:
+            found[-1] = replace(last, end=edit.end)
         else:
             found.append(edit)
     return tuple(found)
@@ -83,15 +84,8 @@ def remove(elements: Iterable[Element]) -> tuple[ModelEdit, ...]:
         if _goes_too(parent, includes):
             gone.add(parent)
             waiting.append(parent)
-    whole = {one for one in gone | includes if not _goes_with_more(one, gone, includes)}
-    return tuple(sorted(map(_removal, whole)))
-
-
-def _goes_with_more(
-    element: Element, gone: Collection[Element], includes: Collection[Element]
-) -> bool:
-    """Whether something around it goes, or the file that it is in."""
-    return element.document.at in includes or any(one in gone for one in element.above())
+    # A file that nothing includes any more stays as it is.
+    return merge_edits(_removal(o) for o in gone | includes if o.document.at not in includes)
 
 
 def _goes_too(section: Element, includes: Collection[Element]) -> bool:

@@ -37,7 +37,7 @@ _STATE = {
 _KEYS = {"key_qpos": "nq", "key_qvel": "nv", "key_act": "na", "key_ctrl": "nu"}
 
 
-class Gone(Struct, frozen=True):
+class Removal(Struct, frozen=True):
     """What a change takes out of a compiled model, by number."""
 
     bodies: frozenset[int] = frozenset()
@@ -47,17 +47,18 @@ class Gone(Struct, frozen=True):
     actuators: frozenset[int] = frozenset()
 
 
-def index_map(model: Any, gone: Gone) -> IndexMap:
+def index_map(model: Any, gone: Removal) -> IndexMap:
     """What is left of a model."""
     bodies = set(gone.bodies)
     for number in range(1, model.nbody):  # parents come first
         if int(model.body_parentid[number]) in bodies:
             bodies.add(number)
-    body = _left(model.nbody, bodies)
+    body = np.setdiff1d(np.arange(model.nbody), [*bodies])
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
-    ctrl, sensors = _left(model.nu, gone.actuators), _left(model.nsensor, gone.sensors)
-    geoms = _left(model.ngeom, gone.geoms)
+    ctrl = np.setdiff1d(np.arange(model.nu), [*gone.actuators])
+    sensors = np.setdiff1d(np.arange(model.nsensor), [*gone.sensors])
+    geoms = np.setdiff1d(np.arange(model.ngeom), [*gone.geoms])
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),
@@ -69,10 +70,6 @@ def index_map(model: Any, gone: Gone) -> IndexMap:
         "ngeom": geoms[np.isin(model.geom_bodyid[geoms], body)],
         "nsensordata": _ranges(model.sensor_adr[sensors], model.sensor_dim[sensors]),
     }
-
-
-def _left(count: int, gone: set[int] | frozenset[int]) -> Places:
-    return np.array([number for number in range(count) if number not in gone], dtype=np.int64)
 
 
 def _ranges(starts: Any, counts: Any) -> Places:

@@ -103,7 +103,7 @@ class ModelText:
         model = self._compile(self.main.data)
         if self.main.included:
             try:
-                same = saved(self.compiled()) == saved(model)
+                same = model_bytes(self.compiled()) == model_bytes(model)
             except ValueError:
                 same = False
             if not same:
@@ -196,19 +196,16 @@ def _by_path(edits: Iterable[ModelEdit]) -> dict[str, list[ModelEdit]]:
 def _whole(document: Markup, edits: Mapping[str, Sequence[ModelEdit]]) -> bytes:
     """A file with edits, and in place of its includes what these hold."""
     own = list(edits.get(document.path, ()))
-    removed = [(one.start, one.end) for one in own if not one.new]
     for inner in document.included:
         include = inner.at
         assert include is not None
-        if any(start <= include.start and include.end <= end for start, end in removed):
-            continue
         root = parse_markup(inner.path, text := _whole(inner, edits)).root
         held = text[root.head : root.tail]
         own.append(ModelEdit(document.path, include.start, include.end, held))
     return apply_edits(document.data, own)
 
 
-def saved(model: Any) -> bytes:
+def model_bytes(model: Any) -> bytes:
     """A compiled model as bytes."""
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)

@@ -149,7 +149,7 @@ class Reach:
             plane, other, place = a, second, first
         if place.most > 0 or not self._has_size(b if plane == a else a):
             return False
-        if int(model.geom_bodyid[plane]) and not self._is_fixed(int(model.geom_bodyid[plane])):
+        if not self._is_fixed(int(model.geom_bodyid[plane])):
             # Its normal is known in the world only; a plane that moves is left out.
             return False
         normal = self._data.geom_xmat[plane].reshape(3, 3)[:, 2]
@@ -157,10 +157,8 @@ class Reach:
         return height > other.most + gap + _SLACK * (abs(height) + other.most)
 
     def _is_fixed(self, body: int) -> bool:
-        return int(self._model.body_weldid[body]) == 0 and not self._has_mocap(body)
-
-    def _has_mocap(self, body: int) -> bool:
-        return any(int(self._model.body_mocapid[b]) >= 0 for b in self._above[body])
+        model, above = self._model, self._above[body]
+        return int(model.body_weldid[body]) == 0 and not np.any(model.body_mocapid[above] >= 0)
 
     def shell(self, geom: int, common: int) -> Shell | None:
         """Where a geom can be, seen from a body that carries it, in world axes of `qpos0`.
@@ -194,13 +192,10 @@ class Reach:
     def _radius(self, geom: int) -> float:
         """About the geom's own place; a mesh or field may lie beside it."""
         model = self._model
-        if model.geom_type[geom] != _HFIELD:
-            box = model.geom_aabb[geom]
-            return max(
-                float(model.geom_rbound[geom]),
-                float(np.linalg.norm(np.abs(box[:3]) + box[3:])),
-            )
-        return float(model.geom_rbound[geom])
+        radius, box = float(model.geom_rbound[geom]), model.geom_aabb[geom]
+        if model.geom_type[geom] == _HFIELD:
+            return radius
+        return max(radius, float(np.linalg.norm(np.abs(box[:3]) + box[3:])))
 
 
 def separate(model: Any, pairs: Iterable[Pair]) -> frozenset[Pair]:

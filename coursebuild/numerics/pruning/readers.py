@@ -1,6 +1,6 @@
 """What code may notice of a model: what cannot be ruled out counts as a use.
 
-Entry points: `read_code(path, text, own)`, `Reader`, `Readers`.
+Entry points: `read_code(path, text, own)`, `Reader`.
 
 1. Nobody's code is understood: it is words. A thing is used where code has its name as a text, a
    field where its name stands anywhere, and any thing of a kind where code has the word by which
@@ -114,22 +114,6 @@ class Reader(Struct, frozen=True):
             or not self.members.isdisjoint(end for _, _, end in split)
             or not self.parts.isdisjoint((VIEWS.get(prefix, ""), end) for prefix, _, end in split)
         )
-
-
-class Readers(Struct, frozen=True):
-    """All code that uses a model, or may."""
-
-    files: tuple[Reader, ...] = ()
-
-    def noticing(
-        self, names: Collection[str], kinds: Collection[str], change: Collection[str]
-    ) -> Reader | None:
-        """The first who may notice that things are gone."""
-        return next((one for one in self.files if one.notices(names, kinds, change)), None)
-
-    def touching(self, fields: Collection[str]) -> Reader | None:
-        """The first who may change one of these fields."""
-        return next((one for one in self.files if one.touches(fields)), None)
 
 
 def read_code(path: str, text: str, own: Collection[str] = ()) -> Reader:

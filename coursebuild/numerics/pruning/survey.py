@@ -16,12 +16,14 @@ Entry point: `survey`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import mujoco
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.model.results import Machine
+from coursebuild.core.model.scenarios import Keep
 from coursebuild.numerics.pruning.candidates import (
     Item,
     contacts,
@@ -32,20 +34,23 @@ from coursebuild.numerics.pruning.candidates import (
     settings,
     unread,
 )
-from coursebuild.numerics.pruning.compare import TOLERANCE, MotionComparison, Seen, watch
+from coursebuild.numerics.pruning.compare import TOLERANCE, MotionComparison, WatchedRun, watch
 from coursebuild.numerics.pruning.differences import beyond, difference
 from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
-from coursebuild.numerics.pruning.readers import Readers
-from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest
+from coursebuild.numerics.pruning.readers import Reader
+from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest_subset
 from coursebuild.numerics.reports.diet import (
     PROVED,
     SAME,
+    DietReport,
+    DietScenario,
     Finding,
     ModelPlace,
     Saving,
+    StaleKeep,
     TextEdit,
     Tried,
     name_list,
@@ -78,11 +83,17 @@ Rerun = Callable[[Mapping[str, bytes]], str]
 class Order(Struct, frozen=True, eq=False):
     """What is to be surveyed, and how."""
 
+    model: str
+    """Its name."""
+    digest: str
+    """Of all in the course that the report depends on."""
+    machine: Machine
     text: ModelText
     scenes: tuple[Scene, ...]
-    readers: Readers
-    keeps: Mapping[str, str]
-    """Reasons, by the finding: `KIND`, or `KIND NAME`."""
+    readers: tuple[Reader, ...]
+    """All code that uses the model, or may."""
+    keeps: Mapping[str, Keep]
+    """By the finding: `KIND`, or `KIND NAME`."""
     locked: Mapping[str, str]
     """Files that are not to be changed, and why."""
     has_commands: bool
@@ -92,28 +103,46 @@ class Order(Struct, frozen=True, eq=False):
     quick: bool
     tell: Callable[[str], None]
     """Is told what is tried next."""
-    rerun: Rerun = lambda _: ""
+    rerun: Rerun | None = None
+    """`None`: scripts and labs do not run."""
 
 
 class Survey(Struct, frozen=True):
     """What was found."""
 
-    seen: tuple[Seen, ...]
-    findings: tuple[Finding, ...] = ()
-    tried: tuple[Tried, ...] = ()
-    fixed: Saving | None = None
-    slim: Saving | None = None
-    slim_difference: float | None = None
-    stale: tuple[str, ...] = ()
+    report: DietReport
+    text: ModelText
     edits: tuple[ModelEdit, ...] = ()
     """All that `--fix` changes."""
 
 
 def survey(order: Order) -> Survey:
     """Try everything on a model."""
-    seen = tuple(watch(order.text.model, scene) for scene in order.scenes)
+    seen = [watch(order.text.model, scene) for scene in order.scenes]
+    report = DietReport(
+        model=order.model,
+        digest=order.digest,
+        quick=order.quick,
+        machine=order.machine,
+        readers=tuple(dict.fromkeys(one.path.partition(":")[0] for one in order.readers)),
+        scenarios=tuple(
+            DietScenario(
+                one.scene.name,
+                round(one.scene.scenario.duration / one.scene.own),
+                one.judgement.status.value,
+                one.judgement.reasons,
+            )
+            for one in seen
+        ),
+        findings=(),
+        tried=(),
+        fixed=None,
+        slim=None,
+        slim_difference=None,
+        stale=(),
+    )
     good = tuple(one for one in seen if one.judgement.ok)
-    return _Surveyor(order, seen, good).all() if good else Survey(seen)
+    return _Surveyor(order, good).all(report) if good else Survey(report, order.text)
 
 
 class _Found(Struct, frozen=True, eq=False):
@@ -124,58 +153,57 @@ class _Found(Struct, frozen=True, eq=False):
 
 
 class _Surveyor:
-    def __init__(self, order: Order, seen: tuple[Seen, ...], good: tuple[Seen, ...]) -> None:
+    def __init__(self, order: Order, good: tuple[WatchedRun, ...]) -> None:
         self.order = order
-        self.seen, self.good = seen, good
+        self.good = good
         self.trials = PruningTrials(
             order.text, [one.scene for one in good], order.clock, quick=order.quick
         )
         self.tried: list[Tried] = []
 
-    def all(self) -> Survey:
+    def all(self, report: DietReport) -> Survey:
         """Every candidate, then all of what was found."""
         proved = self._proved()
         found = self._believed([*proved, *self._run(proved)])
         found += self._settings()
         self.order.tell("all together")
         fixable = [item for one in found if one.finding.fixable for item in one.items]
-        whole = self.trials.without(largest(fixable, self._holds)) if fixable else None
+        whole = self.trials.without(largest_subset(fixable, self._holds)) if fixable else None
         slim, apart = self._slim([one for one in found if not one.finding.kept])
         used = {one.finding.kind for one in found}
         used |= {f"{item.kind} {item.name}" for one in found for item in one.items}
-        return Survey(
-            self.seen,
-            tuple(one.finding for one in found),
-            tuple(self.tried),
-            None if whole is None else self.trials.saving(whole),
-            slim,
-            apart,
-            tuple(one for one in self.order.keeps if one not in used),
-            () if whole is None else whole.edits,
+        stale = {key: one.finding_span for key, one in self.order.keeps.items() if key not in used}
+        report = replace(
+            report,
+            findings=tuple(one.finding for one in found),
+            tried=tuple(self.tried),
+            fixed=None if whole is None else self.trials.saving(whole),
+            slim=slim,
+            slim_difference=apart,
+            stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
         )
+        return Survey(report, self.order.text, () if whole is None else whole.edits)
 
     def _believed(self, found: Sequence[_Found]) -> list[_Found]:
         """Those without which scripts and labs of the course say the same."""
         self.order.tell("scripts and labs")
         unkept = [one for one in found if not one.finding.kept]
-        believed = largest(unkept, lambda some: not self._says_otherwise(some))
+        believed = largest_subset(unkept, lambda some: not self._says_otherwise(some))
         for one in unkept:
             if one not in believed:
                 who = self._says_otherwise([one])
                 self._note(one.items, one.finding.difference, f"{who} says something else then")
         return [one for one in found if one.finding.kept or one in believed]
 
-    # --- every state
-
     def _proved(self) -> list[_Found]:
         order = self.order
         order.tell("what nobody needs")
         items = unread(order.text, [one.scene.scenario for one in self.good])
-        if order.readers.touching(PREMISES) is None:
+        if not any(one.touches(PREMISES) for one in order.readers):
             items += contacts(order.text)
         items = [one for one in items if self._unread(one)]
         wanted = [one for one in items if not self._reason(one)]
-        gone = largest(wanted, self._holds)
+        gone = largest_subset(wanted, self._holds)
         kept = [one for one in items if self._reason(one) and self._holds([*gone, one])]
         for one in wanted:
             if one not in gone:
@@ -187,7 +215,13 @@ class _Surveyor:
 
     def _unread(self, item: Item) -> bool:
         names = {item.name} | {one.get("class") or "" for e in item.gone for one in e.walk()}
-        return self.order.readers.noticing(names - {""}, {item.view} - {""}, frozenset()) is None
+        return self._noticing(names - {""}, {item.view} - {""}, ()) is None
+
+    def _noticing(
+        self, names: Collection[str], kinds: Collection[str], change: Collection[str]
+    ) -> Reader | None:
+        """The first who may notice that things are gone."""
+        return next((o for o in self.order.readers if o.notices(names, kinds, change)), None)
 
     def _holds(self, items: Sequence[Item]) -> bool:
         """Whether nothing but these would be missing, in any state."""
@@ -202,20 +236,18 @@ class _Surveyor:
         if "tree_sleep_policy" in change and self._may_sleep():
             return False
         change |= self.trials.state_difference(trial)
-        if self.order.readers.noticing((), kinds, change) is not None:
+        if self._noticing((), kinds, change) is not None:
             return False
         result = self.trials.compare(trial)
         return result is not None and result.identical
 
     def _may_sleep(self) -> bool:
         asleep = int(self.order.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
-        return bool(asleep or self.order.readers.touching({"enableflags"}))
-
-    # --- what was run
+        return bool(asleep or any(one.touches({"enableflags"}) for one in self.order.readers))
 
     def _run(self, proved: Sequence[_Found]) -> list[_Found]:
         text = self.order.text
-        said = {name for one in self.order.readers.files for name in one.names}
+        said = {name for one in self.order.readers for name in one.names}
         groups = [far_bodies(text, said, self.good)]
         if not any(one.items[0].kind == "contact-off" for one in proved):
             groups.append(idle_contacts(text, self.good))
@@ -247,7 +279,7 @@ class _Surveyor:
         # Bodies fall asleep below a speed, which is then the difference.
         sleeps = items[0].kind == "sleep"
         allowed = float(self.order.text.model.opt.sleep_tolerance) if sleeps else TOLERANCE
-        gone = largest(items, same)
+        gone = largest_subset(items, same)
         if not gone:
             worst = max((one.difference for one in results), default=math.inf)
             self._note(items, worst, "it changes the motion")
@@ -262,12 +294,11 @@ class _Surveyor:
             return None
         return one
 
-    # --- findings
-
     def _reason(self, item: Item) -> str:
         """Why the author keeps it; empty where nothing says so."""
         keeps = self.order.keeps
-        return keeps.get(f"{item.kind} {item.name}", keeps.get(item.kind, ""))
+        keep = keeps.get(f"{item.kind} {item.name}") or keeps.get(item.kind)
+        return "" if keep is None else keep.reason
 
     def _grouped(self, items: Iterable[Item]) -> list[tuple[str, list[Item]]]:
         """Items of one kind that are kept for one reason, or for none."""
@@ -286,7 +317,7 @@ class _Surveyor:
             saving = self.trials.saving(trial, timed=timed)
             change = difference(self.order.text.model, trial.model)
             change |= self.trials.state_difference(trial)
-        reader = self.order.readers.noticing((), {items[0].view} - {""}, change)
+        reader = self._noticing((), {items[0].view} - {""}, change)
         finding = Finding(
             kind=kind,
             message=message_of(kind, name_list([item.name for item in items]), len(items)),
@@ -333,15 +364,15 @@ class _Surveyor:
             found.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
         return tuple(found)
 
-    # --- all together
-
     def _without(self, found: Sequence[_Found]) -> PrunedModel | None:
         return self.trials.without([item for one in found for item in one.items])
 
     def _says_otherwise(self, found: Sequence[_Found]) -> str:
         """Who of the course's scripts and labs says something else without all these."""
-        trial = self._without(found)
-        return "" if trial is None else self.order.rerun(self.order.text.files(trial.edits))
+        trial, rerun = self._without(found), self.order.rerun
+        if trial is None or rerun is None:
+            return ""
+        return rerun(self.order.text.files(trial.edits))
 
     def _slim(self, found: Sequence[_Found]) -> tuple[Saving | None, float | None]:
         """What everything found saves: the most that goes together, or the best alone."""
@@ -353,7 +384,7 @@ class _Surveyor:
             return result is not None and result.difference <= allowed
 
         by_time = sorted(found, key=lambda one: -(one.finding.saving.time or 0.0))
-        trial = self._without(largest(by_time, equal)) if found else None
+        trial = self._without(largest_subset(by_time, equal)) if found else None
         result = None if trial is None else self.trials.compare(trial)
         if trial is None or result is None:
             return None, None

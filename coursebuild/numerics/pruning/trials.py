@@ -1,6 +1,6 @@
 """A model without some things: compiled, compared with the whole one, run and timed beside it.
 
-Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest(items, holds)`.
+Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest_subset(items, holds)`.
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from coursebuild.numerics.pruning.edits import (
     drop_attribute,
     drop_numbers,
     emptied,
+    merge_edits,
     remove,
 )
-from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
+from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
 from coursebuild.numerics.pruning.markup import Element
-from coursebuild.numerics.pruning.model_text import ModelText, saved
+from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
 from coursebuild.numerics.reports.diet import Saving
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.timing import Clock, Timing, scenario_job, timed
+from coursebuild.numerics.timing import Clock, Timing, scenario_job, time_jobs
 
 _T = TypeVar("_T")
 _KEY_NUMBERS = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
@@ -38,7 +39,7 @@ _DRAWS = 2
 """Random states in which two models are compared."""
 
 
-def largest(items: Sequence[_T], holds: Callable[[list[_T]], bool]) -> list[_T]:
+def largest_subset(items: Sequence[_T], holds: Callable[[list[_T]], bool]) -> list[_T]:
     """Most of the items for which something holds together, by delta debugging.
 
     All of them are tried first, then halves, each together with what was found before; again, until
@@ -139,7 +140,7 @@ class PruningTrials:
     def saving(self, trial: PrunedModel, *, timed: bool = True) -> Saving:
         """What a change saves, in time and bytes."""
         text = self.bytes_of(trial.edits)
-        memory = len(saved(self.text.model)) - len(saved(trial.model))
+        memory = len(model_bytes(self.text.model)) - len(model_bytes(trial.model))
         timing = self._timing(trial) if timed else None
         if timing is None:
             return Saving(None, None, False, memory, text)
@@ -164,40 +165,24 @@ class PruningTrials:
             scenario_job(trial.model, others, self.scenes[0].own, index["nu"].tolist()),
         )
         with silent():
-            found, own = timed(jobs, 1, self.clock, quick=self.quick)
+            found, own = time_jobs(jobs, 1, self.clock, quick=self.quick)
         return found if min(found.nanoseconds.low, own.nanoseconds.low) > 0 else None
 
 
-def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Gone]:
+def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Removal]:
     """All the edits that items make together, and what they take out of the compiled model."""
     elements = list(dict.fromkeys(one for item in items for one in item.gone))
     below = [one for element in elements for one in element.walk()]
-    gone = Gone(*(text.ids_of(below, kind) for kind in ("body", "geom", "sensor", "actuator")))
+    gone = Removal(*(text.ids_of(below, kind) for kind in ("body", "geom", "sensor", "actuator")))
     drops = [drop for item in items for drop in item.drops]
     edits = [edit for item in items for edit in item.edits]
     edits += remove([*elements, *emptied(drops, edits)])
     edits += [drop_attribute(*drop) for drop in drops]
     edits += _keyframes(text, gone, set(below))
-    return tuple(_outermost(edits)), gone
+    return merge_edits(edits), gone
 
 
-def _outermost(edits: Iterable[ModelEdit]) -> Iterator[ModelEdit]:
-    """Without those inside of what another one takes out."""
-    last: ModelEdit | None = None
-    for edit in sorted(set(edits), key=lambda one: (one.path, one.start, -one.end)):
-        if (
-            last is not None
-            and last.path == edit.path
-            and edit.start < last.end
-            and edit.end <= last.end
-            and not last.new
-        ):
-            continue
-        yield edit
-        last = edit
-
-
-def _keyframes(text: ModelText, gone: Gone, removed: Collection[Element]) -> Iterator[ModelEdit]:
+def _keyframes(text: ModelText, gone: Removal, removed: Collection[Element]) -> Iterator[ModelEdit]:
     """Keyframes list a number for every coordinate: those of what is gone go too."""
     if not (gone.bodies or gone.actuators):
         return

@@ -2,8 +2,8 @@
 
 Entry points: `Reports`, those that a course's pages may show. `bench`: speed against error of a
 model; `sweep`: its parameters at other values; `cases`: the hard cases; `diet`: what a model can be
-without. `records`: reports as files; `departures`: how two differ; `points`: what is shown, and in
-which words; `plot`, `case_plot` and `sweep_plot`: charts. Nothing here measures.
+without. `records`: reports as files; `departures`: how two differ; `text`: what is shown, and in
+which words; `plot` and `sweep_plot`: charts. Nothing here measures.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Record(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Interval(Record, frozen=True):
-    """A figure that comes out otherwise each time, and between what it lies in 95 % of cases."""
+    """A figure that varies from measurement to measurement, and its 95 % interval."""
 
     value: float
     low: float

@@ -27,36 +27,54 @@ class MeasuredSetting(Record, frozen=True):
     cone: str
     """As MJCF names it; empty where nothing can touch."""
 
+    @property
+    def solving(self) -> tuple[str, int, str]:
+        """All but integrator and timestep."""
+        return self.solver, self.iterations, self.cone
 
-class WorkPrecisionRow(Record, frozen=True):
-    """One setting in one scenario. Errors are the largest over the horizon, and at its end."""
 
-    setting: MeasuredSetting
+class Errors(Record, frozen=True):
+    """How far a motion is from its reference: at its largest over the horizon, and at its end.
+
+    `None` for what the motion does not have, and where the run was lost.
+    """
+
+    position: tuple[float, float] | None
+    """m or rad: Euclidean norm over coordinates."""
+    attitude: tuple[float, float] | None
+    """rad: the largest angle of any body."""
+    velocity: tuple[float, float] | None
+    """m/s or rad/s: Euclidean norm."""
+
+
+class MeasuredRun(Errors, frozen=True):
+    """One run against its reference."""
+
     status: str
     """`ok`, `slow-growth`, `diverged` or `reset`."""
     reasons: tuple[str, ...]
     """Why it is not `ok`."""
-    position: tuple[float, float] | None
-    """m or rad; `None` where the run was lost, or the model has none."""
-    attitude: tuple[float, float] | None
-    """rad."""
-    velocity: tuple[float, float] | None
-    """m/s or rad/s."""
-    figure: tuple[float, float] | None
-    """Of what the scenario declares to be measured, in its unit; `None` where it declares none."""
     energy_drift: float | None
     """Relative, with its sign; `None` where energy is not conserved."""
     momentum_drift: float | None
     """Relative; `None` where angular momentum is not conserved."""
     penetration: float
     """Deepest contact, m."""
+    refsafe: bool
+    """Whether constraints were softened because the timestep is long: it is another model."""
+
+
+class WorkPrecisionRow(MeasuredRun, frozen=True):
+    """One setting in one scenario."""
+
+    setting: MeasuredSetting
+    figure: tuple[float, float] | None
+    """Of what the scenario declares to be measured, in its unit; `None` where it declares none."""
     slip: float | None
     """Largest creep of a contact that sticks in the reference, m; `None` without contact."""
     model_error: float | None
     """What remains of the error however small the timestep, in the errors' unit (soft contact, a
     pyramid for a cone): against the closed form; `None` where there is none."""
-    refsafe: bool
-    """Whether constraints were softened because the timestep is long: it is another model."""
     steps: int
     cost: Interval | None
     """Time for the scenario, relative to the scene's own setting; `None` where it was not timed."""
@@ -194,6 +212,11 @@ class ScenarioReport(Record, frozen=True):
     horizons: tuple[float, float] | None = None
     """s: the shortest and the longest of runs whose beginnings were nudged in different ways;
     `None` where the scenario is not chaotic."""
+
+    @property
+    def own(self) -> MeasuredSetting | None:
+        """The scene's own setting; `None` where there are no rows."""
+        return next((row.setting for row in self.rows if row.own), None)
 
 
 class SceneCard(Record, frozen=True):

@@ -1,6 +1,7 @@
 """What was measured on a hard case.
 
-Entry point: `CaseReport`; `merged`, integrators of which the same is said.
+Entry points: `CaseReport`; `merged`, integrators of which the same is said; `course_cases(report)`,
+the hard cases of a course's own: scenarios of models whose exact motion stands in `exact_file`.
 """
 
 from __future__ import annotations
@@ -10,9 +11,18 @@ from collections.abc import Iterable
 from itertools import pairwise
 from typing import TypeAlias
 
+from msgspec.structs import asdict
+
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval, Record
-from coursebuild.numerics.reports.bench import OrderRow, StableRow
+from coursebuild.numerics.reports.bench import (
+    MeasuredRun,
+    OrderRow,
+    ScenarioReport,
+    SceneReport,
+    StableRow,
+    WorkPrecisionRow,
+)
 
 
 class BoundaryLine(StableRow, frozen=True):
@@ -53,27 +63,12 @@ class StepCost(Record, frozen=True):
     """Processor time on the machine of the report."""
 
 
-class ErrorLine(Record, frozen=True):
-    """One run against the reference. Errors are the largest over the duration, and at its end."""
+class ErrorLine(MeasuredRun, frozen=True):
+    """An integrator at a timestep."""
 
     integrator: str
     timestep: float
     """s."""
-    status: str
-    reasons: tuple[str, ...]
-    """Why it is not `ok`."""
-    position: tuple[float, float] | None
-    """m or rad."""
-    attitude: tuple[float, float] | None
-    """rad."""
-    velocity: tuple[float, float] | None
-    """m/s or rad/s."""
-    energy_drift: float | None
-    momentum_drift: float | None
-    penetration: float
-    """m."""
-    refsafe: bool
-    """Whether constraints were softened because the timestep is long: it is another model."""
 
 
 class ReferenceLine(Record, frozen=True):
@@ -143,3 +138,49 @@ def merged(rows: Iterable[tuple[str, Cells]]) -> dict[Cells, str]:
     for integrator, cells in rows:
         together.setdefault(cells, []).append(integrator)
     return {cells: ", ".join(names) for cells, names in together.items()}
+
+
+def exact_file(model: str) -> str:
+    """Where a course says the exact motion of a model, if it knows it."""
+    return f"models/{model}.exact.py"
+
+
+def course_cases(report: SceneReport) -> tuple[CaseReport, ...]:
+    """The scenarios of a model whose exact motion the course says in its `exact.py`."""
+    known = (one for one in report.scenarios if one.source == exact_file(report.model))
+    return tuple(_course_case(report, one) for one in known)
+
+
+def _course_case(report: SceneReport, scenario: ScenarioReport) -> CaseReport:
+    own = scenario.own
+    rows = [row for row in scenario.rows if own and row.setting.solving == own.solving]
+    steps = {
+        row.setting.integrator: row.seconds.scaled(row.setting.timestep)
+        for row in reversed(rows)
+        if row.seconds is not None
+    }
+    floors = scenario.floor, scenario.floor, scenario.velocity_floor
+    return CaseReport(
+        name=f"{report.model}/{scenario.name}",
+        title=f"{report.model}: {scenario.title or scenario.name}",
+        case=0,
+        machine=report.machine,
+        note="; ".join(scenario.notes),
+        reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
+        boundaries=tuple(_boundary(row) for row in scenario.stable),
+        figures=(),
+        orders=scenario.orders,
+        errors=tuple(_error_line(row) for row in rows),
+        costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),
+    )
+
+
+def _boundary(row: StableRow) -> BoundaryLine:
+    return BoundaryLine(
+        **asdict(row), theory=None, formula="", difference=None, beyond="", growth=None
+    )
+
+
+def _error_line(row: WorkPrecisionRow) -> ErrorLine:
+    measured = {name: getattr(row, name) for name in MeasuredRun.__struct_fields__}
+    return ErrorLine(integrator=row.setting.integrator, timestep=row.setting.timestep, **measured)

@@ -201,21 +201,15 @@ def _marks(line: Line, x: Scale, y: Scale) -> Iterator[str]:
 def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
     """At the right, in the order in which the lines end, and none on another."""
     lines = [line for line in chart.lines if line.drawn]
-    ends = sorted(((_place(line.drawn[-1], x, y), line) for line in lines), key=_height)
-    places = apart([_height(end) for end in ends], _NAME, y.end, y.start)
+    ends = [(_place(line.drawn[-1], x, y), line) for line in lines]
+    ends.sort(key=lambda end: end[0][1])
+    places = apart([down for (_, down), _ in ends], _NAME, y.end, y.start)
     for ((across, down), line), at in zip(ends, places, strict=True):
         paint = colour(line.number)
         lead = f"M{across + 5:.1f} {down:.1f}L{x.end + 6:.1f} {at:.1f}"
         yield path(lead, f'stroke="{paint}" stroke-opacity="0.5" stroke-width="0.8"')
         look = f'fill="{paint}" font-weight="600" {FINE} {HALO}'
         yield label(x.end + 9, at + 4, line.name, look)
-
-
-def _height(end: tuple[tuple[float, float], Line]) -> float:
-    return end[0][1]
-
-
-# --- axes
 
 
 def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[str]]:

@@ -12,7 +12,7 @@ Entry points: `scene_departures(recorded, measured, bands)`, `case_departures`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -20,13 +20,13 @@ from msgspec import Struct
 from coursebuild.core.model.scenarios import Bands
 from coursebuild.numerics.reports.bench import (
     FLOORS,
+    MeasuredRun,
     OrderRow,
     ScenarioReport,
     SceneReport,
     StableRow,
-    WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.cases import CaseReport, ErrorLine, FigureLine
+from coursebuild.numerics.reports.cases import CaseReport, FigureLine
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.numerics.reports.text import seconds_text, setting_text, status_text
 
@@ -87,7 +87,10 @@ class _Figure(Struct, frozen=True):
 
 _Figures: TypeAlias = dict[str, _Figure]
 _Table: TypeAlias = dict[tuple[str, str], _Figures]
-"""Figures by what they are of, a setting or an integrator, and by what that is in the report."""
+"""Figures by what they are of, a setting or an integrator, and by what that is in the report; those
+of no setting are of the whole."""
+_Report: TypeAlias = dict[tuple[str, str, str], _Figures]
+"""The same of all scenarios, or hard cases, by their names."""
 
 
 def scene_departures(
@@ -95,41 +98,37 @@ def scene_departures(
 ) -> tuple[Departure, ...]:
     """Everything of a model that left its band, in the order of the recorded report."""
 
-    def tables(report: SceneReport) -> dict[tuple[str, str], _Table]:
-        found = {(one.name, "scenario"): _scenario(one, bands) for one in report.scenarios}
-        return found | {(one.name, "sweep"): _sweep(one, bands) for one in report.sweeps}
+    def figures(report: SceneReport) -> _Report:
+        tables = [(one.name, _scenario(one, bands)) for one in report.scenarios]
+        return _by_name([*tables, *((one.name, _sweep(one, bands)) for one in report.sweeps)])
 
-    return tuple(_departures(tables(recorded), tables(measured)))
+    return tuple(_departures(figures(recorded), figures(measured)))
 
 
 def case_departures(
     recorded: Sequence[CaseReport], measured: Sequence[CaseReport], bands: Bands
 ) -> tuple[Departure, ...]:
     """Everything of the hard cases that left its band, in the order of the recorded report."""
-    old, new = ({(one.name, "case"): _case(one, bands) for one in c} for c in (recorded, measured))
+    old, new = (_by_name((one.name, _case(one, bands)) for one in c) for c in (recorded, measured))
     return tuple(_departures(old, new))
 
 
-def _departures(
-    recorded: Mapping[tuple[str, str], _Table], measured: Mapping[tuple[str, str], _Table]
-) -> Iterator[Departure]:
+def _by_name(tables: Iterable[tuple[str, _Table]]) -> _Report:
+    return {(name, *key): figures for name, table in tables for key, figures in table.items()}
+
+
+def _departures(recorded: _Report, measured: _Report) -> Iterator[Departure]:
     """What is in one only is told, and of what is in both the figures that left their band."""
-    for where, what in {**recorded, **measured}:
-        old, new = recorded.get((where, what)), measured.get((where, what))
-        if old is None or new is None:
-            yield Departure(where, "", what, _there(old), _there(new), "the same")
-            continue
-        for setting, kind in {**old, **new}:
-            before, now = old.get((setting, kind)), new.get((setting, kind))
-            if before is None or now is None:
-                yield Departure(where, setting, kind, _there(before), _there(now), "the same")
-                continue
-            for name, told in _compared(before, now):
+    gone: set[str] = set()
+    for where, setting, kind in {**recorded, **measured}:
+        old, new = (one.get((where, setting, kind)) for one in (recorded, measured))
+        if old is not None and new is not None:
+            for name, told in _compared(old, new):
                 yield Departure(where, setting, name, *told)
-
-
-def _there(value: object) -> str:
-    return "nothing" if value is None else "there"
+        elif where not in gone:
+            before, now = ("nothing" if one is None else "there" for one in (old, new))
+            yield Departure(where, setting, kind, before, now, "the same")
+            gone |= set() if setting else {where}  # its settings go with it
 
 
 def _compared(old: _Figures, new: _Figures) -> Iterator[tuple[str, tuple[str, str, str]]]:
@@ -157,9 +156,6 @@ def _shown(value: float | str | bool | None, band: str) -> str:
     return value or "nothing"
 
 
-# --- runs, orders and limits
-
-
 def _error(name: str, found: tuple[float, float] | None, share: float, least: float) -> _Figures:
     """An error, at its largest and at the end; none is known better than to `least`."""
     if found is None:
@@ -170,9 +166,7 @@ def _error(name: str, found: tuple[float, float] | None, share: float, least: fl
     }
 
 
-def _run(
-    run: WorkPrecisionRow | ErrorLine, share: float, place: float, speed: float, *, known: bool
-) -> _Figures:
+def _run(run: MeasuredRun, share: float, place: float, speed: float, *, known: bool) -> _Figures:
     """What is measured of every run.
 
     `place`, `speed`: what errors of places and velocities are not known better than. `known`:
@@ -206,9 +200,6 @@ def _largest(row: StableRow) -> _Figures:
     }
 
 
-# --- models
-
-
 def _scenario(report: ScenarioReport, bands: Bands) -> _Table:
     share = bands.error
     place, speed = FLOORS * report.floor, FLOORS * report.velocity_floor
@@ -236,7 +227,7 @@ def _scenario(report: ScenarioReport, bands: Bands) -> _Table:
 
 
 def _sweep(sweep: SweepReport, bands: Bands) -> _Table:
-    return {
+    return {("", "sweep"): {}} | {
         (f"{row.parameter} {row.value}", "value"): {
             "status": _Figure(status_text(row.status)),
             **{
@@ -249,13 +240,10 @@ def _sweep(sweep: SweepReport, bands: Bands) -> _Table:
     }
 
 
-# --- hard cases
-
-
 def _case(case: CaseReport, bands: Bands) -> _Table:
     known, share = case.reference, bands.error
     place, speed = FLOORS * max(known.position, known.attitude), FLOORS * known.velocity
-    found: _Table = {}
+    found: _Table = {("", "case"): {}}
     for line in case.boundaries:
         figures = _largest(line) | {"beyond": _Figure(status_text(line.beyond))}
         if line.monotone:

@@ -1,6 +1,7 @@
-"""The work–precision plot of a scenario as SVG: error against cost.
+"""The work–precision plot of a scenario or a hard case as SVG: error against cost.
 
-Entry points: `plot_svg(report, …)`; `work_precision(report)`, what it shows.
+Entry points: `plot_svg(report, …)`; `work_precision(report)`, what it shows; of a hard case
+`case_quantities(report)`, what can be drawn, and `case_svg(report, quantity, name)`.
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
    scene's own solver, iterations and cone; the rows with others are small marks beside it.
@@ -16,18 +17,18 @@ import statistics
 from collections.abc import Iterator, Sequence
 
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
-from coursebuild.numerics.reports.chart import NARROW, WIDE, Chart, Line, Point, chart_svg
+from coursebuild.numerics.reports.bench import FLOORS, ScenarioReport, WorkPrecisionRow
+from coursebuild.numerics.reports.cases import CaseReport
+from coursebuild.numerics.reports.chart import BESIDE, NARROW, WIDE, Chart, Line, Point, chart_svg
 from coursebuild.numerics.reports.strokes import Entry
 from coursebuild.numerics.reports.text import (
     KNOWN,
     Quantity,
     interval_text,
+    seconds_text,
     setting_text,
-    solving,
     status_text,
     telling,
-    usual_setting,
 )
 
 
@@ -75,7 +76,7 @@ def _line(
     name: str,
 ) -> Line:
     """The rows of an integrator."""
-    usual = usual_setting(report.rows)
+    own = report.own
     points = []
     rows = [row for row in report.rows if row.setting.integrator == name]
     for row in sorted(rows, key=lambda row: -row.setting.timestep):
@@ -86,7 +87,7 @@ def _line(
                 error,
                 " · ".join(_told(report, row, error, timed=bool(timed))),
                 full=row.front,
-                small=usual is not None and solving(row.setting) != solving(usual),
+                small=own is not None and row.setting.solving != own.solving,
                 ringed=row.own,
             )
         )
@@ -118,9 +119,6 @@ def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
             yield Entry("own", f"the scene’s own: {setting_text(row.setting, row.setting)}")
     if len(drawn) < len(points):
         yield Entry("lost", "run lost")
-
-
-# --- the plot in words
 
 
 def _said(report: ScenarioReport, quantity: Quantity, lines: Sequence[Line]) -> Iterator[str]:
@@ -169,3 +167,54 @@ def _told(
     elif row.dominated_by is not None and 0 <= row.dominated_by < len(report.rows):
         better = setting_text(report.rows[row.dominated_by].setting, row.setting)
         yield f"{better} is better"
+
+
+def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
+    """The error that says most, and energy drift where energy is conserved."""
+    known = report.reference
+    errors = (
+        Quantity("position", "error of position (m or rad)", FLOORS * known.position),
+        Quantity("attitude", "error of attitude (rad)", FLOORS * known.attitude),
+        Quantity("velocity", "error of velocity (m/s or rad/s)", FLOORS * known.velocity),
+    )
+    drift = Quantity("energy_drift", "energy drift, relative")
+    runs = [line for line in report.errors if line.status == "ok"]
+    return (*[one for one in errors if one.tells(runs)][:1], *[drift] * drift.tells(runs))
+
+
+def case_svg(report: CaseReport, quantity: Quantity, name: str) -> str:
+    """The plot as an `svg` element; empty where nothing was timed.
+
+    `name` is unlike those of all other plots on the page.
+    """
+    lines = tuple(
+        Line(integrator, number, tuple(points))
+        for number, integrator in enumerate(KNOWN)
+        if (points := [*_case_points(report, quantity, integrator)])
+    )
+    chart = Chart(
+        title=f"{report.title}: {quantity.label} against processor time",
+        text=" ".join(_case_range(line) for line in lines if line.drawn),
+        axes=("processor time for a simulated second (s)", quantity.label),
+        lines=lines,
+        least=quantity.least,
+    )
+    return chart_svg(chart, name, BESIDE)
+
+
+def _case_points(report: CaseReport, quantity: Quantity, integrator: str) -> Iterator[Point]:
+    """By timestep; without runs of which nothing is off, for which there is no place."""
+    for run in report.errors:
+        cost = report.cost(run)
+        if run.integrator != integrator or cost is None:
+            continue
+        if run.status != "ok":
+            told = f"{integrator} at {seconds_text(run.timestep)}: {status_text(run.status)}"
+            yield Point(cost, None, told)
+        elif error := quantity.of(run):
+            yield Point(cost, error, f"{integrator}: {error:.3g} at {seconds_text(cost.value, 3)}")
+
+
+def _case_range(line: Line) -> str:
+    (x0, y0), *_, (x1, y1) = [(p.x.value, p.y) for p in (*line.drawn, line.drawn[-1])]
+    return f"{line.name}: {y0:.2g} at {seconds_text(x0, 2)}, {y1:.2g} at {seconds_text(x1, 2)}."

@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -32,11 +33,7 @@ _T = TypeVar("_T")
 
 
 class RecordError(Exception):
-    """A file is no report that can be used; `message` says why, without the file's name."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(message)
-        self.message = message
+    """Why a file is no report that can be used, without the file's name."""
 
 
 class ReportFailure(Struct, frozen=True):
@@ -88,7 +85,7 @@ class ReportKind(Struct, Generic[_T], frozen=True):
         return report
 
 
-def _other(kind: str, report: SceneReport | DietReport, model: str) -> str:
+def _model_flaw(kind: str, report: SceneReport | DietReport, model: str) -> str:
     """Why a report is not the whole one of a model; empty where it is, or none is named."""
     if model and report.model != model:
         return f"holds a report of the model `{report.model}`"
@@ -105,7 +102,7 @@ def _scene_flaw(report: SceneReport, model: str) -> str:
         pointed = [row.dominated_by for row in scenario.rows] + [scenario.verdict.better]
         if not all(0 <= at < len(scenario.rows) for at in pointed if at is not None):
             return f"points at a row that scenario `{scenario.name}` does not have"
-    return _other("bench", report, model)
+    return _model_flaw("bench", report, model)
 
 
 def _case_flaw(cases: tuple[CaseReport, ...], _: str) -> str:
@@ -114,15 +111,10 @@ def _case_flaw(cases: tuple[CaseReport, ...], _: str) -> str:
 
 
 BENCH = ReportKind("bench", "scene", SceneReport, ".bench.json", _scene_flaw)
-DIET = ReportKind(
-    "diet", "diet", DietReport, ".diet.json", lambda report, model: _other("diet", report, model)
-)
+DIET = ReportKind("diet", "diet", DietReport, ".diet.json", partial(_model_flaw, "diet"))
 STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
     "stability", "cases", tuple[CaseReport, ...], ".json", _case_flaw
 )
-
-
-# --- reading
 
 
 def _decoded(data: bytes, holds: str, kind: type[_T]) -> _T:
@@ -138,9 +130,6 @@ def _decoded(data: bytes, holds: str, kind: type[_T]) -> _T:
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         text = str(error).replace("JSON is malformed", "no JSON")
         raise RecordError(f"is damaged: {text[:1].lower()}{text[1:]}") from None
-
-
-# --- writing
 
 
 def _text(value: Any, indent: int, lists: int) -> str:

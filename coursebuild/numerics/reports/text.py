@@ -6,18 +6,12 @@ Entry points: `quantities(report)`, `telling`; `setting_text`, `seconds_text`, `
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from msgspec import Struct
 
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import (
-    FLOORS,
-    MeasuredSetting,
-    ScenarioReport,
-    WorkPrecisionRow,
-)
-from coursebuild.numerics.reports.cases import ErrorLine
+from coursebuild.numerics.reports.bench import FLOORS, MeasuredRun, MeasuredSetting, ScenarioReport
 
 KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are told, and keep their colour and mark."""
@@ -35,13 +29,13 @@ class Quantity(Struct, frozen=True):
     least: float = 0.0
     """Nothing below is known."""
 
-    def of(self, row: WorkPrecisionRow | ErrorLine) -> float | None:
+    def of(self, row: MeasuredRun) -> float | None:
         """The largest over the horizon; `None` where the row has none."""
         found: tuple[float, float] | float | None = getattr(row, self.name)
         value = found[0] if isinstance(found, tuple) else found
         return None if value is None or not math.isfinite(value) else abs(value)
 
-    def tells(self, rows: Iterable[WorkPrecisionRow | ErrorLine]) -> bool:
+    def tells(self, rows: Iterable[MeasuredRun]) -> bool:
         """Whether any of the rows has more than what is not known."""
         found = (self.of(row) for row in rows)
         return any(one is not None and one > self.least * (1 + 1e-9) for one in found)
@@ -72,16 +66,6 @@ def is_cut_short(report: ScenarioReport) -> bool:
     """Whether it is the duration that ended the search for stable timesteps."""
     longest = report.duration / FEWEST_STEPS
     return any(math.isclose(one.searched[1], longest, rel_tol=1e-9) for one in report.stable)
-
-
-def solving(setting: MeasuredSetting) -> tuple[str, int, str]:
-    """All of a setting but integrator and timestep."""
-    return setting.solver, setting.iterations, setting.cone
-
-
-def usual_setting(rows: Sequence[WorkPrecisionRow]) -> MeasuredSetting | None:
-    """The scene's own; `None` where there are no rows."""
-    return next((row.setting for row in rows if row.own), None)
 
 
 def seconds_text(value: float, digits: int = 6) -> str:

@@ -94,9 +94,6 @@ def test_names_cannot_change_the_terminal() -> None:
     assert "名前" in text
 
 
-# --- tables
-
-
 def test_a_table_keeps_what_has_room() -> None:
     columns = [
         Column("name", ("a", "bb"), 0, left=True),
@@ -123,9 +120,6 @@ def test_wide_characters_take_two_cells() -> None:
     ]
 
 
-# --- JSON
-
-
 @given(value=st.floats())
 def test_json_has_no_number_that_is_none(value: float) -> None:
     odd = replace(row(), position=(value, value), cost=Interval(value, value, value), growth=value)
@@ -134,8 +128,6 @@ def test_json_has_no_number_that_is_none(value: float) -> None:
     (told,) = json.loads(text)["scenes"][0]["scenarios"][0]["rows"]
     assert told["growth"] == (value if math.isfinite(value) else None)
 
-
-# --- what was recorded
 
 CHECKED = Checked(
     "arm",

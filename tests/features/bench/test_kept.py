@@ -27,9 +27,6 @@ def course(tmp_path: Path) -> Path:
     return bench_course(tmp_path)
 
 
-# --- which
-
-
 def test_bench_measures_every_model_that_is_no_part_of_another(course: Path) -> None:
     write(course / "models" / "arms" / "left arm.xml", BOX)
     write(course / "models" / "part.xml", "<mujocoinclude/>")
@@ -68,9 +65,6 @@ def test_a_scenario_that_cannot_be_measured_is_told(course: Path) -> None:
     wrong = diagnose("scenario-model", scene.model.source.span(0, 0), "no way")
     found = bench(options(course), ("box",), measuring=Fake(swing(), wrong))
     assert found.reports == () and [d.message for d in found.diagnostics] == ["no way"]
-
-
-# --- what is kept
 
 
 def test_model_is_measured_again_only_where_something_changed(course: Path) -> None:

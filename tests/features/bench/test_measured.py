@@ -7,18 +7,11 @@ import re
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.features.bench.figures import (
-    bounded,
-    factor,
-    percent,
-    power,
-    sentence,
-    size,
-)
+from coursebuild.features.bench.figures import bounded, factor, percent, power, sentence, size
 from coursebuild.numerics.reports import Interval, Reports
-from coursebuild.numerics.reports.cases import ErrorLine, StepCost
+from coursebuild.numerics.reports.cases import StepCost
 from support.bench_reports import awkward, swing
-from support.model_reports import box, case, diet, reports, row, scenario, scene
+from support.model_reports import box, case, diet, reports, row, run, scenario, scene
 from support.rendered_course import Make
 
 
@@ -200,11 +193,11 @@ def test_the_page_begins_with_a_matrix_of_cases_and_integrators(site: dict[str, 
 
 def test_errors_and_energy_are_drawn_against_processor_time(make: Make) -> None:
     runs = [
-        ErrorLine(name, h, "ok", (), (h**power, h**power), None, None, -(h**2), None, 0.0, False)
+        run(integrator=name, timestep=h, position=(h**power, h**power), energy_drift=-(h**2))
         for name, power in (("Euler", 1), ("RK4", 4))
         for h in (0.1, 0.05, 0.025)
     ]
-    lost = ErrorLine("Euler", 0.2, "diverged", (), None, None, None, None, None, 0.0, False)
+    lost = run(timestep=0.2, status="diverged")
     costs = tuple(StepCost(name, Interval(1e-6, 9e-7, 2e-6)) for name in ("Euler", "RK4"))
     found = Reports(cases=(case("a", 4, errors=(lost, *runs), costs=costs),))
     page = pages(make, found)["numerics/index.html"]

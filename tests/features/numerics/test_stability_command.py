@@ -1,4 +1,4 @@
-"""`coursebuild stability`."""
+"""`coursebuild stability`, with `--record` and `--check`."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.cli import main
+from coursebuild.numerics.problems import all_problems, projectile
+from coursebuild.numerics.reports.records import STABILITY
 
 pytestmark = pytest.mark.site
 
@@ -19,6 +22,14 @@ def course(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def run(course: Path, *arguments: str) -> int:
+    return main(["-C", str(course), "stability", *arguments, "-q"])
+
+
+def names(course: Path) -> list[str]:
+    return [case.name for case in STABILITY.decode((course / STABILITY.path()).read_bytes())]
+
+
 def test_stability_prints_text_and_then_json_without_measuring_again(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -28,7 +39,7 @@ def test_stability_prints_text_and_then_json_without_measuring_again(
     assert "\n  References: x = v₀t + gt²/2; MuJoCo’s accelerations over the MJCF, DOP853.\n" in out
     assert "−0.049" in out
     assert "projectile: measured after" in err
-    assert main(["-C", str(course), "stability", "projectile", "--format", "json", "-q"]) == 0
+    assert run(course, "projectile", "--format", "json") == 0
     out, err = capsys.readouterr()
     assert err == ""
     (report,) = json.loads(out)
@@ -53,7 +64,94 @@ def test_stability_of_a_family_and_of_an_unknown_case(
     assert said.startswith(
         "coursebuild: no hard case is called `nope`; known: tumbling-box, pendulum-hinge-90, "
     )
-    assert main(["-C", str(course), "stability", "flat", "millimetre", "-q"]) == 0
+    assert run(course, "flat", "millimetre") == 0
     out = capsys.readouterr().out
     heads = [line.split()[0] for line in out.splitlines() if line[:1] not in (" ", "")]
     assert heads == ["millimetre-cube", "flat-plate"]
+
+
+def test_recorded_then_checked(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(course, "projectile", "--record") == 0
+    out = capsys.readouterr().out
+    assert out.startswith("projectile  case 4: Projectile\n")
+    assert out.endswith(f"\nwrote {STABILITY.path()}\n")
+    assert run(course, "projectile", "--check") == 0
+    assert capsys.readouterr().out == f"stability  as recorded in {STABILITY.path()}\n"
+    assert run(course, "projectile", "--record") == 0
+    assert capsys.readouterr().out.endswith(f"\n{STABILITY.path()} is as it was\n")
+
+
+def test_references_that_differ_are_an_error_and_nothing_is_recorded(
+    course: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a constant that somebody mistyped: here the stone is thrown 1e-6 too fast."""
+    thrown = replace(projectile.PARABOLA, launch=(3.000003, 0.0, 4.0))
+    monkeypatch.setattr(projectile, "PARABOLA", thrown)
+    all_problems.cache_clear()
+    try:
+        for arguments in (["--record"], ["--format", "json"]):
+            assert run(course, "projectile", *arguments) == 1
+            out = capsys.readouterr().out
+            assert "the references of `projectile` differ by 3e-06 in position" in out
+    finally:
+        all_problems.cache_clear()
+    assert not (course / STABILITY.path()).exists()
+
+
+def test_recording_some_cases_leaves_the_others(course: Path) -> None:
+    run(course, "flat-plate", "--record")
+    before = (course / STABILITY.path()).read_bytes()
+    assert run(course, "projectile", "--record") == 0
+    assert names(course) == ["projectile", "flat-plate"]
+    path = course / STABILITY.path()
+    old = replace(STABILITY.decode(before)[0], name="no-more")
+    path.write_bytes(STABILITY.encode((old,)))
+    assert run(course, "projectile", "--record") == 0
+    assert names(course) == ["projectile"]
+
+
+def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run(course, "projectile", "--record")
+    path = course / STABILITY.path()
+    (case,) = STABILITY.decode(path.read_bytes())
+    wrong = tuple(
+        replace(line, measured=-0.06) if line.integrator == "Euler" else line
+        for line in case.figures
+    )
+    other = replace(case, machine=replace(case.machine, engine="3.7.0"), figures=wrong)
+    path.write_bytes(STABILITY.encode((other,)))
+    capsys.readouterr()
+    assert run(course, "projectile", "--check") == 1
+    head, remark, _, name, _, figure = capsys.readouterr().out.splitlines()
+    assert head == f"stability  1 figure not as recorded in {STABILITY.path()}"
+    assert remark.startswith("  recorded with MuJoCo 3.7.0, measured with ")
+    assert name == "  projectile"
+    assert figure.startswith(
+        "    Euler    error of the height after 1 s at 10 ms, against theory  -0.01095  "
+    )
+    assert run(course, "projectile", "--check", "--format", "json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert sorted(found) == ["cases", "checked", "diagnostics", "failures", "remarks"]
+    (departure,) = found["checked"][0]["departures"]
+    assert departure["recorded"] == "-0.01095"
+
+
+def test_where_there_is_no_report_or_a_damaged_one(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(course, "--check") == 1
+    assert capsys.readouterr().out == (
+        f"error: {STABILITY.path()} is not there\n"
+        "  help: make it with `coursebuild stability --record`, and commit it\n"
+    )
+    path = course / STABILITY.path()
+    path.parent.mkdir()
+    path.write_bytes(b"{}")
+    assert run(course, "--check") == 1
+    assert capsys.readouterr().out == (
+        f"error: {STABILITY.path()} holds no report of `coursebuild stability`\n"
+        "  help: make it again with `coursebuild stability --record`\n"
+    )
+    assert run(course, "projectile", "--record") == 1
+    assert "holds no report of" in capsys.readouterr().out
+    assert path.read_bytes() == b"{}"

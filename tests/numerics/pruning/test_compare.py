@@ -11,11 +11,8 @@ import numpy as np
 from coursebuild.core.model.scenarios import Visible
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.compare import (
-    compare,
-    pruning_scenes,
-)
-from coursebuild.numerics.pruning.index_map import Gone, IndexMap, fits, index_map, transfer
+from coursebuild.numerics.pruning.compare import compare, pruning_scenes
+from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
 from support.surveys import declared
 
@@ -37,7 +34,7 @@ def double(mass: float = 1.0) -> Any:
 
 
 def same(model: Any) -> IndexMap:
-    return index_map(model, Gone())
+    return index_map(model, Removal())
 
 
 def test_chaos_is_no_difference() -> None:
@@ -85,7 +82,7 @@ def test_a_state_is_brought_over() -> None:
     model, spec = mujoco.MjModel.from_xml_string(FULL), mujoco.MjSpec.from_string(FULL)
     spec.delete(spec.body("a"))
     other = spec.compile()
-    left = index_map(model, Gone(frozenset({model.body("a").id})))
+    left = index_map(model, Removal(frozenset({model.body("a").id})))
     assert fits(left, model, other)
     data, into = mujoco.MjData(model), mujoco.MjData(other)
     data.qpos[:], data.qvel[:] = range(12), range(10)

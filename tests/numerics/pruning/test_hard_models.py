@@ -41,11 +41,11 @@ def whole(files: str | Mapping[str, str | bytes], *, lesson: str = "") -> tuple[
     first: Survey | None = None
     now = dict(before)
     for _ in range(6):
-        model, survey = tried(now, lesson=lesson, quick=False)
+        survey = tried(now, lesson=lesson, quick=False)
         first = first or survey
         if not survey.edits:
             break
-        now |= model.files(survey.edits)
+        now |= survey.text.files(survey.edits)
     else:
         raise AssertionError("there is always something left")
     old, new = opened(before).model, opened(now).model
@@ -75,14 +75,14 @@ def test_includes_are_changed_where_they_stand() -> None:
 </mujocoinclude>""",
         "models/parts/sensors.xml": "<x>\n<sensor>\n  <clock/>\n</sensor>\n</x>\n",
     }
-    model, survey = tried(files)
+    survey = tried(files)
     assert set(found(survey)) >= {"sensor-unread", "unused-site", "unused-default"}
     assert [place.path for place in found(survey)["sensor-unread"].places] == [
         "models/parts/sensors.xml"
     ]
-    assert fixed(model, survey, "models/parts/sensors.xml") == files["models/parts/sensors.xml"]
-    assert '<include file="parts/sensors.xml"/>' not in fixed(model, survey, "models/parts/arm.xml")
-    main = fixed(model, survey)
+    assert fixed(survey, "models/parts/sensors.xml") == files["models/parts/sensors.xml"]
+    assert '<include file="parts/sensors.xml"/>' not in fixed(survey, "models/parts/arm.xml")
+    main = fixed(survey)
     assert main.count("\r\n") == main.count("\n") == 5 and "idle" not in main
     whole(files)
 
@@ -200,9 +200,9 @@ def test_an_attached_model_is_a_model_of_its_own() -> None:
   <joint name="knee" axis="0 1 0"/><geom size=".05" pos=".2 0 0"/><site name="idle"/>
   </body></worldbody><sensor><jointpos joint="knee"/></sensor></mujoco>""",
     }
-    model, survey = tried(files)
+    survey = tried(files)
     assert set(found(survey)) == {"unused-model"}
-    assert 'name="spare"' not in fixed(model, survey)
+    assert 'name="spare"' not in fixed(survey)
     whole(files)
 
 
@@ -283,9 +283,9 @@ def test_random_models_move_as_before() -> None:
     for seed in range(4):
         text = random_model(np.random.default_rng(seed))
         survey, left = whole(text, lesson='data.actuator("drive")' if seed % 2 else "")
-        if survey.seen[0].judgement.ok:
+        if survey.report.scenarios[0].status == "ok":
             assert "c1" not in left and "m1" not in left, seed
         else:
             assert left == text, seed
-        for finding in survey.findings:
+        for finding in survey.report.findings:
             assert finding.label == PROVED or not finding.fixable, seed

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.numerics.pruning.edits import (
-    ModelEdit,
-    apply_edits,
-    drop_numbers,
-    remove,
-)
+from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, drop_numbers, remove
 from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup
 
 
@@ -126,5 +121,5 @@ def test_edits_that_contradict_each_other_are_refused() -> None:
     edits = (ModelEdit("a", 0, 4, b"x"), ModelEdit("a", 2, 6, b"y"))
     with pytest.raises(ValueError, match="two changes overlap at byte 2 of a"):
         apply_edits(b"0123456789", edits)
-    inside = (ModelEdit("a", 2, 6, b""), ModelEdit("a", 3, 4, b"y"))
-    assert apply_edits(b"0123456789", inside) == b"016789"
+    inside = (ModelEdit("a", 2, 6, b""), ModelEdit("a", 3, 4, b"y"), ModelEdit("a", 6, 7, b""))
+    assert apply_edits(b"0123456789", inside) == b"01789"

@@ -9,8 +9,6 @@ import pytest
 from coursebuild.numerics.reports.diet import PROVED, SAME
 from support.surveys import PENDULUM, field, fixed, found, names, scene, tried
 
-# ------------------------------------------------------------------------------ what takes part
-
 
 def test_actuators_that_nobody_commands() -> None:
     rest = """<actuator>
@@ -20,20 +18,20 @@ def test_actuators_that_nobody_commands() -> None:
   </actuator>
   <keyframe><key name="up" qpos="1" ctrl="0 0 0"/></keyframe>"""
     clock = itertools.count(step=10**6).__next__
-    model, survey = tried(scene(rest=rest), clock=clock)
+    survey = tried(scene(rest=rest), clock=clock)
     finding = found(survey)["actuator-idle"]
     assert names(finding) == ["push"] and finding.label == PROVED
     assert finding.saving.time == 1.0
-    assert '<key name="up" qpos="1" ctrl="0 0"/>' in fixed(model, survey)
+    assert '<key name="up" qpos="1" ctrl="0 0"/>' in fixed(survey)
 
 
 def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> None:
     rest = '<actuator><motor name="push" joint="pivot"/></actuator>'
-    model, survey = tried(scene(rest=rest), has_commands=True)
+    survey = tried(scene(rest=rest), has_commands=True)
     finding = found(survey)["actuator-idle"]
     assert finding.counts and not finding.fixable
     assert finding.unfixed.startswith("scenarios give commands by number")
-    assert fixed(model, survey) == scene(rest=rest)
+    assert fixed(survey) == scene(rest=rest)
 
 
 def test_tendons_along_which_nothing_acts() -> None:
@@ -46,38 +44,35 @@ def test_tendons_along_which_nothing_acts() -> None:
     <fixed><joint joint="pivot" coef="2"/></fixed>
   </tendon>
   <actuator><motor name="m" tendon="pull"/></actuator>"""
-    model, survey = tried(scene(rest=rest), lesson='data.ctrl[0]; data.tendon("measured").J')
+    survey = tried(scene(rest=rest), lesson='data.ctrl[0]; data.tendon("measured").J')
     assert names(found(survey)["tendon-idle"]) == ["lazy", "mujoco/tendon/fixed[6]"]
-    left = fixed(model, survey)
+    left = fixed(survey)
     assert left.count("<fixed") == 4 and "lazy" not in left
-    _, survey = tried(scene(rest=rest), lesson="data.ctrl[0]; data.ten_length[4]")
-    assert survey.findings == ()
-
-
-# ------------------------------------------------------------------------------------ contact
+    survey = tried(scene(rest=rest), lesson="data.ctrl[0]; data.ten_length[4]")
+    assert survey.report.findings == ()
 
 
 def test_contact_is_off_where_nothing_can_touch() -> None:
     world = PENDULUM + '<geom name="far" size=".1" pos="0 0 2"/>'
-    model, survey = tried(scene(world))
+    survey = tried(scene(world))
     finding = found(survey)["contact-off"]
     assert finding.label == PROVED and finding.proof.startswith("no two geoms can meet")
-    left = fixed(model, survey)
+    left = fixed(survey)
     assert '<option><flag contact="disable"/></option>' in left
-    assert tried(left)[1].edits == ()
+    assert tried(left).edits == ()
 
 
 def test_what_only_did_not_touch_is_told_and_left() -> None:
     world = PENDULUM + '<geom name="near" size=".1" pos="0 0 1.35"/>'
-    model, survey = tried(scene(world))
+    survey = tried(scene(world))
     finding = found(survey)["contact-idle"]
     assert finding.label == SAME and not finding.fixable and not finding.counts
-    assert fixed(model, survey) == scene(world)
+    assert fixed(survey) == scene(world)
 
 
 def test_a_lesson_that_moves_geoms_takes_the_proof_away() -> None:
     world = PENDULUM + '<geom name="far" size=".1" pos="0 0 2"/>'
-    _, survey = tried(scene(world), lesson="model.geom_pos[1] = 0")
+    survey = tried(scene(world), lesson="model.geom_pos[1] = 0")
     assert found(survey)["contact-idle"].label == SAME
 
 
@@ -88,16 +83,13 @@ def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
       <geom name="s" size=".1" pos="1 0 0"/></body>
     <body name="near" pos="1.5 0 .15"><joint axis="0 1 0"/>
       <geom name="n" size=".1" pos=".2 0 0"/></body>"""
-    model, survey = tried(scene(world))
+    survey = tried(scene(world))
     finding = found(survey)["collision-unreachable"]
     assert names(finding) == ["lamp", "s"] and finding.label == PROVED
-    left = fixed(model, survey)
+    left = fixed(survey)
     assert '<geom name="lamp" size=".1" pos="0 0 9" contype="0" conaffinity="0"/>' in left
     assert '<geom name="n" size=".1" pos=".2 0 0"/>' in left
-    assert "collision-unreachable" not in found(tried(left)[1])
-
-
-# --------------------------------------------------------------------------------- far things
+    assert "collision-unreachable" not in found(tried(left))
 
 
 @pytest.mark.site
@@ -106,19 +98,19 @@ def test_all_of_a_field_of_rubble_goes_and_the_arm_stays() -> None:
     posts = "".join(
         f'<geom type="cylinder" size=".05 1" pos="{40 + i % 10} {i // 10} 1"/>' for i in range(60)
     )
-    model, survey = tried(field(3, 40).replace("</worldbody>", posts + "</worldbody>"))
+    survey = tried(field(3, 40).replace("</worldbody>", posts + "</worldbody>"))
     far = found(survey)["far-body"]
     assert len(names(far)) == 40 and far.label == SAME and far.difference < 1e-9
     assert not far.fixable and not far.counts and far.doubt == ""
     posts = {f"mujoco/worldbody/geom[{number}]" for number in range(2, 62)}
     assert set(names(found(survey)["collision-idle"])) >= posts
-    assert fixed(model, survey).count("<freejoint/>") == 40
-    _, survey = tried(field(3, 2), lesson="import mujoco\nprint(data.qpos[0])")
+    assert fixed(survey).count("<freejoint/>") == 40
+    survey = tried(field(3, 2), lesson="import mujoco\nprint(data.qpos[0])")
     assert found(survey)["far-body"].doubt == "examples/a.py may notice"
 
 
 def far(world: str, *, lesson: str = "", rest: str = "") -> list[str]:
-    finding = found(tried(scene(world, rest=rest), lesson=lesson)[1]).get("far-body")
+    finding = found(tried(scene(world, rest=rest), lesson=lesson)).get("far-body")
     return [] if finding is None else names(finding)
 
 

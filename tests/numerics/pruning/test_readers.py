@@ -74,13 +74,14 @@ HOSTILE = {
 
 @pytest.mark.site
 def test_no_hostile_script_loses_a_part() -> None:
-    whole = {one.kind: names(one) for one in tried(MODEL, declared=GO)[1].findings if one.fixable}
+    findings = tried(MODEL, declared=GO).report.findings
+    whole = {one.kind: names(one) for one in findings if one.fixable}
     lost = []
     for title, (part, script) in HOSTILE.items():
         kind, _, name = part.partition(" ")
         assert any(kind in one for one in whole), kind
-        _, survey = tried(MODEL, lesson=HEAD + script, declared=GO)
-        counted = [one for one in survey.findings if one.counts and kind in one.kind]
+        survey = tried(MODEL, lesson=HEAD + script, declared=GO)
+        counted = [one for one in survey.report.findings if one.counts and kind in one.kind]
         lost += [(title, one.kind) for one in counted if not name or name in names(one)]
     assert lost == []
 
@@ -96,8 +97,8 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
         mujoco.mj_resetDataKeyframe(model, data, model.key("down").id)
         print("the spare cube and spin are in the prose only")
     """)
-    _, survey = tried(MODEL, lesson=HEAD + script, declared=GO)
-    found = {one.kind: names(one) for one in survey.findings if one.counts}
+    survey = tried(MODEL, lesson=HEAD + script, declared=GO)
+    found = {one.kind: names(one) for one in survey.report.findings if one.counts}
     assert found.pop("contact-off") == []
     assert found == {
         "energy-flag": ["energy"],

@@ -7,20 +7,16 @@ import time
 
 import pytest
 
-from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.reports.diet import PROVED
 from support.surveys import PATH, PENDULUM, field, fixed, found, names, scene, tried
 
 
 @pytest.mark.parametrize("world", ["", "<!-- nothing -->", "<geom size='1'/>"])
 def test_nothing_that_moves(world: str) -> None:
-    _, survey = tried(scene(world))
-    assert survey.findings == ()
-    _, survey = tried("<mujoco/>")
-    assert survey.findings == ()
-
-
-# ---------------------------------------------------------------------------- things of no use
+    survey = tried(scene(world))
+    assert survey.report.findings == ()
+    survey = tried("<mujoco/>")
+    assert survey.report.findings == ()
 
 
 ASSETS = """<asset>
@@ -38,7 +34,7 @@ SHOWN = """<geom type="mesh" mesh="used" material="table" mass="0"/>"""
 
 def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
     text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
-    model, survey = tried(text)
+    survey = tried(text)
     seen = found(survey)
     assert {kind: names(one) for kind, one in seen.items()} == {
         "unused-material": ["curtain"],
@@ -48,21 +44,21 @@ def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
     }
     assert all(one.label == PROVED and one.fixable for one in seen.values())
     assert seen["unused-texture"].saving.text > 50 and seen["unused-mesh"].saving.memory > 100
-    left = fixed(model, survey)
+    left = fixed(survey)
     for gone in ("curtain", "cloth", "ünüsed", "hill"):
         assert gone not in left
     assert len(left.splitlines()) == len(text.splitlines()) - 4
-    again, second = tried(left)
-    assert second.findings == () and fixed(again, second) == left
+    second = tried(left)
+    assert second.report.findings == () and fixed(second) == left
 
 
 def test_a_texture_of_a_kept_material_is_used() -> None:
     text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
-    _, survey = tried(text, keeps={"unused-material curtain": "for the next lesson"})
+    survey = tried(text, keeps={"unused-material curtain": "for the next lesson"})
     seen = found(survey)
     assert seen["unused-material"].kept == "for the next lesson"
     assert not seen["unused-material"].fixable and not seen["unused-material"].counts
-    assert "unused-texture" not in seen and survey.stale == ()
+    assert "unused-texture" not in seen and survey.report.stale == ()
 
 
 def test_an_asset_is_called_after_its_file() -> None:
@@ -70,7 +66,7 @@ def test_an_asset_is_called_after_its_file() -> None:
     head = '<asset><mesh file="one.obj"/><mesh file="two.obj"/></asset>'
     world = PENDULUM.replace("</body>", '<geom type="mesh" mesh="one" mass="0"/></body>')
     files = {PATH: scene(world, head=head), "models/one.obj": mesh, "models/two.obj": mesh}
-    _, survey = tried(files)
+    survey = tried(files)
     assert names(found(survey)["unused-mesh"]) == ["two"]
 
 
@@ -85,12 +81,12 @@ def test_classes_that_no_element_is_of() -> None:
     </default> <!-- said of it -->
     <default class="read"/>
   </default>"""
-    model, survey = tried(
+    survey = tried(
         scene(PENDULUM.replace('name="ball"', 'name="ball" class="inner"'), head=head),
         lesson='show("read")',
     )
     assert names(found(survey)["unused-default"]) == ["idle"]
-    left = fixed(model, survey)
+    left = fixed(survey)
     assert "<!-- for later -->\n    <!-- said of it -->\n" in left
     assert "idle" not in left and 'class="outer"' in left and 'class="read"' in left
 
@@ -107,7 +103,7 @@ TENDON = """<tendon><spatial stiffness="1"><site site="held"/><site site="end"/>
 
 def test_sites_and_sensors() -> None:
     """Those of a tendon stay; one that only an unread sensor needs goes with it."""
-    model, survey = tried(scene(SITES, rest=TENDON), lesson='print(data.site("read").xpos)')
+    survey = tried(scene(SITES, rest=TENDON), lesson='print(data.site("read").xpos)')
     seen = found(survey)
     assert names(seen["sensor-unread"]) == ["mujoco/sensor/framepos"]
     assert names(seen["unused-site"]) == [
@@ -115,10 +111,10 @@ def test_sites_and_sensors() -> None:
         "idle",
         "sensed",
     ]
-    left = fixed(model, survey)
+    left = fixed(survey)
     assert '<site name="held"/><site name="read"/>\n' in left
     assert "<sensor>" not in left and '"end"' in left
-    assert tried(left, lesson='print(data.site("read").xpos)')[1].edits == ()
+    assert tried(left, lesson='print(data.site("read").xpos)').edits == ()
 
 
 @pytest.mark.parametrize(
@@ -134,48 +130,29 @@ def test_sites_and_sensors() -> None:
     ],
 )
 def test_flags_for_nobody(option: str, left: str) -> None:
-    model, survey = tried(scene(head=option))
+    survey = tried(scene(head=option))
     assert set(found(survey)) <= {"energy-flag", "fwdinv-flag"}
-    rest = fixed(model, survey)
+    rest = fixed(survey)
     assert left in rest and rest.count("<flag") == left.count("<flag")
     assert rest.count("<option") == left.count("<option")
-    assert tried(scene(head=option), lesson="print(model.opt.enableflags)")[1].edits == ()
-
-
-# ----------------------------------------------------------------------- runs and their labels
-
-
-def test_from_a_scenario_that_diverges_nothing_is_claimed() -> None:
-    head = '<option timestep="0.1"/>'
-    world = PENDULUM.replace("/>", ' stiffness="1e6" damping="0"/>', 1)
-    text = scene(world, head=head, rest='<sensor><clock name="t"/></sensor>')
-    text = text.replace("</mujoco>", '<keyframe><key name="go" qpos="1"/></keyframe></mujoco>')
-    _, survey = tried(text, quick=False)
-    assert survey.seen[0].judgement.status is not RunStatus.OK
-    assert survey.findings == () and survey.edits == ()
-
-
-def test_a_keep_that_keeps_nothing_is_told() -> None:
-    keeps = {"sensor-unread t": "shown in class", "unused-site": "for labs", "contact": "?"}
-    _, survey = tried(scene(rest='<sensor><clock name="t"/></sensor>'), keeps=keeps)
-    assert found(survey)["sensor-unread"].kept == "shown in class"
-    assert survey.stale == ("unused-site", "contact")
+    assert tried(scene(head=option), lesson="print(model.opt.enableflags)").edits == ()
 
 
 def test_what_only_runs_speak_for_is_told_for_the_time_that_it_saves() -> None:
     world = """<geom type="plane" size="1 1 1"/>
     <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1" condim="4"/></body>"""
-    _, survey = tried(scene(world), clock=itertools.count(step=10**6).__next__)
-    assert survey.findings == ()
-    assert {"island", "cone"} <= {one.kind for one in survey.tried if "no time" in one.reason}
+    survey = tried(scene(world), clock=itertools.count(step=10**6).__next__)
+    assert survey.report.findings == ()
+    slow = {one.kind for one in survey.report.tried if "no time" in one.reason}
+    assert {"island", "cone"} <= slow
 
 
 @pytest.mark.slow
 def test_an_arm_and_a_field_of_rubble_become_as_fast_as_they_can() -> None:
     """Whole scenarios are timed: in the field nothing happens that the arm could notice."""
     for links, pieces, least in ((6, 0, 1.5), (6, 24, 25)):
-        _, survey = tried(field(links, pieces), quick=False, clock=time.thread_time_ns)
-        assert survey.slim is not None and survey.slim.time is not None
-        assert survey.slim.time > least, (pieces, survey.slim)
+        survey = tried(field(links, pieces), quick=False, clock=time.thread_time_ns)
+        assert survey.report.slim is not None and survey.report.slim.time is not None
+        assert survey.report.slim.time > least, (pieces, survey.report.slim)
         if pieces:
-            assert "sleep" in found(survey) or survey.slim.time > least
+            assert "sleep" in found(survey) or survey.report.slim.time > least

@@ -92,12 +92,10 @@ def _checked(one: Checked, style: Style) -> str:
 
 
 def _rows(found: Sequence[Departure]) -> list[str]:
+    names = ("setting", "figure", "recorded", "measured", "band")
     return table(
         [
-            Column("setting", tuple(one.setting for one in found), left=True),
-            Column("figure", tuple(one.figure for one in found), left=True),
-            Column("recorded", tuple(one.recorded for one in found)),
-            Column("measured", tuple(one.measured for one in found)),
-            Column("band", tuple(one.band for one in found), left=True),
+            Column(n, tuple(getattr(o, n) for o in found), left=n not in ("recorded", "measured"))
+            for n in names
         ]
     )

@@ -37,7 +37,7 @@ from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.pruning.compare import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
-from coursebuild.numerics.reports.course_cases import exact_file
+from coursebuild.numerics.reports.cases import exact_file
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
@@ -88,12 +88,20 @@ def measured(
         return measure_scenario(loaded.model, chosen, quick=quick, clock=clock, tell=tell)
 
 
-def swept(loaded: CompiledScene, sweep: DeclaredSweep, *, quick: bool, timed: bool) -> SweepReport:
+def swept(
+    loaded: CompiledScene,
+    sweep: DeclaredSweep,
+    *,
+    quick: bool,
+    timed: bool,
+    tell: Callable[[str], None],
+) -> SweepReport:
     """Measure a sweep that the course declares.
 
     Raises:
         CannotError: it cannot be.
     """
+    tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
     found = (one for one in loaded.scenarios if sweep.scenario in ("", one.name))
     with _told(loaded.scene):
@@ -145,9 +153,6 @@ def _exact(root: Path, scene: CourseScene) -> ExactMotion | None:
         return parts[0], parts[1] if len(parts) > 1 else None
 
     return ExactMotion(span, states)
-
-
-# ------------------------------------------------------------------------------------------- cards
 
 
 def with_card(

@@ -18,16 +18,12 @@ from typing import Any, TypeVar
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.model.scenarios import Bands, DeclaredSweep
+from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench import measuring
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import (
-    MeasuringRun,
-    forbid_quick,
-    with_records,
-)
+from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, with_records
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import Checked, scene_departures
 from coursebuild.numerics.reports.records import BENCH, ReportFailure
@@ -119,9 +115,6 @@ def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -
     return Checked(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
 
 
-# --------------------------------------------------------------------------------------- measuring
-
-
 class SceneRun(MeasuringRun):
     """Measures scenes one after the other."""
 
@@ -158,29 +151,28 @@ class SceneRun(MeasuringRun):
         def tell(text: str) -> None:
             self.progress.doing(name, text)
 
-        def scenario(number: int) -> ScenarioReport:
-            how = {"quick": self.quick, "timed": timed, "tell": tell}
-            found: ScenarioReport = self.measuring.measured(loaded, number, **how)
-            return found
-
-        def sweep(declared: DeclaredSweep) -> SweepReport:
-            tell(declared.name)
-            found: SweepReport = self.measuring.swept(
-                loaded, declared, quick=self.quick, timed=timed
-            )
-            return found
-
+        how = {"quick": self.quick, "timed": timed, "tell": tell}
         report = SceneReport(
             model=name,
             digest=scene.digest,
             quick=self.quick,
             machine=self.here,
             scenarios=tuple(
-                self._part("bench-scenarios", (*parts, n), ScenarioReport, partial(scenario, n))
+                self._part(
+                    "bench-scenarios",
+                    (*parts, n),
+                    ScenarioReport,
+                    partial(self.measuring.measured, loaded, n, **how),
+                )
                 for n in range(len(loaded.scenarios))
             ),
             sweeps=tuple(
-                self._part("bench-sweeps", (*parts, one.name), SweepReport, partial(sweep, one))
+                self._part(
+                    "bench-sweeps",
+                    (*parts, one.name),
+                    SweepReport,
+                    partial(self.measuring.swept, loaded, one, **how),
+                )
                 for one in (() if scene.declared is None else scene.declared.sweeps)
             ),
         )

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from coursebuild.features.bench.commands.grids import english, grid_lines, plain_text
 from coursebuild.features.bench.figures import Grid, power, where
-from coursebuild.features.bench.scenarios import scenario_view, sweep_view
+from coursebuild.features.bench.scenarios import scenario_view
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
@@ -38,7 +38,7 @@ def _scene(scene: SceneReport, style: Style) -> str:
 
 
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:
-    view = scenario_view(english(), report, "")
+    view = scenario_view(english(), report)
     lines = [_title(report.name, report.title, style)]
     for text in (*map(plain_text, view.about), *_also(report), *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
@@ -54,12 +54,12 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
 
 
 def _sweep(sweep: SweepReport, style: Style) -> list[str]:
-    view = sweep_view(english(), sweep)
+    view = scenario_view(english(), sweep)
     marks = (((_OWN, BOLD) if row.own else (" ", "")) for row in sweep.rows)
     head = _title(sweep.name, sweep.title, style)
     return [
         head,
-        *_table(view.table, marks, f"{_OWN} as the model is", style),
+        *_table(view.settings, marks, f"{_OWN} as the model is", style),
         *_notes(view.notes, style),
     ]
 

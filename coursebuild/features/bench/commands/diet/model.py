@@ -29,10 +29,9 @@ from coursebuild.features.bench.commands.diet.readers import readers_of
 from coursebuild.features.bench.commands.runs import CannotError
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.markup import MarkupError
-from coursebuild.numerics.pruning.model_text import ModelText, ModelTextError, open_model, saved
-from coursebuild.numerics.pruning.readers import Reader, Readers
+from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
+from coursebuild.numerics.pruning.readers import Reader
 from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
-from coursebuild.numerics.reports.diet import DietReport, DietScenario, StaleKeep
 from coursebuild.numerics.scene import SceneError
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
@@ -75,8 +74,8 @@ class DietModel:
             raise ValueError(shown) from None
 
     def survey(
-        self, *, quick: bool, tell: Callable[[str], None], rerun: Rerun
-    ) -> tuple[Survey, ModelText]:
+        self, here: Machine, *, quick: bool, tell: Callable[[str], None], rerun: Rerun | None
+    ) -> Survey:
         """Try everything; `rerun` says who of the course's scripts and labs differs then.
 
         Raises:
@@ -87,10 +86,13 @@ class DietModel:
             text = open_model(self.path, self.read, self.compile)
             declared = self.scene.declared
             order = Order(
+                self.scene.name,
+                self.scene.digest,
+                here,
                 text,
                 pruning_scenes(text.model, declared, quick=quick),
                 self.readers,
-                {key: one.reason for key, one in self.keeps.items()},
+                self.keeps,
                 self.locked,
                 declared is not None and any(one.controls for one in declared.scenarios),
                 time.thread_time_ns,
@@ -98,7 +100,7 @@ class DietModel:
                 tell,
                 rerun,
             )
-            return survey(order), text
+            return survey(order)
         except MarkupError as error:
             said = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
             help = "MuJoCo reads it all the same; other tools do not"
@@ -112,49 +114,20 @@ class DietModel:
             said = f"the diet cannot look at the model `{self.scene.name}`: {words}"
             raise CannotError(diagnose("model-error", source.span(0, 0), said)) from None
 
-    def report(self, survey: Survey, here: Machine, *, quick: bool) -> DietReport:
-        """What was found, as a value."""
-        return DietReport(
-            model=self.scene.name,
-            digest=self.scene.digest,
-            quick=quick,
-            machine=here,
-            readers=tuple(dict.fromkeys(one.path.partition(":")[0] for one in self.readers.files)),
-            scenarios=tuple(
-                DietScenario(
-                    one.scene.name,
-                    round(one.scene.scenario.duration / one.scene.own),
-                    one.judgement.status.value,
-                    one.judgement.reasons,
-                )
-                for one in survey.seen
-            ),
-            findings=survey.findings,
-            tried=survey.tried,
-            fixed=survey.fixed,
-            slim=survey.slim,
-            slim_difference=survey.slim_difference,
-            stale=tuple(self._stale(key) for key in survey.stale),
-        )
-
-    def _stale(self, key: str) -> StaleKeep:
-        place = self.keeps[key].finding_span
-        return StaleKeep(key, place.path, place.line, place.column)
-
-    def write(self, survey: Survey, text: ModelText) -> None:
+    def write(self, survey: Survey) -> None:
         """Make the changes that were found; all of them, or none.
 
         Raises:
             EffectError: a file cannot be written, or somebody changed it.
             CannotError: the files would make another model than the one that was run.
         """
-        changed = text.files(survey.edits)
+        changed = survey.text.files(survey.edits)
 
         def read(path: str) -> bytes | None:
             return changed.get(path) or self.read(path)
 
         new = open_model(self.path, read, self.compile, check=False).model
-        if saved(new) != saved(text.compiled(survey.edits)):
+        if model_bytes(new) != model_bytes(survey.text.compiled(survey.edits)):
             message = f"the changed model `{self.scene.name}` is not the one that was run"
             place = self.scene.model.source.span(0, 0)
             raise CannotError(diagnose("model-error", place, message))
@@ -179,7 +152,11 @@ class DietModel:
 def _locked(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
     """Files of the model that are not to be changed, and why."""
     parts = model_files(root, path, text)
-    locked = {part: f"{part} is not in models/" for part in parts if not _is_model(part)}
+    locked = {
+        part: f"{part} is not in models/"
+        for part in parts
+        if not (part.startswith("models/") and part.endswith(".xml"))
+    }
     mine = {path, *parts}
     for other in files.models:
         if other.source.path == path:
@@ -191,13 +168,11 @@ def _locked(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str
     return locked
 
 
-def _is_model(path: str) -> bool:
-    return path.startswith("models/") and path.endswith(".xml")
-
-
-def _readers(root: Path, files: CourseFiles, course: Course | None, scene: CourseScene) -> Readers:
+def _readers(
+    root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
+) -> tuple[Reader, ...]:
     """Everything in the course that may use a model, and what is to be measured on it."""
-    found = list(readers_of(course, root, files, scene).files)
+    found = list(readers_of(course, root, files, scene))
     if scene.declared is not None:
         declared = scene.declared.scenarios
         names = frozenset(one.measure.name for one in declared if one.measure is not None)
@@ -205,4 +180,4 @@ def _readers(root: Path, files: CourseFiles, course: Course | None, scene: Cours
         if names or fields:
             path = scene.declared.source.path
             found.append(Reader(path, names=names, words=frozenset(fields)))
-    return Readers(tuple(found))
+    return tuple(found)

@@ -27,7 +27,7 @@ from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.scripts.extract import extract
 from coursebuild.features.lab.model import Lab
 from coursebuild.numerics.pruning.differences import VIEWS
-from coursebuild.numerics.pruning.readers import Reader, Readers, read_code
+from coursebuild.numerics.pruning.readers import Reader, read_code
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
@@ -42,10 +42,10 @@ _COPIED = ("content", "models")
 
 def readers_of(
     course: Course | None, root: Path, files: CourseFiles, scene: CourseScene
-) -> Readers:
+) -> tuple[Reader, ...]:
     """Everything in the course that may use a model."""
     if course is None:
-        return Readers((Reader("content/course.toml", opaque="the course cannot be read"),))
+        return (Reader("content/course.toml", opaque="the course cannot be read"),)
     own = {Path(path).stem for path in files.files if path.endswith(".py")}
     scripts = [
         read_code(one.path, one.text, own)
@@ -54,8 +54,8 @@ def readers_of(
     ]
     labs = list(_blocks(course, scene.name))
     if not scripts and not labs:
-        return Readers()
-    return Readers((*scripts, *labs, *_code(root, files, own)))
+        return ()
+    return (*scripts, *labs, *_code(root, files, own))
 
 
 def _may_use(text: str, model: str) -> bool:
@@ -135,7 +135,13 @@ class Reruns:
             for run in results.runs
             if run.trace is not None and not mine.isdisjoint(run.trace.files)
         }
-        labs = [trial for trial in results.trials if self._shows(trial.span.path)]
+        shown = {
+            document.source.path
+            for document in self.course.documents
+            for block in document_blocks(document)
+            if isinstance(block, FeatureBlock) and self.scene.name in block.models()
+        }
+        labs = [trial for trial in results.trials if trial.span.path in shown]
         self._documents = frozenset(
             one.document for one in extract(self.course).value if one.path in paths
         ) | {trial.span.path for trial in labs}
@@ -144,14 +150,6 @@ class Reruns:
         whole = self._outputs(self.course, self.options, self._documents)
         names = paths | {trial.line.name for trial in labs}
         return {name: said for name, said in whole.items() if name in names}
-
-    def _shows(self, path: str) -> bool:
-        return any(
-            isinstance(block, FeatureBlock) and self.scene.name in block.models()
-            for document in self.course.documents
-            if document.source.path == path
-            for block in document_blocks(document)
-        )
 
     def _outputs(
         self, course: Course, options: Options, documents: frozenset[str]

@@ -13,6 +13,7 @@ Entry point: `diet(options, names, …)`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -26,14 +27,9 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.diet.model import DietModel
 from coursebuild.features.bench.commands.diet.readers import Reruns
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import (
-    MeasuringRun,
-    forbid_quick,
-    with_records,
-)
+from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, with_records
 from coursebuild.numerics.engine import silent
-from coursebuild.numerics.pruning.model_text import ModelText
-from coursebuild.numerics.pruning.survey import Rerun, Survey
+from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet import DietReport
 from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.pipeline.load import load
@@ -107,16 +103,14 @@ class _DietRun(MeasuringRun):
 
     def _looked(self, look: DietModel) -> DietReport | None:
         with silent():  # what MuJoCo warns of, it would write into the working directory
-            report = self._fixed(look) if self.fix else self._surveyed(look)[0]
+            report = self._fixed(look) if self.fix else self._surveyed(look).report
         return None if report is None else replace(report, digest=look.digest())
 
-    def _surveyed(self, look: DietModel) -> tuple[DietReport, Survey, ModelText]:
-        tell = lambda text: self.progress.doing(look.scene.name, text)  # noqa: E731
-        rerun: Rerun = lambda changed: ""  # noqa: E731
+    def _surveyed(self, look: DietModel) -> Survey:
+        tell, rerun = partial(self.progress.doing, look.scene.name), None
         if not self.quick and self.course is not None:
             rerun = Reruns(self.options, self.course, look.scene).differing
-        survey, text = look.survey(quick=self.quick, tell=tell, rerun=rerun)
-        return look.report(survey, self.here, quick=self.quick), survey, text
+        return look.survey(self.here, quick=self.quick, tell=tell, rerun=rerun)
 
     def _fixed(self, look: DietModel) -> DietReport | None:
         """Change and look again until nothing is left to change.
@@ -124,19 +118,19 @@ class _DietRun(MeasuringRun):
         `None` where it could not be written; why is told.
         """
         kinds: dict[str, dict[str, None]] = {}
-        report, survey, text = self._surveyed(look)
+        survey = self._surveyed(look)
         while survey.edits:
             try:
-                look.write(survey, text)
+                look.write(survey)
             except EffectError as error:
                 self.failures.append(ReportFailure(error.message, error.help))
                 return None
-            for finding in report.findings:
+            for finding in survey.report.findings:
                 for edit in finding.edits if finding.fixable else ():
                     kinds.setdefault(edit.path, {})[finding.kind] = None
-            report, survey, text = self._surveyed(look)
+            survey = self._surveyed(look)
         self.remarks += [f"changed {path}: {', '.join(kinds[path])}" for path in sorted(kinds)]
-        return report
+        return survey.report
 
     def _parts(self, look: DietModel) -> tuple[object, ...]:
         """All that what is found depends on; first the digest of the model."""
@@ -146,7 +140,7 @@ class _DietRun(MeasuringRun):
             place = one.finding_span
             parts.append((one.finding, one.reason, place.line, place.column))
         parts += look.locked.items()
-        if look.readers.files and self.course is not None:
+        if look.readers and self.course is not None:
             parts += [(one.source.path, one.source.text) for one in self.course.documents]
             parts += [(path, _state(self.options.root / path)) for path in self.files.files]
         return tuple(parts)
