@@ -29,7 +29,7 @@ from coursebuild.core.registry import feature_trials
 from coursebuild.core.run.dependencies import (
     Inputs,
     Kind,
-    described,
+    describe,
     sought_files,
     state_changes,
 )
@@ -125,7 +125,7 @@ class _Explainer:
 
     def _script(self, path: str) -> Explained:
         extraction, job = self.scripts[path]
-        if job.norun:
+        if extraction.script.norun:
             return Explained("script", path, extraction.owner, "norun")
         inputs = self.memory.inputs(job, extraction.data)
         record = self.memory.remembered(inputs)
@@ -218,7 +218,7 @@ def _explained(
     state: State = "would run" if reasons else "remembered"
     if record is None:
         return Explained(kind, name, owner, state, reasons)
-    depends = [described(dependency) for dependency in record.dependencies]
+    depends = [describe(dependency) for dependency in record.dependencies]
     depends += [f"{what}: {value}" for what, value in record.inputs.around]
     return Explained(
         kind,

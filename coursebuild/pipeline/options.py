@@ -44,7 +44,7 @@ class Options(Struct, frozen=True):
     verbose: bool = False
     """Whether it is said of each script why it runs."""
     run_all: RunAll | None = None
-    """What runs scripts, where it is not `run_scripts`: a server stays warm from run to run."""
+    """What runs scripts, where a `ScriptServer` stays warm from run to run."""
     place: OtherEnvironment | None = None
     """Where scripts run, where that is not here; see `for_course`."""
     sandbox: Sandbox | None = None

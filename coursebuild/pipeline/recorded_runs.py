@@ -24,9 +24,9 @@ from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
+    dependencies_of,
     input_changes,
     inputs_of,
-    looked_at,
     state_changes,
 )
 from coursebuild.core.run.machine import machine
@@ -94,7 +94,7 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         run, path = by_path.get(extraction.path), _path(extraction.path)
         if run is None or not extraction.script.once or run.outcome is not Outcome.OK:
             continue
-        looked = looked_at(run, (), states.places, states)
+        looked = dependencies_of(run, (), states.places, states)
         record = record_of(
             _inputs(extraction),
             tuple(_of_the_project(looked, states)),

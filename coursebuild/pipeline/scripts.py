@@ -8,7 +8,6 @@ longest first, of which no result is remembered that still holds.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from msgspec import Struct
@@ -118,11 +117,13 @@ def run(
     chosen = tuple(chosen)
     memory = options.memory() if memory is None else memory
     todo = jobs(chosen, perturbation)
-    done = {**(known or {}), **recorded_runs(chosen, options)}
+    norun = (script.path for script in chosen if script.script.norun)
+    done = {path: ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0) for path in norun}
+    done |= {**(known or {}), **recorded_runs(chosen, options)}
     inputs = {
         job.path: memory.inputs(job, extraction.data)
         for job, extraction in zip(todo, chosen, strict=True)
-        if not job.norun and job.path not in done
+        if job.path not in done
     }
     if inputs:
         done |= memory.recall(tuple(inputs.values()))
@@ -143,13 +144,10 @@ def _run(
     """Run scripts, the longest first, and remember what they did."""
     if not todo:
         return ()
-    from coursebuild.core.run.runner import run_scripts
+    from coursebuild.core.run.runner import ScriptServer
 
-    count = sum(not job.norun for job in todo)
-    if not count:
-        return run_scripts(options.root, todo, parallel=1)
-    lasted = {job.path: memory.last(job.path) for job in todo}
-    seconds = {path: None if last is None else last.kept.seconds for path, last in lasted.items()}
+    lasted = (memory.last(job.path) for job in todo)
+    seconds = {last.inputs.path: last.kept.seconds for last in lasted if last is not None}
 
     def started(path: str) -> None:
         memory.started(path)
@@ -161,11 +159,10 @@ def _run(
 
     if options.verbose:
         for job in todo:
-            if job.path in inputs:
-                progress.say(f"{job.path}: {'; '.join(memory.reasons(inputs[job.path]))}")
+            progress.say(f"{job.path}: {'; '.join(memory.reasons(inputs[job.path]))}")
     memory.begin()
-    run_all = options.run_all or functools.partial(run_scripts, sandbox=options.sandbox)
-    with progress.stage(stage, count):
+    with ScriptServer(sandbox=options.sandbox) as server, progress.stage(stage, len(todo)):
+        run_all = options.run_all or server.run
         return run_all(
             options.root,
             longest_first(todo, seconds),

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import sealed, unsealed
 from coursebuild.core.model.results import Divergence, Outcome, Sign, Trace
-from coursebuild.core.run.dependencies import described
+from coursebuild.core.run.dependencies import describe
 from coursebuild.core.run.memory import longest_first
 from coursebuild.core.scripts.sensitivity import amplification
 from coursebuild.report.explained import Explained, Explanation, explained_text
@@ -116,7 +116,7 @@ def test_a_few_results_are_kept_for_a_script(desk: Desk) -> None:
 
 def test_longest_runs_come_first_and_unknown_ones_before_them() -> None:
     jobs = [replace(JOB, path=name) for name in "abcd"]
-    seconds = {"a": 1.0, "b": None, "c": 3.0}
+    seconds = {"a": 1.0, "c": 3.0}
     assert [job.path for job in longest_first(jobs, seconds)] == ["b", "d", "c", "a"]
 
 
@@ -141,7 +141,7 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
         last = memory.last(PATH)
         shown = Explained("script", PATH, "1.1", "remembered", tuple(reasons))
         if last is not None:
-            depends = tuple(map(described, last.dependencies))
+            depends = tuple(map(describe, last.dependencies))
             seconds = last.kept.seconds
             shown = replace(shown, depends=depends, made=last.made, seconds=seconds)
         text = explained_text(Explanation(PATH, "script", (shown,)), Style(colour=False))

@@ -15,7 +15,7 @@ from coursebuild.core.run.memory import Memory
 
 SCRIPT = b"print('hello')\n"
 PATH = "examples/a.py"
-JOB = ScriptJob(PATH, (), 10.0, (), False)
+JOB = ScriptJob(PATH, (), 10.0, ())
 NOTHING = Trace((), (), (), (), "")
 LOOKED = Trace(("models/a.xml", "models/none.xml"), (), (), (), "")
 

@@ -25,7 +25,7 @@ from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.model.results import ScriptJob
 try:
     with ScriptServer(fork=sys.argv[2] == "True") as server:
-        job = ScriptJob("examples/x.py", (), 60.0, (), False)
+        job = ScriptJob("examples/x.py", (), 60.0, ())
         for run in server.run(Path(sys.argv[1]), [job], parallel=2):
             print(run.outcome, run.stdout)
 except KeyboardInterrupt:
@@ -40,10 +40,9 @@ def job(
     args: Sequence[str] = (),
     timeout: float = 120.0,
     requires: Sequence[str] = (),
-    norun: bool = False,
     perturbation: int = 0,
 ) -> ScriptJob:
-    return ScriptJob(path, tuple(args), timeout, tuple(requires), norun, perturbation)
+    return ScriptJob(path, tuple(args), timeout, tuple(requires), perturbation)
 
 
 def alive(pid: int) -> bool:

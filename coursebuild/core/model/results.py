@@ -43,7 +43,6 @@ class ScriptJob(Struct, frozen=True):
     timeout: float
     """Seconds."""
     requires: tuple[str, ...]
-    norun: bool
     perturbation: int = 0
     """From 1: its initial states are moved a little, in one of several directions; 0: they are
     not; −1: each of its steps is made as two of half the timestep."""

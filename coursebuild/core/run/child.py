@@ -19,12 +19,11 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.temporary import temporary_folder
-from coursebuild.core.run.runner import clean_environment
+from coursebuild.core.run.script_environment import clean_environment
 
 MEMORY = 1024
 """MiB that a child may take."""
@@ -36,28 +35,22 @@ class JsonChild:
     """The child and its folder."""
 
     def __init__(
-        self,
-        script: str,
-        seconds: float,
-        python: str | None = None,
-        patience: float = 10.0,
-        memory: int = MEMORY,
+        self, script: str, seconds: float, python: str | None = None, memory: int = MEMORY
     ) -> None:
         """A child ends itself, by SIGPROF, after so many seconds of processor time for a request.
 
-        One that does not compute is waited for `patience` times as long. One that asks for more
-        than `memory` MiB gets none, where the system can see to that.
+        One that does not compute is waited for ten times as long. One that asks for more than
+        `memory` MiB gets none, where the system can see to that.
         """
         self.memory = memory
         self._python = python or sys.executable
         self._script = script
         self._seconds = seconds
-        self._patience = patience
+
         self._life = contextlib.ExitStack()
         self._folder = ""
         self._process: subprocess.Popen[bytes] | None = None
         self._interrupted = False
-        self._buffer = b""
 
     def __enter__(self) -> Self:
         return self
@@ -80,12 +73,12 @@ class JsonChild:
         with contextlib.suppress(BrokenPipeError):  # it died; reading tells
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
-        line = self._read_line(self._seconds * self._patience)
+        line = self._read_line(10 * self._seconds)
         return None if line is None else json.loads(line)
 
     def stop(self) -> None:
         """End the child, whatever it does."""
-        process, self._process, self._buffer = self._process, None, b""
+        process, self._process = self._process, None
         if process is None:
             return
         process.kill()
@@ -141,16 +134,7 @@ class JsonChild:
     def _read_line(self, seconds: float) -> bytes | None:
         """The next line of the child; `None` if it died, or said nothing for so long."""
         assert self._process is not None and self._process.stdout is not None
-        until = time.monotonic() + seconds
-        parts = [self._buffer]
         with selectors.DefaultSelector() as selector:
             selector.register(self._process.stdout, selectors.EVENT_READ)
-            while b"\n" not in parts[-1]:
-                if not selector.select(max(0.0, until - time.monotonic())):
-                    return None
-                data = os.read(self._process.stdout.fileno(), 1 << 20)
-                if not data:
-                    return None
-                parts.append(data)
-        line, _, self._buffer = b"".join(parts).partition(b"\n")
-        return line
+            line = self._process.stdout.readline() if selector.select(seconds) else b""
+        return line[:-1] if line.endswith(b"\n") else None

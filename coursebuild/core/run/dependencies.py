@@ -1,6 +1,6 @@
 """What the result of a script depends on, and in which words to say that it changed.
 
-Entry points: `group_key`, `looked_at`, `input_changes`, `state_changes`, `forgotten`.
+Entry points: `group_key`, `dependencies_of`, `input_changes`, `state_changes`, `forgotten`.
 
 1. What is known before a script runs (`Inputs`) names a group of results.
 2. What it looked at while it ran (a `Trace`) names its needs; each with its state at that time is a
@@ -124,7 +124,7 @@ def result_key(dependencies: Iterable[Dependency]) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def looked_at(
+def dependencies_of(
     run: ScriptRun,
     requires: Iterable[str],
     places: Iterable[tuple[str, str]],
@@ -204,22 +204,19 @@ def forgotten(run: ScriptRun) -> str:
 def input_changes(old: Inputs, new: Inputs) -> list[str]:
     """What is different, each as a clause."""
     found = ["its text changed"] if old.text != new.text else []
+    before, now = dict(old.around), dict(new.around)
+    names = sorted({*before, *now})
     for what, one, two in (
         ("its arguments changed", _list(old.args), _list(new.args)),
         ("its option `timeout` changed", f"{old.timeout:g}", f"{new.timeout:g}"),
         ("its option `requires` changed", _list(old.requires), _list(new.requires)),
-        *_both(dict(old.around), dict(new.around)),
+        *((name, before.get(name, "unset"), now.get(name, "unset")) for name in names),
     ):
         if one != two:
             found.append(f"{what}: {one} → {two}")
     if old.version != new.version:
         found.append("this version of coursebuild runs scripts in another way")
     return found
-
-
-def _both(old: dict[str, str], new: dict[str, str]) -> Iterator[tuple[str, str, str]]:
-    for name in sorted({*old, *new}):
-        yield name, old.get(name, "unset"), new.get(name, "unset")
 
 
 def state_changes(
@@ -271,10 +268,10 @@ def _became(old: str, now: str) -> str:
 
 
 def _list(items: tuple[str, ...]) -> str:
-    return " ".join(items) if items else "none"
+    return " ".join(items) or "none"
 
 
-def described(dependency: Dependency) -> str:
+def describe(dependency: Dependency) -> str:
     """A dependency as a line of a list."""
     match dependency.kind:
         case Kind.FILE | Kind.OUTSIDE:

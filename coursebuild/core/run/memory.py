@@ -14,6 +14,7 @@ Entry point: `Memory`.
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -36,17 +37,17 @@ from coursebuild.core.run.dependencies import (
     Inputs,
     Kind,
     Need,
+    dependencies_of,
     forgotten,
     group_key,
     input_changes,
     inputs_of,
     is_perturbed,
-    looked_at,
     result_key,
     sought,
     state_changes,
 )
-from coursebuild.core.run.packages import Installed
+from coursebuild.core.run.packages import InstalledPackages
 from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, record_of, to_bytes
 from coursebuild.core.run.script_environment import OtherEnvironment, conditions, places
 
@@ -66,7 +67,7 @@ class States:
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, place)
         self.around = conditions(os.environ, place)
-        self._installed = Installed(store, None if place is None else place.packages)
+        self._installed = InstalledPackages(store, None if place is None else place.packages)
         self._known: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -207,7 +208,7 @@ class Memory:
     def keep(self, inputs: Inputs, run: ScriptRun) -> None:
         """Remember the result of a run, or why it is not remembered."""
         states = self.states
-        dependencies = looked_at(run, inputs.requires, states.places, states.now)
+        dependencies = dependencies_of(run, inputs.requires, states.places, states.now)
         why = forgotten(run) or self._disturbed(inputs, dependencies)
         record = record_of(inputs, dependencies, int(time.time()), why, run)
         key = ""
@@ -241,9 +242,8 @@ class Memory:
         return ""
 
     def _holds(self, record: RunRecord, inputs: Inputs) -> bool:
-        return _fits(record, inputs) and not any(
-            True for _ in state_changes(record.dependencies, self.states)
-        )
+        changes = state_changes(record.dependencies, self.states)
+        return _fits(record, inputs) and next(changes, None) is None
 
     def _fetch(self, wanted: Sequence[Inputs]) -> list[RunRecord]:
         """Results that hold from the shared cache."""
@@ -307,17 +307,9 @@ def _fits(record: RunRecord, inputs: Inputs) -> bool:
     )
 
 
-def longest_first(
-    jobs: Sequence[ScriptJob], seconds: Mapping[str, float | None]
-) -> list[ScriptJob]:
+def longest_first(jobs: Sequence[ScriptJob], seconds: Mapping[str, float]) -> list[ScriptJob]:
     """The order in which scripts take the least time together; an unknown one may be long."""
-    unknown = float("inf")
-
-    def length(job: ScriptJob) -> float:
-        known = seconds.get(job.path)
-        return unknown if known is None else known
-
-    return sorted(jobs, key=lambda job: -length(job))
+    return sorted(jobs, key=lambda job: -seconds.get(job.path, math.inf))
 
 
 def _last_key(path: str) -> str:

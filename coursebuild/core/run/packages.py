@@ -1,6 +1,6 @@
 """Which version of what is installed gives a module, without importing anything.
 
-Entry points: `Installed`; `distributions`, `module_files`, for archives of scripts.
+Entry points: `InstalledPackages`; `distributions`, `module_files`, for archives of scripts.
 
 Reading what each distribution provides takes a quarter of a second, so the whole map is kept until
 one of the folders with installed packages changes. A module that no distribution names, and one of
@@ -10,6 +10,7 @@ this tool's own, is known by the content of its files.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import importlib.util
 import sys
@@ -39,41 +40,34 @@ def site_folders() -> tuple[str, ...]:
     return tuple(path for path in sys.path if Path(path).name in _FOLDERS)
 
 
-class Installed:
+class InstalledPackages:
     """What is installed for the interpreter that runs the scripts."""
 
     def __init__(self, store: Memo, folders: Sequence[str] | None = None) -> None:
         self._folders = site_folders() if folders is None else tuple(folders)
-        self._store = store
-        self._map: Mapping[str, str] | None = None
-        self._found: dict[str, str] = {}
-
-    def version(self, module: str) -> str:
-        """Such as `numpy 2.4.6`; empty where there is no such module."""
-        if module not in self._found:
-            self._found[module] = self._version(module)
-        return self._found[module]
+        self._distributions = functools.cache(lambda: _provided(store, self._folders))
+        self.version = functools.cache(self._version)
+        """Of a module, such as `numpy 2.4.6`; empty where there is none."""
 
     def _version(self, module: str) -> str:
-        if self._map is None:
-            self._map = _provided(self._store, self._folders)
-        named = self._map.get(module)
+        named = self._distributions().get(module)
         if named is not None:
             return named
         spec = _spec(module, self._folders) or _spec(module, [str(_LIBRARY)])
-        return ABSENT if spec is None else f"files {self._content(spec)}"
+        return ABSENT if spec is None else f"files {_content(spec)}"
 
-    def _content(self, spec: ModuleSpec) -> str:
-        """A hash of a module's files."""
-        if not spec.submodule_search_locations:
-            return file_state(spec.origin or "")[:16]
-        digest = hashlib.sha256()
-        for top in sorted(spec.submodule_search_locations):
-            for file in sorted(Path(top).rglob("*")):
-                if "__pycache__" not in file.parts and file.is_file():
-                    state = file_state(str(file))
-                    digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
-        return digest.hexdigest()[:16]
+
+def _content(spec: ModuleSpec) -> str:
+    """A hash of a module's files."""
+    if not spec.submodule_search_locations:
+        return file_state(spec.origin or "")[:16]
+    digest = hashlib.sha256()
+    for top in sorted(spec.submodule_search_locations):
+        for file in sorted(Path(top).rglob("*")):
+            if "__pycache__" not in file.parts and file.is_file():
+                state = file_state(str(file))
+                digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
+    return digest.hexdigest()[:16]
 
 
 def distributions(

@@ -1,6 +1,6 @@
 """Running the lessons' scripts, each in a process, a session and an environment of its own.
 
-Entry points: `run_scripts`; `ScriptServer`, which stays warm between runs.
+Entry point: `ScriptServer`, which stays warm between runs.
 
 1. `parallel` supervisors are started. They are given one script after another, and run each as a
    copy of themselves, or in an interpreter of its own (see `supervisor`); the results are the same.
@@ -19,17 +19,17 @@ import contextlib
 import functools
 import json
 import os
-import selectors
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from multiprocessing.connection import wait
 from pathlib import Path
-from typing import Any, Self, TypeAlias
+from typing import Self, TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import supervisor
@@ -37,10 +37,10 @@ from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.sandbox import Sandbox, copied_folders, difference, visible
 from coursebuild.core.run.script_environment import (
     OtherEnvironment,
+    clean_environment,
     library_folder,
     wanted_packages,
 )
-from coursebuild.core.run.script_environment import clean_environment as clean_environment
 from coursebuild.core.run.script_process import Job
 from coursebuild.core.run.trace_records import read_records
 from coursebuild.core.run.watching import STDERR_KEPT
@@ -51,7 +51,7 @@ Started: TypeAlias = Callable[[str], object]
 Finished: TypeAlias = Callable[[ScriptRun], object]
 """Is told of a script that is through, one way or another."""
 RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
-"""Runs scripts, as `run_scripts` does."""
+"""Runs scripts, as `ScriptServer.run` does."""
 
 
 class RunStoppedError(Exception):
@@ -69,19 +69,6 @@ _GRACE = 60.0
 
 _LOG = "MUJOCO_LOG.TXT"
 """What MuJoCo writes where it runs when it warns, in a process that a script has started."""
-
-
-def run_scripts(
-    root: Path,
-    jobs: Sequence[ScriptJob],
-    *,
-    parallel: int,
-    sandbox: Sandbox | None = None,
-    **others: Any,
-) -> tuple[ScriptRun, ...]:
-    """Run scripts once, in a sandbox or not: see `ScriptServer.run`."""
-    with ScriptServer(sandbox=sandbox) as server:
-        return server.run(root, jobs, parallel=parallel, **others)
 
 
 class ScriptServer:
@@ -127,9 +114,7 @@ class ScriptServer:
         place: OtherEnvironment | None = None,
         unwanted: Callable[[frozenset[str]], bool] | None = None,
     ) -> tuple[ScriptRun, ...]:
-        """Run scripts; those marked `norun` are not, and nothing is told of them.
-
-        Only one run at a time.
+        """Run scripts; only one run at a time.
 
         Args:
             root: the course folder, which becomes the working directory.
@@ -147,65 +132,62 @@ class ScriptServer:
             EffectError: there is no place for temporary files, or the interpreter is none.
             RunStoppedError: the run is unwanted.
         """
+        if not jobs:
+            return ()
         work = _Work(root.resolve(), jobs, started, finished, place, self._sandbox)
-        if not work.waiting:
-            return work.results()
         with temporary_folder() as work.scratch:
             self._run(work, parallel, unwanted)
-        return work.results()
+        return tuple(work.runs[i] for i in range(len(jobs)))
 
     def _run(
         self, work: _Work, parallel: int, unwanted: Callable[[frozenset[str]], bool] | None
     ) -> None:
-        busy: set[Worker] = set()
-        if work.place is not None:
-            work.library = _library_alone(work.scratch)
+        busy: dict[int, Worker] = {}
+        """By the descriptors of their reports."""
+        if work.place is not None:  # `mjcourse` alone: what else is installed here is not for it
+            work.library = work.scratch
+            Path(work.scratch, "mjcourse").symlink_to(Path(library_folder(), "mjcourse"))
         work.look_around()
         log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
-            with selectors.DefaultSelector() as selector:
-                for _ in range(min(max(parallel, 1), len(work.waiting))):
-                    self._start(busy, selector, work)
-                while busy:
-                    asks = unwanted is not None or self._sandbox is not None
-                    for key, _ in selector.select(_PATIENCE if asks else None):
-                        self._hear(key.data, busy, selector, work)
-                    for worker in busy:
-                        if time.monotonic() > worker.deadline:
-                            worker.kill()
-                    if unwanted is not None and unwanted(work.running(busy)):
-                        raise RunStoppedError
+            for _ in range(min(max(parallel, 1), len(work.jobs))):
+                self._start(busy, work)
+            asks = unwanted is not None or self._sandbox is not None
+            while busy:
+                for ready in wait(busy, _PATIENCE if asks else None):
+                    self._hear(busy[ready], busy, work)  # type: ignore[index]
+                for worker in busy.values():
+                    if time.monotonic() > worker.deadline:
+                        worker.kill()
+                if unwanted is not None and unwanted(work.running(busy.values())):
+                    raise RunStoppedError
         finally:
-            for worker in busy:
+            for worker in busy.values():
                 worker.dismiss()  # all of them, before waiting for any
-            for worker in busy:
+            for worker in busy.values():
                 worker.close()
             supervisor.remove_folder(work.scratch)
             if not had_log:
                 with contextlib.suppress(OSError):
                     log.unlink()
 
-    def _start(self, busy: set[Worker], selector: selectors.BaseSelector, work: _Work) -> None:
+    def _start(self, busy: dict[int, Worker], work: _Work) -> None:
         worker = self._worker(work)
-        busy.add(worker)
-        selector.register(worker, selectors.EVENT_READ, worker)
+        busy[worker.reports] = worker
         work.next(worker)
 
-    def _hear(
-        self, worker: Worker, busy: set[Worker], selector: selectors.BaseSelector, work: _Work
-    ) -> None:
+    def _hear(self, worker: Worker, busy: dict[int, Worker], work: _Work) -> None:
         there = work.hear(worker)
         if there and worker.job is not None:
             return
-        selector.unregister(worker)
-        busy.remove(worker)
+        del busy[worker.reports]
         if there and self._sandbox is None:
             self._idle.append(worker)
             return
         worker.close()
         if work.waiting:
-            self._start(busy, selector, work)
+            self._start(busy, work)
 
     def _worker(self, work: _Work) -> Worker:
         """A supervisor that waits for a job: one that is left, or a new one."""
@@ -215,7 +197,7 @@ class ScriptServer:
             self._installed = installed
         while self._idle:
             worker = self._idle.pop()
-            worker.rested = True
+            worker.is_reused = True
             if worker.environment == work.environment:
                 return worker
             worker.close()
@@ -239,7 +221,9 @@ class _Work:
         self.jobs = jobs
         self.started = started
         self.finished = finished
-        self.environment = _environment(place) | dict(jobs[0].environment if jobs else ())
+        clean = clean_environment(os.environ)
+        self.environment = clean if place is None else place.environment(clean)
+        self.environment |= dict(jobs[0].environment)
         self.library = library_folder()
         self.place = place
         self.sandbox = sandbox
@@ -247,18 +231,14 @@ class _Work:
         self.shown: dict[str, str] = {}
         self.copied: list[tuple[str, str]] = []
         self.scratch = ""
-        self.runs: dict[int, ScriptRun] = {
-            i: ScriptRun(job.path, Outcome.NORUN, 0, "", "", 0.0)
-            for i, job in enumerate(jobs)
-            if job.norun
-        }
-        self.waiting = [i for i in range(len(jobs)) if i not in self.runs]
+        self.runs: dict[int, ScriptRun] = {}
+        self.waiting = list(range(len(jobs)))
         self.told: set[int] = set()
         """The jobs whose start was told."""
         folders = {self.root / folder for job in jobs for folder in job.packages}
         files = [file for folder in folders for file in folder.rglob("*.py")]
-        files += [self.root / jobs[index].path for index in self.waiting]
-        self.packages = wanted_packages(files) if self.waiting else ()
+        files += [self.root / job.path for job in jobs]
+        self.packages = wanted_packages(files)
 
     def look_around(self) -> None:
         """Know what a sandbox is to show, now that there is a temporary folder."""
@@ -285,7 +265,7 @@ class _Work:
         if not worker.read():
             if worker.job is not None:
                 index, worker.job = worker.job, None
-                if worker.rested:  # it may have been as good as gone before it was given the job
+                if worker.is_reused:  # it may have been as good as gone before it was given the job
                     self.waiting.insert(0, index)
                     return False
                 if self.place is not None and worker.status() > 0:
@@ -311,7 +291,7 @@ class _Work:
         if self.sandbox is not None and run.trace is not None:
             why = run.trace.opaque or difference(self.jobs[index], run.trace, self.shown)
             run = replace(run, trace=replace(run.trace, opaque=why))
-        worker.job, worker.rested = None, False
+        worker.job, worker.is_reused = None, False
         self._finish(index, run)
         if self.sandbox is None:
             self.next(worker)
@@ -319,9 +299,6 @@ class _Work:
     def running(self, busy: Iterable[Worker]) -> frozenset[str]:
         """The paths of what these supervisors run."""
         return frozenset(self.jobs[w.job].path for w in busy if w.job is not None)
-
-    def results(self) -> tuple[ScriptRun, ...]:
-        return tuple(self.runs[i] for i in range(len(self.jobs)))
 
     def _message(self, job: ScriptJob) -> bytes:
         request: Job = {
@@ -348,11 +325,6 @@ class _Work:
         self.finished(run)
 
 
-def _environment(place: OtherEnvironment | None) -> dict[str, str]:
-    clean = clean_environment(os.environ)
-    return clean if place is None else place.environment(clean)
-
-
 def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
     """The folders with packages, and when something was installed there."""
     found: list[object] = []
@@ -368,9 +340,9 @@ def _script_run(
     out, err, trace, *figures = parts
     if out is None or err is None:
         raise ValueError("a report without output")
-    stdout, is_text = _decode(out)
+    stdout = out.decode("utf-8", "backslashreplace")
     outcome = Outcome(report["outcome"])
-    if outcome is Outcome.OK and not is_text:
+    if outcome is Outcome.OK and stdout.encode() != out:
         outcome = Outcome.ENCODING
     if len(err) == STDERR_KEPT:
         err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]  # a letter cut in two
@@ -379,22 +351,13 @@ def _script_run(
         job.path,
         outcome,
         report["status"],
-        stdout,
-        _decode(err)[0],
+        stdout.replace("\r\n", "\n"),
+        err.decode("utf-8", "backslashreplace").replace("\r\n", "\n"),
         report["seconds"],
         missing=tuple(report["missing"]),
         trace=read_records(trace, root, job.path) if trace else None,
         figures=tuple((name, data) for name, data in drawn if data is not None),
     )
-
-
-def _decode(data: bytes) -> tuple[str, bool]:
-    """Text with LF line ends, other bytes than UTF-8 made visible; whether there were none."""
-    try:
-        text, is_text = data.decode("utf-8"), True
-    except UnicodeDecodeError:
-        text, is_text = data.decode("utf-8", "backslashreplace"), False
-    return text.replace("\r\n", "\n"), is_text
 
 
 def _lost(path: str, status: int) -> ScriptRun:
@@ -404,16 +367,3 @@ def _lost(path: str, status: int) -> ScriptRun:
     name = signal.Signals(-status).name
     text = f"the process that supervises this script was ended by {name}\n"
     return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)
-
-
-def _library_alone(scratch: str) -> str:
-    """A folder with `mjcourse` for another interpreter; what else is installed here is not for it.
-
-    Raises:
-        EffectError: it cannot be made.
-    """
-    try:
-        Path(scratch, "mjcourse").symlink_to(Path(library_folder(), "mjcourse"))
-    except OSError as error:
-        raise EffectError(f"a link cannot be made: {reason(error)}") from None
-    return scratch

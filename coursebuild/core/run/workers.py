@@ -8,10 +8,10 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import selectors
 import subprocess
 import time
 from collections.abc import Callable, Mapping, Sequence
+from multiprocessing.connection import wait
 from typing import TypeAlias
 
 import msgspec
@@ -43,7 +43,7 @@ class Worker:
         self.environment = environment
         self.job: int | None = None
         """What it works on: the index of a job."""
-        self.rested = False
+        self.is_reused = False
         """Whether it is as it was left by an earlier run, and has reported nothing since."""
         self.deadline = float("inf")
         """When it must have reported, by `time.monotonic`."""
@@ -75,18 +75,13 @@ class Worker:
             assert pipe is not None
             pipe.close()  # a script's streams are pipes too; the supervisor itself prints nothing
 
-    def fileno(self) -> int:
-        """Where its reports are read."""
-        return self.reports
-
     def give(self, index: int, message: bytes) -> None:
         """Hand over a job."""
         self.job = index
-        rest = memoryview(supervisor.LENGTH.pack(len(message)) + message)
         assert self.jobs is not None
-        with contextlib.suppress(BrokenPipeError):  # it died; reading tells
-            while rest:
-                rest = rest[os.write(self.jobs, rest) :]
+        # A pipe that is broken is that of one that died, which reading tells.
+        with contextlib.suppress(BrokenPipeError), open(self.jobs, "wb", closefd=False) as pipe:
+            pipe.write(supervisor.LENGTH.pack(len(message)) + message)
 
     def kill(self) -> None:
         """End it at once; on Linux, what it runs with it."""
@@ -136,18 +131,12 @@ class Worker:
     def close(self) -> None:
         """Let it kill what it runs, and wait for that."""
         self.dismiss()
+        until = time.monotonic() + 10.0
         try:
-            with contextlib.suppress(OSError):
-                self._wait(10.0)
+            while (left := until - time.monotonic()) > 0 and wait([self.reports], left):
+                if not os.read(self.reports, 1 << 16):
+                    break
         finally:
             os.close(self.reports)
             self.kill()  # if it is still there
             self._process.wait()
-
-    def _wait(self, seconds: float) -> None:
-        until = time.monotonic() + seconds
-        with selectors.DefaultSelector() as selector:
-            selector.register(self.reports, selectors.EVENT_READ)
-            while (left := until - time.monotonic()) > 0 and selector.select(left):
-                if not os.read(self.reports, 1 << 16):
-                    return

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import PurePosixPath
 
 from msgspec import Struct
 
@@ -104,7 +105,6 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
             each.script.args,
             each.script.timeout * patience,
             each.script.requires,
-            each.script.norun,
             perturbation,
             each.packages,
             each.environment,
@@ -121,10 +121,8 @@ def _key(path: str) -> str:
     return unicodedata.normalize("NFC", path).casefold()
 
 
-def _folders(key: str) -> Iterator[str]:
-    while "/" in key:
-        key = key.rpartition("/")[0]
-        yield key
+def _folders(key: str) -> list[str]:
+    return [folder.as_posix() for folder in PurePosixPath(key).parents if folder.name]
 
 
 def _clash(

@@ -9,7 +9,7 @@ from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
-    described,
+    describe,
     input_changes,
     state_changes,
 )
@@ -86,7 +86,7 @@ def test_dependencies_as_lines() -> None:
         Dependency(Kind.MODULE, "mjcourse", "files 12"),
         Dependency(Kind.PLACE, "course", "/home/me"),
     ]
-    assert [described(dependency) for dependency in dependencies] == [
+    assert [describe(dependency) for dependency in dependencies] == [
         "models/a.xml",
         "models/b.xml (not there)",
         "the list of files in models",

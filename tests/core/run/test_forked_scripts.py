@@ -15,8 +15,12 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.run.runner import ScriptServer, clean_environment
-from coursebuild.core.run.script_environment import OtherEnvironment, library_folder
+from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_environment import (
+    OtherEnvironment,
+    clean_environment,
+    library_folder,
+)
 from coursebuild.core.run.versions import python_version
 from support.probe_scripts import FAILURES, PROBES
 from support.runners import job

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import pytest
 
 from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.runner import ScriptServer, clean_environment
+from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_environment import clean_environment
 from support.model_files import TETRAHEDRON, png
 
 pytestmark = pytest.mark.site
@@ -263,7 +264,7 @@ def write(root: Path, files: dict[str, bytes]) -> None:
 
 def run(server: ScriptServer, root: Path, script: str) -> ScriptRun:
     write(root, {"examples/x.py": (SHOW + script).encode()})
-    (done,) = server.run(root, [ScriptJob("examples/x.py", (), 120.0, (), False)], parallel=1)
+    (done,) = server.run(root, [ScriptJob("examples/x.py", (), 120.0, ())], parallel=1)
     return done
 
 

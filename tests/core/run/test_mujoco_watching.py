@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import Divergence, Outcome, Sign
-from coursebuild.core.run.runner import clean_environment
+from coursebuild.core.run.script_environment import clean_environment
 from support.runners import Run, both_ways
 
 pytestmark = pytest.mark.site

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.run.packages import ABSENT, Installed
+from coursebuild.core.run.packages import ABSENT, InstalledPackages
 
 
 @pytest.fixture
@@ -41,8 +41,8 @@ def later(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "time_ns", lambda: real() + 3_600_000_000_000)
 
 
-def ask(tmp_path: Path, site: Path) -> Installed:
-    return Installed(Memo(tmp_path), [str(site)])
+def ask(tmp_path: Path, site: Path) -> InstalledPackages:
+    return InstalledPackages(Memo(tmp_path), [str(site)])
 
 
 def test_versions(tmp_path: Path, site: Path) -> None:
@@ -102,5 +102,5 @@ def test_the_first_on_the_path_counts(tmp_path: Path, site: Path) -> None:
     user = tmp_path / "user/site-packages"
     user.mkdir(parents=True)
     install(user, "Some-Tool", "9", ["tool/__init__.py"])
-    found = Installed(Memo(tmp_path), [str(user), str(site), str(tmp_path / "none")])
+    found = InstalledPackages(Memo(tmp_path), [str(user), str(site), str(tmp_path / "none")])
     assert found.version("tool") == "Some-Tool 9"

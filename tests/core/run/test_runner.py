@@ -14,7 +14,8 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome
-from coursebuild.core.run.runner import ScriptServer, clean_environment
+from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_environment import clean_environment
 from support.runners import SOURCE_TREE, TOOL, Run, both_ways, forked_or_not, hanging, job
 
 pytestmark = pytest.mark.site
@@ -94,15 +95,15 @@ def test_script_that_closes_its_output_goes_on(run: Run, root: Path) -> None:
     assert (root / "examples/late").exists()
 
 
-def test_skipped_and_norun(server: ScriptServer, root: Path) -> None:
+def test_script_that_lacks_a_module_is_skipped(server: ScriptServer, root: Path) -> None:
     (root / "examples/x.py").write_text("print(1)")
     told: list[object] = []
     lacking = ["no_such_module", "json", "json.no_such", "no_such_module.sub"]
-    jobs = [job(requires=lacking), job("examples/none.py", norun=True)]
-    skipped, norun = server.run(root, jobs, parallel=4, started=told.append, finished=told.append)
+    jobs = [job(requires=lacking)]
+    (skipped,) = server.run(root, jobs, parallel=4, started=told.append, finished=told.append)
     assert skipped.outcome is Outcome.SKIPPED
     assert skipped.missing == ("no_such_module", "json.no_such", "no_such_module.sub")
-    assert (norun.outcome, norun.stdout) == (Outcome.NORUN, "")
+
     assert told == ["examples/x.py", skipped]
     assert server.run(root, [], parallel=4) == ()
 

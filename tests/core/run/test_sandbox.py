@@ -17,7 +17,7 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run.runner import run_scripts
+from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.sandbox import find_sandbox
 from support.runners import gone
 from support.sandboxes import require_sandbox
@@ -53,8 +53,9 @@ def confine(root: Path, home: Path) -> Confine:
         jobs = []
         for number, code in enumerate(codes):
             (root / f"examples/x{number}.py").write_text(TRY + code)
-            jobs.append(ScriptJob(f"examples/x{number}.py", (), 60.0, (), False, **options))  # type: ignore[arg-type]
-        return list(run_scripts(root, jobs, parallel=1, sandbox=require_sandbox(root)))
+            jobs.append(ScriptJob(f"examples/x{number}.py", (), 60.0, (), **options))  # type: ignore[arg-type]
+        with ScriptServer(sandbox=require_sandbox(root)) as server:
+            return list(server.run(root, jobs, parallel=1))
 
     return confine
 
@@ -275,8 +276,9 @@ print(model.ngeom, helper.VALUE, old, os.getcwd(), os.path.expanduser("~"))
 
     def test_they_are_the_same(self, confine: Confine, root: Path) -> None:
         (inside,) = confine(self.CODE, figures=("a.csv",))
-        job = ScriptJob("examples/x0.py", (), 60.0, (), False, figures=("a.csv",))
-        (outside,) = run_scripts(root, [job], parallel=1)
+        job = ScriptJob("examples/x0.py", (), 60.0, (), figures=("a.csv",))
+        with ScriptServer() as server:
+            (outside,) = server.run(root, [job], parallel=1)
         assert outside.outcome is Outcome.OK, outside.stderr
         for name in ("outcome", "stdout", "stderr", "figures", "trace"):
             assert getattr(inside, name) == getattr(outside, name)

@@ -29,7 +29,10 @@ def test_supervisors_stay_and_one_that_died_is_replaced(root: Path) -> None:
             dead = supervisor_of(server.run(root, [job()], parallel=1)[0])
             os.kill(dead, number)
             assert gone(dead)
-            assert supervisor_of(server.run(root, [job()], parallel=1)[0]) != dead
+            events: list[str] = []
+            after = server.run(root, [job()], parallel=1, started=events.append)
+            assert supervisor_of(after[0]) != dead
+            assert events == ["examples/x.py"], "it began once, whoever was to run it"
 
 
 def test_environment_that_changes_is_seen(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,8 +28,8 @@ def test_scripts_become_files() -> None:
     )  # fmt: skip
     assert a.data == b"x = '\xc2\xb5'\n\nprint(x)\n"
     assert jobs(found.value) == (
-        ScriptJob("examples/a.py", (), 5.0, (), False),
-        ScriptJob("examples/b/c.py", (), 60.0, (), True),
+        ScriptJob("examples/a.py", (), 5.0, ()),
+        ScriptJob("examples/b/c.py", (), 60.0, ()),
     )
     assert c.text == "pass\n"
     places = [a.line_span(number) for number in range(5)]

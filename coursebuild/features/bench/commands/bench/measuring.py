@@ -27,7 +27,7 @@ from msgspec.structs import replace
 from coursebuild.core.model.results import ScriptJob
 from coursebuild.core.model.scenarios import DeclaredSweep
 from coursebuild.core.run.machine import one_processor
-from coursebuild.core.run.runner import run_scripts
+from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.runs import CannotError
@@ -140,8 +140,9 @@ def _exact(root: Path, scene: CourseScene) -> ExactMotion | None:
     def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array | None]:
         asked = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
         script = os.path.relpath(EXACT_SCRIPT, root)
-        job = ScriptJob(script, (path, json.dumps(asked)), _SECONDS, (), norun=False)
-        (run,) = run_scripts(root, (job,), parallel=1)
+        job = ScriptJob(script, (path, json.dumps(asked)), _SECONDS, ())
+        with ScriptServer() as server:
+            (run,) = server.run(root, (job,), parallel=1)
         try:
             found = msgspec.json.decode(run.stdout, type=list[list[list[float]]])
             parts = [np.array(part) for part in zip(*found, strict=True)]
