@@ -12,7 +12,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.core.engine.archives import check_target, write_archive, write_single
+from coursebuild.core.engine.archives import check_target, write_export
 from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.features import Exporter
 from coursebuild.core.files.course_features import load_course_features
@@ -60,8 +60,7 @@ def export(options: Options, name: str, out: Path | None) -> Report:
         if not made.files:
             raise EffectError(f"the course has nothing that `export {name}` could write")
         with progress.stage("packing"):
-            write = write_archive if exporter.archive else write_single
-            size = write(place, made.files)
+            size = write_export(place, made.files, archive=exporter.archive)
     count = len(made.files)
     said = f"wrote {f'{count} files to ' if exporter.archive else ''}{out}, {_size(size)}"
     return replace(report, remarks=(said,), depends=None)

@@ -1,7 +1,7 @@
 """Writing a file for others, in one step, without holding an archive in memory.
 
 Entry points: `check_target`, which says early whether one may be written somewhere;
-`write_archive`, `write_single`.
+`write_export`.
 
 The same files give the same bytes: they stand in the order of their paths, with one date, and what
 is compressed already is stored.
@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import os
 import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -70,33 +70,12 @@ def _begins_with(place: Path, mark: str) -> bool:
         return False
 
 
-def write_archive(out: Path, files: Iterable[SiteFile]) -> int:
-    """Write the files into an archive; gives its size in bytes.
+def write_export(out: Path, files: Iterable[SiteFile], *, archive: bool) -> int:
+    """Write files into an archive, or the only one as it is; gives the size in bytes.
 
     Raises:
         EffectError: it cannot be written; what was there stays.
     """
-
-    def write(target: BinaryIO) -> None:
-        with zipfile.ZipFile(target, "w") as archive:
-            for file in sorted(files, key=lambda file: (file.path != _FIRST, file.path)):
-                _add(archive, file)
-
-    return _write(out, write)
-
-
-def write_single(out: Path, files: Iterable[SiteFile]) -> int:
-    """Write the only one of the files; gives its size in bytes.
-
-    Raises:
-        EffectError: it cannot be written; what was there stays.
-    """
-    (file,) = files
-    return _write(out, lambda target: target.write(file.make()))
-
-
-def _write(out: Path, write: Callable[[BinaryIO], object]) -> int:
-    """Put a file in its place when it is whole; gives its size."""
     place = Path(os.path.realpath(out))
     # One name, so that what a killed command left is written over by the next.
     temporary = place.with_name(f".{place.name}.part")
@@ -104,7 +83,11 @@ def _write(out: Path, write: Callable[[BinaryIO], object]) -> int:
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
             with temporary.open("wb") as target:
-                write(target)
+                if archive:
+                    _pack(target, files)
+                else:
+                    (file,) = files
+                    target.write(file.make())
             size = temporary.stat().st_size
             temporary.replace(place)
         finally:
@@ -115,10 +98,12 @@ def _write(out: Path, write: Callable[[BinaryIO], object]) -> int:
     return size
 
 
-def _add(archive: zipfile.ZipFile, file: SiteFile) -> None:
-    entry = zipfile.ZipInfo(file.path, _DATE)
-    stored = file.path.lower().endswith(_STORED)
-    entry.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
-    entry.create_system = 3
-    entry.external_attr = 0o100644 << 16
-    archive.writestr(entry, file.make(), compresslevel=_LEVEL)
+def _pack(target: BinaryIO, files: Iterable[SiteFile]) -> None:
+    with zipfile.ZipFile(target, "w") as archive:
+        for file in sorted(files, key=lambda file: (file.path != _FIRST, file.path)):
+            entry = zipfile.ZipInfo(file.path, _DATE)
+            stored = file.path.lower().endswith(_STORED)
+            entry.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = 0o100644 << 16
+            archive.writestr(entry, file.make(), compresslevel=_LEVEL)

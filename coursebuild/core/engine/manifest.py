@@ -20,6 +20,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
+from coursebuild.core.engine.memo import TEMPORARY, replace_file
 from coursebuild.core.files.locks import make_private_folder
 
 FOLDER = ".coursebuild/published"
@@ -91,14 +92,13 @@ class Manifest(Struct, frozen=True):
         """Keep it for the next build; one that cannot be written only costs time."""
         body = msgspec.json.encode(self.entries)
         path = _file(root, self.place)
-        new = path.with_name(f".new-{os.getpid()}")
+
         with contextlib.suppress(OSError):
             make_private_folder(root / ".coursebuild")
             path.parent.mkdir(exist_ok=True)
-            for left in path.parent.glob(".new-*"):  # by a run that was killed
+            for left in path.parent.glob(f"{TEMPORARY}*"):  # by a run that was killed
                 left.unlink(missing_ok=True)
-            new.write_bytes(hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
-            new.replace(path)
+            replace_file(path, hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
 
 
 def _file(root: Path, place: Path) -> Path:

@@ -54,8 +54,22 @@ _OFTEN = 3600.0
 """Seconds between two times that all is gone through."""
 _SHARE = 16
 """Where this part of the limit was written at once all is gone through at once."""
+_NEWEST = 8
+"""Entries that a group keeps."""
 _ROOM = 0.9
 """Part of the limit that is left full, so that not every command has to remove something."""
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Write a file in a folder that is there, or write it anew: whole or not at all."""
+    new = path.with_name(f"{TEMPORARY}{os.urandom(8).hex()}")
+    try:
+        new.write_bytes(data)
+        new.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        raise
 
 
 def sealed(name: str, data: bytes, key: bytes = b"") -> bytes:
@@ -170,16 +184,16 @@ class Memo:
         """Keep a value as JSON."""
         self.put(kind, key, msgspec.json.encode(value))
 
-    def group(self, kind: str, key: str, *, newest: int = 8) -> list[str]:
-        """The keys, `GROUP/KEY`, that are kept in a group, newest first; the others go."""
+    def group(self, kind: str, key: str) -> list[str]:
+        """The keys, `GROUP/KEY`, of the newest entries in a group, newest first; the others go."""
         folder = self.folder / kind / key
         found: list[tuple[float, str]] = []
         with contextlib.suppress(OSError), os.scandir(folder) as entries:
             found = [(e.stat().st_mtime, e.name) for e in entries if not e.name.startswith(".")]
         found.sort(reverse=True)
-        for _, name in found[newest:]:
+        for _, name in found[_NEWEST:]:
             (folder / name).unlink(missing_ok=True)
-        return [f"{key}/{name}" for _, name in found[:newest]]
+        return [f"{key}/{name}" for _, name in found[:_NEWEST]]
 
     def shared_group(self, kind: str, key: str) -> list[str]:
         """The keys of a group that the shared cache has."""
@@ -232,18 +246,14 @@ class Memo:
 
     def _write(self, name: str, data: bytes) -> None:
         path, entry = self.folder / name, sealed(name, data)
-        new = path.with_name(f"{TEMPORARY}{os.urandom(8).hex()}")
         try:
             try:
-                new.write_bytes(entry)
+                replace_file(path, entry)
             except FileNotFoundError:
                 make_private_folder(self.folder)
                 path.parent.mkdir(parents=True, exist_ok=True)
-                new.write_bytes(entry)
-            new.replace(path)
+                replace_file(path, entry)
         except OSError as error:
-            with contextlib.suppress(OSError):
-                new.unlink(missing_ok=True)
             self._say(f"results cannot be kept in {FOLDER}: {reason(error)}")
             return
         with self._lock:

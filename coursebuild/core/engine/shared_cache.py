@@ -10,16 +10,15 @@ Entry point: `shared_cache(where)` gives the `SharedCache` that a `Memo` uses.
 
 from __future__ import annotations
 
-import contextlib
-import os
 import queue
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path, PurePosixPath
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
+from coursebuild.core.engine.memo import replace_file
 from coursebuild.core.files.errors import EffectError, reason
 
 _VERSION = "coursebuild-1"
@@ -37,30 +36,17 @@ _WRITERS = 4
 T = TypeVar("T")
 
 
-class SharedFolder(Protocol):
-    """Where files can be put. Paths are POSIX and relative; whatever is raised means trouble."""
-
-    def read(self, path: str) -> bytes | None:
-        """A file's bytes; `None` if there is none."""
-        ...
-
-    def write(self, path: str, data: bytes) -> None:
-        """Make or replace a file."""
-        ...
-
-    def names(self, folder: str) -> list[str]:
-        """The names in a folder; none if there is none."""
-        ...
-
-
 class FolderPlace:
-    """A folder, perhaps of a network's file system."""
+    """A folder, perhaps of a network's file system.
+
+    Paths in it are POSIX and relative; whatever is raised means trouble.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def read(self, path: str) -> bytes | None:
-        """See `SharedFolder`."""
+        """A file's bytes; `None` if there is none."""
         try:
             return (self.folder / path).read_bytes()
         except (FileNotFoundError, NotADirectoryError):
@@ -69,21 +55,14 @@ class FolderPlace:
             return None
 
     def write(self, path: str, data: bytes) -> None:
-        """See `SharedFolder`; whole or not at all."""
+        """Make or replace a file, whole or not at all."""
         target = self.folder / path
         self.folder.mkdir(exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".new-{os.urandom(8).hex()}")
-        try:
-            temporary.write_bytes(data)
-            temporary.replace(target)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
-            raise
+        replace_file(target, data)
 
     def names(self, folder: str) -> list[str]:
-        """See `SharedFolder`."""
+        """The names in a folder; none if there is none."""
         try:
             found = [path.name for path in (self.folder / folder).iterdir()]
         except (FileNotFoundError, NotADirectoryError):
@@ -92,14 +71,14 @@ class FolderPlace:
 
 
 class RemotePlace:
-    """A place of fsspec's."""
+    """A place of fsspec's, as a `FolderPlace`."""
 
     def __init__(self, files: Any, top: str) -> None:
         self.files = files
         self.top = top.rstrip("/")
 
     def read(self, path: str) -> bytes | None:
-        """See `SharedFolder`."""
+        """A file's bytes; `None` if there is none."""
         try:
             data: bytes = self.files.cat_file(f"{self.top}/{path}")
         except (FileNotFoundError, NotADirectoryError):
@@ -107,7 +86,7 @@ class RemotePlace:
         return data
 
     def write(self, path: str, data: bytes) -> None:
-        """See `SharedFolder`."""
+        """Make or replace a file."""
         full = f"{self.top}/{path}"
         try:
             self.files.pipe_file(full, data)
@@ -116,7 +95,7 @@ class RemotePlace:
             self.files.pipe_file(full, data)
 
     def names(self, folder: str) -> list[str]:
-        """See `SharedFolder`."""
+        """The names in a folder; none if there is none."""
         try:
             found = self.files.ls(f"{self.top}/{folder}", detail=False)
         except (FileNotFoundError, NotADirectoryError):
@@ -158,7 +137,11 @@ class SharedCache:
     """A place where entries are shared; its failures raise nothing."""
 
     def __init__(
-        self, where: str, place: SharedFolder, key: bytes = b"", timeout: float = _TIMEOUT
+        self,
+        where: str,
+        place: FolderPlace | RemotePlace,
+        key: bytes = b"",
+        timeout: float = _TIMEOUT,
     ) -> None:
         self.where = where
         self.place = place

@@ -3,13 +3,14 @@
 Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas; `code_digest`, of
 some code, by its content; `step_key`, the keys of what the tool makes.
 
-What it imports belongs to it, by the versions that are installed. The files' sizes and times tell
-one tool from another, so that none of them need be read. A tool that was installed anew makes
-everything once more, though it may be the same.
+What is installed beside it belongs to it, by the versions: it may import any of that. The files'
+sizes and times tell one tool from another, so that none of them need be read. A tool that was
+installed anew makes everything once more, though it may be the same.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -41,46 +42,19 @@ def typesetter_digest() -> str:
     return _digest(str(assets_dir() / "temml"), os.path.join(_CORE, "run"))  # noqa: PTH118
 
 
-_LIBRARIES = (
-    "brotli",
-    "fonttools",
-    "jinja2",
-    "markdown_it_py",
-    "markupsafe",
-    "mdit_py_plugins",
-    "mdurl",
-    "mini_racer",
-    "msgspec",
-    "pint",
-    "pygments",
-    "segno",
-    "selectolax",
-    "tree_sitter",
-    "tree_sitter_javascript",
-    "uharfbuzz",
-)
-"""What outputs are made with, as the folders with their versions in the name begin."""
-
-
 @functools.cache
-def _libraries() -> str:
-    """The versions of the libraries, by the folders that installing them leaves."""
+def _installed() -> str:
+    """What is installed and its versions, by the folders that installing it leaves."""
     found: list[str] = []
     for folder in sys.path:
-        try:
+        with contextlib.suppress(OSError):
             names = os.listdir(folder or ".")  # noqa: PTH208
-        except OSError:
-            continue
-        found += sorted(
-            name
-            for name in names
-            if name.endswith(".dist-info") and name.lower().partition("-")[0] in _LIBRARIES
-        )
+            found += sorted(name for name in names if name.endswith(".dist-info"))
     return "\0".join(found)
 
 
 def _digest(*folders: str) -> str:
-    digest = hashlib.sha256(f"{sys.version}\0{_libraries()}\0".encode())
+    digest = hashlib.sha256(f"{sys.version}\0{_installed()}\0".encode("utf-8", "surrogateescape"))
     for folder in folders:
         for line in _lines(folder, ""):
             digest.update(line.encode("utf-8", "surrogateescape"))

@@ -87,7 +87,7 @@ def test_a_damaged_shared_entry_is_not_served_and_made_good(tmp_path: Path) -> N
         assert path.read_bytes() == whole
 
 
-class Broken:
+class Broken(FolderPlace):
     """A place with which everything goes wrong, in its own way."""
 
     def __init__(self, trouble: Callable[[], object]) -> None:
