@@ -25,7 +25,12 @@ from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.run.environments import environment, latest_version, other_version
 from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
-from coursebuild.core.scripts.against import RunStanding, is_comparable, judgement, run_standings
+from coursebuild.core.scripts.against import (
+    RunStanding,
+    judgement,
+    reason_uncompared,
+    run_standings,
+)
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure
 from coursebuild.core.text.diagnostics import Severity
@@ -98,7 +103,7 @@ class _Work(Struct):
         self.here = {one.path: one for one in runs}
         place = environment(self.options.root, self.other, self.progress.say)
         here = run_standings(self.course, self.here, runs)
-        kept = {path: is_comparable(standing) for path, standing in here.items()}
+        kept = {path: reason_uncompared(standing) for path, standing in here.items()}
         compared = [e for e in self.chosen if kept[e.path] is None]
         there = self._run(compared, place, f"running scripts with MuJoCo {self.other}")
         differing = [e for e in compared if not there[e.path].holds]

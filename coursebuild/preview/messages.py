@@ -188,7 +188,7 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
 
 def _drift(session: Session, library: Library, verdict: Verdict) -> dict[str, Any]:
     run = library.runs[verdict.recording.script or ""]
-    rows = diff_rows(verdict.recording, verdict, library.course.filters, run.stdout)
+    rows = diff_rows(verdict, library.course.filters, run.stdout)
     edit = new_output(session, library, verdict)
     return {
         "rows": [[row.mark, [[one.text, one.changed] for one in row.pieces]] for row in rows],

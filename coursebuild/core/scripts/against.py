@@ -77,7 +77,7 @@ def _of_print(course: Course, here: ScriptRun, run: ScriptRun) -> RunStanding:
     return RunStanding(run, True, diff="" if same else text_diff(here.stdout, run.stdout))
 
 
-def is_comparable(here: RunStanding) -> Judgement | None:
+def reason_uncompared(here: RunStanding) -> Judgement | None:
     """What keeps a script from being compared; `None` where nothing does."""
     match here.run.outcome:
         case Outcome.NORUN:

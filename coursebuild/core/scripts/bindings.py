@@ -171,15 +171,6 @@ def check_bindings(
     return tuple(found)
 
 
-def _leans_on(
-    binding: NumberBinding, printed: Printed
-) -> tuple[str | None, ScriptRun | None, list[Verdict]]:
-    """The path and the run of the script that a binding depends on, and its recorded outputs."""
-    verdicts = printed.recorded(binding)
-    path = binding.script or (verdicts[0].recording.script if verdicts else None)
-    return path, printed.runs.get(path or ""), verdicts
-
-
 def _check(
     binding: NumberBinding, printed: Printed, before: Sequence[str]
 ) -> Diagnostic | Sequence[PrintedLine]:
@@ -187,16 +178,19 @@ def _check(
 
     `before` are those by which it held before, if that is known.
     """
-    path, run, verdicts = _leans_on(binding, printed)
+    verdicts = printed.recorded(binding)
+    path = binding.script or (verdicts[0].recording.script if verdicts else None)
     if path is None or path not in printed.scripts:
-        return _orphan(binding, printed)
+        return _orphan(binding, path, printed)
+    run = printed.runs.get(path)
     ran_well = run is not None and run.outcome is Outcome.OK
     if run is not None and (
         run.outcome in _FAILED or (verdicts and ran_well and not run.stdout.strip())
     ):
         return ()
     if not verdicts and not ran_well:
-        return _never_run(binding, path, run)
+        is_run = run is None or run.outcome is not Outcome.NORUN
+        return () if is_run else _orphan(binding, path, printed)
     steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
     shown = Shown.of(binding.text)
     lines = [line for verdict in steady for line in printed.lines(verdict)]
@@ -229,38 +223,23 @@ def _script_between(document: Document, binding: NumberBinding, printed: Printed
 
 def _holds(shown: Shown, lines: Sequence[PrintedLine]) -> bool:
     if not shown.numbers:
-        return bool(shown.before) and any(True for _ in text_places(shown.before, lines))
+        return bool(shown.before) and next(text_places(shown.before, lines), None) is not None
     return shown.is_in(lines)
 
 
-def _never_run(
-    binding: NumberBinding, path: str, run: ScriptRun | None
-) -> Diagnostic | Sequence[PrintedLine]:
-    """A binding to a script without a recorded output and without a run that could count."""
-    if run is None or run.outcome is not Outcome.NORUN:
-        return ()
-    return diagnose(
-        "binding-orphan",
-        binding.text_span,
-        f"`{binding.text}` is bound to `{path}`, which has no recorded output and is not run",
-        help="record its output below it",
-    )
-
-
-def _orphan(binding: NumberBinding, printed: Printed) -> Diagnostic:
-    if binding.script is None:
-        return diagnose(
-            "binding-orphan",
-            binding.text_span,
-            f"`{binding.text}` is bound, and no recorded output stands above it",
-            help="write it below the output, or name the script: `{out=examples/…}`",
-        )
-    return diagnose(
-        "binding-orphan",
-        binding.text_span,
-        f"`{binding.text}` is bound to `{binding.script}`, which is no script of the course",
-        help=did_you_mean(binding.script, printed.scripts),
-    )
+def _orphan(binding: NumberBinding, path: str | None, printed: Printed) -> Diagnostic:
+    """A binding that has no output: none above it, no such script, or one that is not run."""
+    if path is None:
+        to = ", and no recorded output stands above it"
+        help = "write it below the output, or name the script: `{out=examples/…}`"
+    elif path in printed.scripts:
+        to = f" to `{path}`, which has no recorded output and is not run"
+        help = "record its output below it"
+    else:
+        to = f" to `{path}`, which is no script of the course"
+        help = did_you_mean(path, printed.scripts)
+    message = f"`{binding.text}` is bound{to}"
+    return diagnose("binding-orphan", binding.text_span, message, help=help)
 
 
 def leaning_on(

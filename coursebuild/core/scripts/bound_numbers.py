@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
-from coursebuild.core.scripts.mapped_text import Side, plain
+from coursebuild.core.scripts.mapped_text import Side, plain, replaced
 from coursebuild.core.scripts.numbers import (
     Number,
     round_like,
@@ -133,15 +133,13 @@ class Shown(Struct, frozen=True):
 
         `None` where its notation is not that of a printed number.
         """
-        parts: list[str] = []
-        at = 0
+        places: list[tuple[int, int, str]] = []
         for number, printed in zip(self.numbers, window.numbers, strict=True):
             rounded = round_like(number, printed.value) if printed.finite else None
             if rounded is None:
                 return None
-            parts += (text[at : number.start], rounded)
-            at = number.end
-        return "".join((*parts, text[at:]))
+            places.append((number.start, number.end, rounded))
+        return replaced(text, places)
 
     def is_in(self, lines: Sequence[PrintedLine]) -> bool:
         """Whether printed numbers that may be meant are those shown, rounded."""

@@ -56,16 +56,11 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
                 comparison, run = block.comparison or course.comparison, by_path.get(block.script)
                 same = nearest is not None and nearest.path == block.script
                 kept = block.readable and (not same or first[block.script] is nearest)
-                if kept and run and run.outcome is Outcome.OK and not is_silent(run.stdout):
+                if kept and run and run.outcome is Outcome.OK and run.stdout.strip():
                     verdicts.append(compare(block, comparison, course.filters, run.stdout))
                 else:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
     return tuple(verdicts)
-
-
-def is_silent(stdout: str) -> bool:
-    """Whether an output has no line to record."""
-    return not stdout.strip()
 
 
 def compare(

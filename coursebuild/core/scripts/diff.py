@@ -1,6 +1,6 @@
 """A recorded output beside what its script prints now, line by line.
 
-Entry points: `diff_rows(recording, verdict, filters, stdout)`; `text_diff`, `shortened`.
+Entry points: `diff_rows`; `text_diff`, `shortened`, `quoted`.
 
 Lines that match under the comparison's mode are as recorded, even where their characters differ;
 lines that a `...` stands for are left out. A row says which part of its line is another.
@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model import Filter, Recording, Table
+from coursebuild.core.model import Filter, Table
 from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align
 from coursebuild.core.scripts.changes import differences
@@ -45,6 +45,11 @@ def shortened(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
+def quoted(text: str, width: int) -> str:
+    """A line of output as a message shows it: cut, without the white space around it."""
+    return f"`{shortened(text.strip(), width)}`"
+
+
 def text_diff(before: str, now: str) -> str:
     """The lines that two texts do not share, at most twelve of them."""
     lines = [
@@ -57,19 +62,18 @@ def text_diff(before: str, now: str) -> str:
     return "\n".join(lines)
 
 
-def diff_rows(
-    recording: Recording, verdict: Verdict, filters: tuple[Filter, ...], stdout: str
-) -> tuple[DiffRow, ...]:
+def diff_rows(verdict: Verdict, filters: tuple[Filter, ...], stdout: str) -> tuple[DiffRow, ...]:
     """The rows of a recording that a run differs from.
 
     Of a table only the cells that changed are shown, as one row each.
     """
-    if isinstance(recording.body, Table):
+    body = verdict.recording.body
+    if isinstance(body, Table):
         return tuple(
             row for change in verdict.changes for row in _whole(change.recorded, change.ran)
         )
     matcher, filters = LineMatcher(verdict.comparison), (*filters, *verdict.comparison.filters)
-    recorded, ran = Side.of(recording.body.text, filters), Side.of(stdout, filters)
+    recorded, ran = Side.of(body.text, filters), Side.of(stdout, filters)
     steps = align(recorded, ran, matcher)
     rows = (row for step in steps for row in _rows(step, recorded, ran, matcher))
     # All that goes before all that comes, as far as no common line lies between.

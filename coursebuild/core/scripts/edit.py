@@ -22,7 +22,7 @@ from collections.abc import Iterable, Sequence
 from coursebuild.core.model import Comparison, Filter, Mode, Recording, Script, Table
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.mapped_text import Side, replaced
 from coursebuild.core.scripts.repeat import unstable
 from coursebuild.core.scripts.tableedit import updated_table
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
@@ -37,19 +37,15 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
     Raises `ValueError` for edits that overlap, stand at the same place, or belong to another text:
     each is a bug of whoever made them.
     """
-    parts: list[str] = []
-    at = 0
-    last: tuple[int, int] | None = None
+    places: list[tuple[int, int, str]] = []
     for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
         start, end = edit.span.start, edit.span.end
         if edit.span.source.text != text:
             raise ValueError(f"an edit of another text than {edit.span.path} is now")
-        if start < at or end < start or (start, end) == last:
+        if places and (start < places[-1][1] or (start, end) == places[-1][:2]):
             raise ValueError(f"edits overlap at offset {start} of {edit.span.path}")
-        parts += (text[at:start], edit.text)
-        at = end
-        last = (start, end)
-    return "".join((*parts, text[at:]))
+        places.append((start, end, edit.text))
+    return replaced(text, places)
 
 
 def updated_body(
@@ -64,7 +60,7 @@ def updated_body(
     `None` where it matches already; a diagnostic where it cannot be brought up to date.
     """
     if not first.strip():
-        return refused(recording.caption_span, "the script printed nothing to record", "")
+        return refusal(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, Table):
         return updated_table(recording, recording.body, comparison, filters, first, second)
     body, filters = recording.body, (*filters, *comparison.filters)
@@ -89,7 +85,7 @@ def updated_body(
     return _fence_edit(recording, lines)
 
 
-def refused(span: Span, message: str, help_text: str, label: str = "") -> Diagnostic:
+def refusal(span: Span, message: str, help_text: str, label: str = "") -> Diagnostic:
     """An output that cannot be brought up to date."""
     return diagnose("output-not-updatable", span, message, label=label, help=help_text)
 
@@ -117,7 +113,7 @@ def _new_lines(
     for lines in tries:
         if same_lines(Side.of("\n".join(lines), filters), ran, comparison):
             return lines
-    return refused(
+    return refusal(
         body.span().first_line(),
         "no text was found that matches what the script prints",
         "bring it up to date by hand: a `...` or a filter stands in the way",
@@ -152,7 +148,7 @@ class _Kept:
                 return self.ran.raw_lines(step.ran)
             case StepKind.MISSING:
                 if _beside_elided(steps, index):
-                    return self._lost(step.recorded, "this line was not printed where `...` is")
+                    return self._refusal(step.recorded, "this line was not printed where `...` is")
                 return ()
             case StepKind.EXTRA:
                 return self.ran.raw_lines(step.ran)
@@ -175,18 +171,13 @@ class _Kept:
         text = self.recorded.lines[step.recorded]
         pairs = self.matcher.pairs(text, self.ran.lines[step.ran])
         if pairs is None or self.recorded.raw_lines(step.recorded) != (text,):
-            return self._lost(step.recorded, "this line no longer fits what the script prints")
-        parts: list[str] = []
-        at = 0
-        for recorded, ran in pairs:
-            if not self.matcher.same(recorded, ran):
-                parts += (text[at : recorded.start], ran.text)
-                at = recorded.end
-        return ("".join((*parts, text[at:])),)
+            return self._refusal(step.recorded, "this line no longer fits what the script prints")
+        others = ((a.start, a.end, b.text) for a, b in pairs if not self.matcher.same(a, b))
+        return (replaced(text, others),)
 
-    def _lost(self, line: int, label: str) -> Diagnostic:
+    def _refusal(self, line: int, label: str) -> Diagnostic:
         start, end = self.recorded.origin(line, 0, len(self.recorded.lines[line]))
-        return refused(
+        return refusal(
             self.body.span(start, end),
             f"an output with `{ELLIPSIS}` cannot be brought up to date here",
             f"write the line anew by hand, or take the `{ELLIPSIS}` away and update again",
@@ -196,13 +187,12 @@ class _Kept:
 
 def _beside_elided(steps: Sequence[Step], index: int) -> bool:
     """Whether lines are elided between the pairs of lines around a step."""
-    pairs = (StepKind.SAME, StepKind.DIFFERS)
-    for way in (-1, 1):
-        at = index + way
-        while 0 <= at < len(steps) and steps[at].kind not in pairs:
-            if steps[at].kind is StepKind.ELIDED:
+    for places in (range(index - 1, -1, -1), range(index + 1, len(steps))):
+        for kind in (steps[at].kind for at in places):
+            if kind is StepKind.ELIDED:
                 return True
-            at += way
+            if kind in (StepKind.SAME, StepKind.DIFFERS):
+                break
     return False
 
 
@@ -214,7 +204,7 @@ def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic
     fence = _opening_fence(recording.body_span)
     for number, line in enumerate(lines, start=1):
         if "\x00" in line:
-            return refused(
+            return refusal(
                 fence,
                 f"line {number} of the output has a NUL character, which Markdown cannot hold",
                 "print text only",
@@ -222,7 +212,7 @@ def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic
     longest = _longest_marks(lines, fence.text)
     if longest:
         marks = "backticks" if fence.text[0] == "`" else "tildes"
-        return refused(
+        return refusal(
             fence,
             "the output has a line that would close this fence, or begin another",
             f"open and close it with {longest + 1} {marks}, then update again",

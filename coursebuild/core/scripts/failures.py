@@ -124,7 +124,8 @@ def failure(
         case Outcome.FAILED:
             rule, message = "script-failed", f"{path} exited with status {run.status}"
         case Outcome.KILLED:
-            name = _signal_name(run.status)
+            known = _SIGNALS.get(run.status)
+            name = f"SIG{known}" if known else f"signal {run.status}"
             rule, message = "script-killed", f"{path} was ended by {name}"
             if name == "SIGKILL":
                 help = "the system ends a process that takes too much memory"
@@ -167,10 +168,6 @@ def silence(recording: Recording, path: str) -> Diagnostic:
         f"an output is recorded here and `{path}` printed nothing",
         help="print what is recorded, or take the recorded output away",
     )
-
-
-def _signal_name(number: int) -> str:
-    return f"SIG{_SIGNALS[number]}" if number in _SIGNALS else f"signal {number}"
 
 
 def _parses(extraction: Extraction) -> bool:
@@ -240,7 +237,7 @@ _EFFECTS = {
 
 def is_lost(extraction: Extraction, run: ScriptRun) -> bool:
     """Whether a simulation was lost, without the script's saying so."""
-    return not extraction.script.diverges and bool(_lost(run))
+    return not extraction.script.diverges and bool(_lost_simulations(run))
 
 
 def divergence(
@@ -258,7 +255,7 @@ def divergence(
             yield _unlike(extraction, "script-shallow", "deep", what)
     if script.diverges or not found:
         return
-    lost = _lost(run)
+    lost = _lost_simulations(run)
     if lost:
         said = f"a simulation of `{script.path}` diverged"
         yield _found("script-diverged", extraction, lost, extractions, said, _DIVERGES)
@@ -281,7 +278,7 @@ def effects(
             yield _found(rule, extraction, these, extractions, f"`{run.path}` {said}", help)
 
 
-def _lost(run: ScriptRun) -> tuple[Divergence, ...]:
+def _lost_simulations(run: ScriptRun) -> tuple[Divergence, ...]:
     found = () if run.trace is None else run.trace.divergences
     return tuple(each for each in found if each.sign is not Sign.CONTACT)
 

@@ -19,8 +19,8 @@ from coursebuild.core.scripts.bindings import (
     leaning_on,
 )
 from coursebuild.core.scripts.bound_numbers import Shown, shows
-from coursebuild.core.scripts.compare import compare, is_silent
-from coursebuild.core.scripts.diff import shortened
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.diff import quoted, shortened
 from coursebuild.core.scripts.extract import Extraction, extract, owners
 from coursebuild.core.scripts.failures import divergence, effects, failure, silence
 from coursebuild.core.scripts.mapped_text import Side
@@ -79,16 +79,16 @@ def output_findings(
         for verdict in printed.outputs(document):
             recording = verdict.recording
             run = printed.runs.get(recording.script or "")
-            if run is not None and run.outcome is Outcome.OK and is_silent(run.stdout):
+            if run is not None and run.outcome is Outcome.OK and not run.stdout.strip():
                 yield silence(recording, run.path)
             elif verdict.status == "drift":
                 leaning = leaning_on(verdict, course.documents, printed)
-                varies = _varies(course, verdict, run, again or {})
-                yield varies or drift_diagnostic(verdict, owner, leaning)
+                unstable_output = _instability(course, verdict, run, again or {})
+                yield unstable_output or drift_diagnostic(verdict, owner, leaning)
         yield from check_bindings(document, printed, held)
 
 
-def _varies(
+def _instability(
     course: Course, verdict: Verdict, first: ScriptRun | None, again: Mapping[str, ScriptRun]
 ) -> Diagnostic | None:
     """That an output differs from run to run, as far as that is known."""
@@ -131,11 +131,11 @@ def drift_diagnostic(verdict: Verdict, owner: str, leaning: Sequence[Leaning] = 
             help=f"run {update}",
         )
     first, *others = sorted(verdict.changes, key=lambda change: change.span.start)
-    notes = [Note(_further(change), change.span) for change in others[:_NAMED]]
+    notes = [Note(_next_difference(change), change.span) for change in others[:_NAMED]]
     if len(others) > _NAMED:
         more = len(others) - _NAMED
         notes.append(Note(f"and {more} more {'difference' if more == 1 else 'differences'}"))
-    notes += (Note(_leans(leans), leans.binding.text_span) for leans in leaning)
+    notes += (Note(_dependence(one), one.binding.text_span) for one in leaning)
     return diagnose(
         "output-drift",
         first.span,
@@ -160,16 +160,17 @@ def _label(change: Change) -> str:
     """What is written beside the place of a change."""
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
-            return f"this run printed {_quoted_number(change.ran)}{_closeness(change)}"
+            told = closeness(change)
+            return f"this run printed {_number(change.ran)}{f' ({told})' if told else ''}"
         case DriftKind.TEXT if not (change.recorded.strip() or change.ran.strip()):
             return "this run printed white space of another width here"
         case DriftKind.TEXT if not change.ran.strip():
             return "this run printed nothing here"
         case DriftKind.TEXT if _same_value(change):
-            number = _quoted_number(change.ran)
+            number = _number(change.ran)
             return f"this run printed {number} (the same value, written in another way)"
         case DriftKind.TEXT:
-            return f"this run printed {_quoted(change.ran)}"
+            return f"this run printed {quoted(change.ran, _WIDTH)}"
         case DriftKind.MISSING:
             count = change.recorded.count("\n") + 1
             what = "this line" if count == 1 else f"these {count} lines"
@@ -177,7 +178,7 @@ def _label(change: Change) -> str:
         case DriftKind.EXTRA:
             first, *rest = change.ran.split("\n")
             more = f" and {len(rest)} more line{'s' if len(rest) > 1 else ''}" if rest else ""
-            return f"this run printed {_quoted(first)}{more} here"
+            return f"this run printed {quoted(first, _WIDTH)}{more} here"
 
 
 def _same_value(change: Change) -> bool:
@@ -186,11 +187,6 @@ def _same_value(change: Change) -> bool:
         return False
     whole = recorded[0].text == change.recorded and ran[0].text == change.ran
     return whole and recorded[0].value == ran[0].value
-
-
-def _closeness(change: Change) -> str:
-    told = closeness(change)
-    return f" ({told})" if told else ""
 
 
 def closeness(change: Change) -> str:
@@ -204,33 +200,29 @@ def closeness(change: Change) -> str:
     return f"{error}, {agree.get(change.digits, f'{change.digits} digits agree')}"
 
 
-def _further(change: Change) -> str:
+def _next_difference(change: Change) -> str:
     """A difference after the first, where no text stands beside its place."""
     if change.kind is DriftKind.MISSING:
         first = change.recorded.split("\n")[0]
-        return f"recorded {_quoted(first)}; {_label(change)}"
+        return f"recorded {quoted(first, _WIDTH)}; {_label(change)}"
     if change.kind is DriftKind.EXTRA or not change.recorded.strip():
         return _label(change)
     numeric = change.kind is not DriftKind.TEXT or _same_value(change)
-    recorded = _quoted_number(change.recorded) if numeric else _quoted(change.recorded)
+    recorded = _number(change.recorded) if numeric else quoted(change.recorded, _WIDTH)
     return f"recorded {recorded}; {_label(change)}"
 
 
-def _quoted(text: str) -> str:
-    return f"`{shortened(text.strip(), _WIDTH)}`"
-
-
-def _quoted_number(text: str) -> str:
+def _number(text: str) -> str:
     return shortened(text, _WIDTH)
 
 
-def _leans(leans: Leaning) -> str:
+def _dependence(leaning: Leaning) -> str:
     """What a change means for a bound number of the prose."""
-    change = leans.change
-    lead = f"`{leans.binding.text}` depends on "
+    change = leaning.change
+    lead = f"`{leaning.binding.text}` depends on "
     recorded, ran = scan(change.recorded), scan(change.ran)
     if len(recorded) != 1 or len(ran) != 1 or change.kind is DriftKind.MISSING:
         return lead + "a line that changed"
-    shown = [n for n in Shown.of(leans.binding.text).numbers if shows(n, recorded[0])]
+    shown = [n for n in Shown.of(leaning.binding.text).numbers if shows(n, recorded[0])]
     holds = ", and still holds" if any(shows(n, ran[0]) for n in shown) else ""
     return f"{lead}{recorded[0].text}, which this run printed as {ran[0].text}{holds}"

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from itertools import accumulate
 
 from msgspec import Struct
@@ -135,6 +135,16 @@ def filtered(mapped: MappedText, filters: Iterable[Filter]) -> MappedText:
     return mapped
 
 
+def replaced(text: str, places: Iterable[tuple[int, int, str]]) -> str:
+    """A text with others in places of it: start, end and what is there instead, in order."""
+    parts: list[str] = []
+    at = 0
+    for start, end, written in places:
+        parts += (text[at:start], written)
+        at = end
+    return "".join((*parts, text[at:]))
+
+
 def plain(text: str) -> str:
     """A text with its minus signs and its white space made plain."""
     return " ".join(text.replace("\u2212", "-").split())
@@ -167,13 +177,9 @@ class Side(Struct, frozen=True):
         at = self.starts[line]
         return self.mapped.origin(at + start, at + end)
 
-    def line_starts(self) -> list[int]:
-        """Offsets in the raw text at which its lines begin."""
-        return [0, *(found.end() for found in _LINE_END.finditer(self.raw))]
-
-    def raw_line(self, line: int, line_starts: Sequence[int]) -> int:
+    def raw_line(self, line: int) -> int:
         """The number, from 1, of the raw line that a line begins on."""
-        return bisect_right(line_starts, self.origin(line, 0, 0)[0])
+        return 1 + len(_LINE_END.findall(self.raw[: self.origin(line, 0, 0)[0]]))
 
     def raw_lines(self, line: int) -> tuple[str, ...]:
         """The lines of raw text that a line came from, without trailing white space.

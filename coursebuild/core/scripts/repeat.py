@@ -15,7 +15,7 @@ from coursebuild.core.model import Comparison, Course, Recording, Table, documen
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.align import Step, StepKind, align
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.diff import shortened, text_diff
+from coursebuild.core.scripts.diff import quoted, text_diff
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
@@ -82,12 +82,9 @@ def unstable(recording: Recording, first: Side, second: Side, comparison: Compar
     `first` is what would be recorded, or is, and matches the first run.
     """
     steps = align(first, second, LineMatcher(comparison))
-    line_starts = second.line_starts()
-    told = (_difference(step, first, second, line_starts) for step in steps)
-    lines = [text for text in told if text]
-    notes = [Note(text) for text in lines[:_NAMED]]
-    if len(lines) > _NAMED:
-        more = len(lines) - _NAMED
+    differ = [step for step in steps if step.kind in _DIFFERENT]
+    notes = [Note(_difference(step, first, second)) for step in differ[:_NAMED]]
+    if (more := len(differ) - _NAMED) > 0:
         notes.append(Note(f"and {more} more {'line' if more == 1 else 'lines'}"))
     return diagnose(
         "output-unstable",
@@ -105,19 +102,14 @@ _HELP = (
 _TABLE_HELP = f"{_REPEATABLE}, or record the output in a `text` fence with `volatile`"
 
 
-def _difference(step: Step, first: Side, second: Side, line_starts: list[int]) -> str:
-    match step.kind:
-        case StepKind.DIFFERS:
-            number = second.raw_line(step.ran, line_starts)
-            a, b = first.lines[step.recorded], second.lines[step.ran]
-            return f"line {number}: {_quoted(a)} in one run, {_quoted(b)} in the next"
-        case StepKind.MISSING:
-            return f"{_quoted(first.lines[step.recorded])} was printed in the first run only"
-        case StepKind.EXTRA:
-            return f"{_quoted(second.lines[step.ran])} was printed in the second run only"
-        case StepKind.SAME | StepKind.ELLIPSIS | StepKind.ELIDED:
-            return ""
+_DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
 
 
-def _quoted(text: str) -> str:
-    return f"`{shortened(text.strip(), _QUOTED)}`"
+def _difference(step: Step, first: Side, second: Side) -> str:
+    if step.kind is StepKind.MISSING:
+        return f"{quoted(first.lines[step.recorded], _QUOTED)} was printed in the first run only"
+    if step.kind is StepKind.EXTRA:
+        return f"{quoted(second.lines[step.ran], _QUOTED)} was printed in the second run only"
+    a, b = first.lines[step.recorded], second.lines[step.ran]
+    number = second.raw_line(step.ran)
+    return f"line {number}: {quoted(a, _QUOTED)} in one run, {quoted(b, _QUOTED)} in the next"

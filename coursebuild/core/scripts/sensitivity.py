@@ -40,7 +40,7 @@ from coursebuild.core.model.sensitivity import (
 )
 from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.diff import shortened
+from coursebuild.core.scripts.diff import quoted
 from coursebuild.core.scripts.lines import same_number
 from coursebuild.core.scripts.numbers import Number, difference, round_like, scan, unit
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
@@ -189,7 +189,7 @@ def _judged(
         converged,
         *ends,
         (halved or "").strip(),
-        rounded_text(number, repeat if converged is None else min(repeat, converged)),
+        _rounded(number, repeat if converged is None else min(repeat, converged)),
         compared,
     )
 
@@ -197,7 +197,7 @@ def _judged(
 def _unconverged(span: Span, number: Number, halved: str) -> Doubt:
     """A number that only half the timestep changes."""
     digits, converged, text = _digits(number), _converged(number, halved), number.text
-    instead = rounded_text(number, converged)
+    instead = _rounded(number, converged)
     return Doubt(
         span, text, digits, digits, converged, text, text, halved.strip(), instead, compared=False
     )
@@ -210,11 +210,6 @@ def _converged(number: Number, halved: str) -> int:
         return 0
     change = difference(number.value, other.value)
     return _holding(number, 2 * change) if change else _digits(number)
-
-
-def rounded_text(number: Number, digits: int) -> str:
-    """A number with so many digits; empty for a count, which is not rounded."""
-    return "" if number.integer else rounded(number, digits)
 
 
 def _number(text: str) -> Number | None:
@@ -242,12 +237,12 @@ def _holding(number: Number, spread: Decimal) -> int:
     return min(_digits(number), max(0, number.value.adjusted() - place + 1))
 
 
-def rounded(number: Number, digits: int) -> str:
-    """A printed number with so many significant digits; empty for none.
+def _rounded(number: Number, digits: int) -> str:
+    """A printed number with so many significant digits; empty for none, and for a count.
 
     In its own notation, where that can say so; a large number with few digits gets an exponent.
     """
-    if digits < 1 or not number.finite:
+    if digits < 1 or number.integer or not number.finite:
         return ""
     decimals = digits - 1 - number.value.adjusted()
     mantissa, mark, power = number.text.lower().partition("e")
@@ -303,7 +298,11 @@ def _growth(
 
 def noise(found: Sensitivity) -> Iterator[Diagnostic]:
     """A warning where the verification compares what moved states change."""
-    told = [(d.span, _doubt(d)) for d in found.doubts if d.compared and _is_noise(d)]
+    told = [
+        (doubt.span, _doubt(doubt))
+        for doubt in found.doubts
+        if doubt.compared and (doubt.repeat < _AS_MOVED or doubt.digits > _HELD)
+    ]
     told += [(flip.span, _flip(flip)) for flip in found.flips if flip.compared]
     told.sort(key=lambda each: (each[0].path, each[0].start))
     if not told:
@@ -329,10 +328,6 @@ def noise(found: Sensitivity) -> Iterator[Diagnostic]:
     )
 
 
-def _is_noise(doubt: Doubt) -> bool:
-    return doubt.repeat < _AS_MOVED or doubt.digits > _HELD
-
-
 def parting(found: Sensitivity) -> str:
     """How fast the states of a script part, in words."""
     size = found.amplification
@@ -347,7 +342,7 @@ def _doubt(doubt: Doubt) -> str:
         return f"no digit repeats: {between}"
     repeat = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
     number = _number(doubt.printed)
-    instead = "" if number is None else rounded_text(number, doubt.repeat)
+    instead = "" if number is None else _rounded(number, doubt.repeat)
     return f"{repeat}{f', print {instead}' if instead else ''}: {between}"
 
 
@@ -355,5 +350,5 @@ def _flip(flip: Flip) -> str:
     if not flip.other.strip():
         return "not always printed"
     if not flip.printed.strip():
-        return f"`{shortened(flip.other.strip(), _WIDTH)}` is printed here as well"
-    return f"printed as `{shortened(flip.other.strip(), _WIDTH)}` too"
+        return f"{quoted(flip.other, _WIDTH)} is printed here as well"
+    return f"printed as {quoted(flip.other, _WIDTH)} too"

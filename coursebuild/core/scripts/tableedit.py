@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import zip_longest
 
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter, Mode, Recording, Table
 from coursebuild.core.scripts.lines import canonical, same_number
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.mapped_text import Side, replaced
 from coursebuild.core.scripts.numbers import Number, round_like
 from coursebuild.core.scripts.repeat import unstable
 from coursebuild.core.scripts.tables import RowCell, RowMatch, TableMatcher, table_rows
@@ -65,30 +66,24 @@ def _updated_row(
         span = found.row[0].cell.span.to(found.row[-1].cell.span)
         return _refused(span, "no line of this run has the cells of this row in order")
     edits: list[Edit] = []
-    texts = {id(cell): cell.mapped.text for cell in found.row}
-    # From the last number to the first, so that the offsets before it stay right.
-    for cell, recorded, printed in reversed(found.pairs):
+    places: dict[int, list[tuple[int, int, str]]] = {id(cell): [] for cell in found.row}
+    for cell, recorded, printed in found.pairs:
         if same_number(recorded, printed, comparison):
             continue
         span = cell.span(recorded)
         if span.text.replace(MINUS, "-") != recorded.text:
             return _refused(span, "a number written with an entity or an escape cannot be replaced")
         new = _written(recorded, printed, comparison)
-        text = texts[id(cell)]
-        texts[id(cell)] = text[: recorded.start] + new + text[recorded.end :]
+        places[id(cell)].append((recorded.start, recorded.end, new))
         edits.append(Edit(span, _signed_like(span.text, new)))
-    cells = tuple(replace(cell, canon=canonical(texts[id(cell)])) for cell in found.row)
-    return cells, edits[::-1]
+    texts = ((cell, replaced(cell.mapped.text, places[id(cell)])) for cell in found.row)
+    return tuple(replace(cell, canon=canonical(text)) for cell, text in texts), edits
 
 
 def _signed_like(old: str, new: str) -> str:
     """The new number with the minus signs of the old one: before it, and in its exponent."""
-    signed: list[str] = []
-    old_parts, new_parts = (re.split("(?=[eE])", text) for text in (old, new))
-    for index, part in enumerate(new_parts):
-        model = old_parts[index] if index < len(old_parts) else ""
-        signed.append(part.replace("-", MINUS) if MINUS in model else part)
-    return "".join(signed)
+    parts = zip_longest(*(re.split("(?=[eE])", text) for text in (old, new)), fillvalue="")
+    return "".join(part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
 
 
 def _written(recorded: Number, printed: Number, comparison: Comparison) -> str:
@@ -100,14 +95,10 @@ def _written(recorded: Number, printed: Number, comparison: Comparison) -> str:
 
 def _joined(edits: Sequence[Edit]) -> Edit:
     """One edit that does what several do, in order."""
-    source = edits[0].span.source
-    start, end = edits[0].span.start, edits[-1].span.end
-    parts: list[str] = []
-    at = start
-    for edit in edits:
-        parts += (source.text[at : edit.span.start], edit.text)
-        at = edit.span.end
-    return Edit(Span(source, start, end), "".join(parts))
+    whole = edits[0].span.to(edits[-1].span)
+    at = whole.start
+    places = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)
+    return Edit(whole, replaced(whole.text, places))
 
 
 def _refused(span: Span, message: str) -> Diagnostic:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 
 from msgspec import Struct
@@ -68,7 +68,7 @@ def table_rows(
 ) -> tuple[tuple[RowCell, ...], ...]:
     """The body rows of a table; cells and rows without text are left out."""
     rules = tuple(filters)
-    texts = ([(cell, cell_text(cell, rules)) for cell in row] for row in table.rows)
+    texts = ([(cell, _cell_text(cell, rules)) for cell in row] for row in table.rows)
     rows = (
         tuple(RowCell(cell, mapped, canonical(mapped.text)) for cell, mapped in row if mapped.text)
         for row in texts
@@ -115,7 +115,7 @@ class TableMatcher:
         self, rows: Sequence[tuple[RowCell, ...]], ran: Side, comparison: model.Comparison
     ) -> None:
         self.rows = rows
-        self.comparison = comparison
+        self._same = partial(same_number, comparison=comparison)
         self.lines = [plain(text) for text in ran.lines]
         self.canon = cache(lambda line: canonical(self.lines[line]))
 
@@ -136,9 +136,6 @@ class TableMatcher:
             found.append(line)
             below = line + 1
         return found
-
-    def _same(self, recorded: Number, ran: Number) -> bool:
-        return same_number(recorded, ran, self.comparison)
 
     def _aligned(self) -> list[int]:
         """A line for each row that stands in one but for its numbers; -1 for the others."""
@@ -233,7 +230,7 @@ _RUN = re.compile(r"\s{2,}|[^\S ]")
 _ENDS = re.compile(r"\A\s+|\s+\Z")
 
 
-def cell_text(cell: model.Cell, filters: Iterable[model.Filter] = ()) -> MappedText:
+def _cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     """The plain text of a cell, filtered; origins are offsets in the lesson's source.
 
     Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A

@@ -17,7 +17,7 @@ def rows(recorded: str, ran: str) -> list[str]:
     verdict = compare(block, DIGITS_ELLIPSIS, (), ran)
     return [
         row.mark + "".join(f"[{p.text}]" if p.changed else p.text for p in row.pieces)
-        for row in diff_rows(block, verdict, (), ran)
+        for row in diff_rows(verdict, (), ran)
     ]
 
 
@@ -41,7 +41,7 @@ def test_rows(recorded: str, ran: str, expected: list[str]) -> None:
 def test_of_a_table_the_cells_that_changed() -> None:
     block = table("| n | x |\n| --- | --- |\n| 1 | 2.5 |")
     verdict = compare(block, EXACT, (), "1 3.5\n")
-    found = [(row.mark, row.pieces[0].text) for row in diff_rows(block, verdict, (), "1 3.5\n")]
+    found = [(row.mark, row.pieces[0].text) for row in diff_rows(verdict, (), "1 3.5\n")]
     assert found == [("-", "2.5"), ("+", "3.5")]
 
 
