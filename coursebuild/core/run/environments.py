@@ -26,6 +26,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import venv
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -138,9 +139,7 @@ def _make(prefix: Path, engine: str) -> None:
     _require_pip()
     new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=prefix.parent))
     try:
-        status, said = _run([sys.executable, "-m", "venv", "--without-pip", str(new)])
-        if status:
-            raise EffectError(f"a virtual environment cannot be made: {_last(said)}")
+        venv.create(new, symlinks=True)
         configured = Path(sys.prefix) / "pip.conf"
         if configured.is_file():
             shutil.copyfile(configured, new / "pip.conf")

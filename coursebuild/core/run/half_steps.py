@@ -36,7 +36,6 @@ class _HalfSteps:
         self._numpy = numpy
         self._step, self._forward = mujoco.mj_step, mujoco.mj_forward
         self._lock = threading.RLock()  # threads may share a model
-        self._has_halved = False
 
     def install(self) -> None:
         self._replace("mj_step", self._whole)
@@ -96,12 +95,7 @@ class _HalfSteps:
             time += timestep
         if abs(data.time - time) < timestep / 4:
             data.time = time
-        self._note()
-
-    def _note(self) -> None:
-        if not self._has_halved and mujoco_tracing.tracer is not None:
-            self._has_halved = True
-            mujoco_tracing.tracer.note("p")
+        mujoco_tracing.note("p")
 
     def _rollout(self, real: Callable[..., None]) -> Callable[..., None]:
         numpy = self._numpy
@@ -116,6 +110,6 @@ class _HalfSteps:
             for output, halves in zip(outputs, made, strict=True):
                 if output is not None and halves is not None:
                     output[:] = halves[:, 1::2]
-            self._note()
+            mujoco_tracing.note("p")
 
         return rollout

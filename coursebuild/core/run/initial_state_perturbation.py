@@ -85,7 +85,6 @@ class _Perturbation:
         self._plans: dict[int, tuple[Any, _Plan]] = {}
         self._count = 0
         self._numbers = 0
-        self._has_moved = False
 
     def install(self) -> None:
         wrap, mujoco = mujoco_tracing.wrap_functions, self._mujoco
@@ -134,9 +133,8 @@ class _Perturbation:
             extent.begin(data.time)
         extent.cover(data)
         extent.from_zero = extent.from_zero or bool((qpos[zeros] != 0).any())
-        if moved and not self._has_moved:
-            self._has_moved = True
-            self._note("p")
+        if moved:
+            mujoco_tracing.note("p")
         self._remember(extent, data)
 
     def _new(self, field: int, array: Any, before: bytes | None, begins: bool) -> Any:
@@ -183,9 +181,8 @@ class _Perturbation:
             act = row[1 + nq + nv : 1 + nq + nv + na]
             fields = (qpos, qvel, act)
             new = [self._new(k, array, None, True) for k, array in enumerate(fields)]
-            if self._plan(model).move(*fields, new, True) and not self._has_moved:
-                self._has_moved = True
-                self._note("p")
+            if self._plan(model).move(*fields, new, True):
+                mujoco_tracing.note("p")
         return (*args[:5], states, *args[6:])
 
     # --- the end
@@ -200,11 +197,7 @@ class _Perturbation:
         if self._numbers <= _MOST_NUMBERS:
             parts = [str(extent.number), str(len(data.qpos))]
             parts += [x.hex() for x in (*extent.sizes(), *numbers)]
-            self._note(f"s{' '.join(parts)}")
-
-    def _note(self, record: str) -> None:
-        if mujoco_tracing.tracer is not None:
-            mujoco_tracing.tracer.note(record)
+            mujoco_tracing.note(f"s{' '.join(parts)}")
 
 
 class _Plan:

@@ -104,7 +104,8 @@ def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
     """
     found: set[str] = set()
     ModelFiles(found.add).of_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
-    inside = {_from_root(root, file) for file in found}
+    paths = [Path(os.path.normpath(file)) for file in found]
+    inside = {(p.relative_to(root) if p.is_relative_to(root) else p).as_posix() for p in paths}
     # MuJoCo puts absolute paths one behind the other; nothing is there, on any machine.
     nowhere = f"{root}/".lstrip("/")
     return tuple(sorted(file for file in inside if file != path and nowhere not in file[1:]))
@@ -113,11 +114,6 @@ def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
 def parts(root: Path, path: str, text: str) -> tuple[str, ...]:
     """Those of the `model_files` that are there."""
     return tuple(file for file in model_files(root, path, text) if (root / file).is_file())
-
-
-def _from_root(root: Path, file: str) -> str:
-    full = Path(os.path.normpath(file))
-    return full.relative_to(root).as_posix() if full.is_relative_to(root) else full.as_posix()
 
 
 _LINE = re.compile(r"\bline (\d+)|Line number=(\d+)", re.IGNORECASE)

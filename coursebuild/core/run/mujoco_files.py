@@ -18,7 +18,7 @@ import functools
 import html
 import posix
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 _MESH = frozenset(("mesh", "hfield", "skin"))
@@ -30,55 +30,52 @@ _ATTRIBUTES = re.compile(rb"([\w:.-]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 
 
 class ModelFiles:
-    """Finds the files of models; `note` is told of each, whether it is there or not."""
+    """Finds the files of models; `note` is told of each, whether it is there or not.
 
-    def __init__(self, note: Callable[[str], None]) -> None:
-        self._note = note
+    `given` are the names of files that are handed over as bytes. Without `assets` only includes are
+    looked for.
+    """
 
-    def of_path(self, path: str, given: Collection[str] = (), *, assets: bool = True) -> None:
-        """The files of the model in a file, with that file; without assets only its includes."""
-        given = frozenset(_last(name) for name in given)
-        self._model(path, given, assets, 0)
-
-    def of_text(
-        self,
-        text: str | bytes,
-        given: Collection[str] = (),
-        *,
-        assets: bool = True,
-        folder: str = "",
+    def __init__(
+        self, note: Callable[[str], None], given: Iterable[str] = (), *, assets: bool = True
     ) -> None:
+        self._note = note
+        self._given = frozenset(map(_last, given))
+        self._assets = assets
+
+    def of_path(self, path: str | bytes) -> None:
+        """The files of the model in a file, with that file."""
+        self._model(_decode(path) if isinstance(path, bytes) else path, 0)
+
+    def of_text(self, text: str | bytes, folder: str = "") -> None:
         """The files of a model that is a text, relative to the working folder or another one."""
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
-        given = frozenset(_last(name) for name in given)
-        self._scan(data, folder and f"{folder.rstrip('/')}/", given, assets, 0)
+        self._scan(data, folder and f"{folder.rstrip('/')}/", 0)
 
-    def of_spec(self, spec: Any, given: Collection[str] = ()) -> None:
+    def of_spec(self, spec: Any) -> None:
         """The assets of an `MjSpec`, which are read when it is compiled."""
-        given = frozenset(_last(name) for name in (*given, *spec.assets))
+        self._given |= frozenset(map(_last, spec.assets))
         strip = bool(spec.strippath)
         mesh = functools.partial(_places, spec.modelfiledir, spec.meshdir, strip=strip)
         texture = functools.partial(_places, spec.modelfiledir, spec.texturedir, strip=strip)
         for kind in ("meshes", "hfields", "skins"):
             for each in getattr(spec, kind):
-                self._asset(mesh(each.file), given)
+                self._asset(mesh(each.file))
         for each in spec.textures:
             for file in (each.file, *each.cubefiles):
-                self._asset(texture(file), given)
+                self._asset(texture(file))
 
-    def _model(self, path: str, given: frozenset[str], assets: bool, depth: int) -> None:
-        if _last(path) in given:
+    def _model(self, path: str, depth: int) -> None:
+        if _last(path) in self._given:
             return
         self._note(path)
         data = _contents(path)
         if data is not None:
-            self._scan(data, path[: path.rfind("/") + 1], given, assets, depth)
+            self._scan(data, path[: path.rfind("/") + 1], depth)
 
-    def _scan(
-        self, data: bytes, folder: str, given: frozenset[str], assets: bool, depth: int
-    ) -> None:
-        tags = list(self._included(data, folder, "", given, 0))
-        if not assets:
+    def _scan(self, data: bytes, folder: str, depth: int) -> None:
+        tags = list(self._included(data, folder, "", 0))
+        if not self._assets:
             return
         compiler: dict[str, str] = {}
         for tag, attributes in tags:
@@ -91,19 +88,19 @@ class ModelFiles:
         for tag, attributes in tags:
             file = attributes.get("file", "")
             if tag in _MESH:
-                self._asset(mesh(file or attributes.get("filename", "")), given)
+                self._asset(mesh(file or attributes.get("filename", "")))
             elif tag == "texture":
                 for name in ("file", *_CUBE):
-                    self._asset(texture(attributes.get(name, "")), given)
+                    self._asset(texture(attributes.get(name, "")))
             elif tag == "flexcomp":
-                self._asset([*_join(folder, file), *mesh(file)], given)
+                self._asset([*_join(folder, file), *mesh(file)])
             elif tag == "model" and file and depth < _DEEPEST:
-                found = self._asset([*_join("", file), *_join(folder, file)], given)
+                found = self._asset([*_join("", file), *_join(folder, file)])
                 if found:
-                    self._model(found, given, assets, depth + 1)
+                    self._model(found, depth + 1)
 
     def _included(
-        self, data: bytes, folder: str, here: str, given: frozenset[str], depth: int
+        self, data: bytes, folder: str, here: str, depth: int
     ) -> Iterator[tuple[str, dict[str, str]]]:
         """Every tag of a text and of what it includes, with its attributes."""
         for tag in _TAGS.finditer(_COMMENTS.sub(b"", data)):
@@ -120,14 +117,14 @@ class ModelFiles:
             if here and file:
                 candidates += _join(folder, here + file)
                 candidates += _join(folder, here + here.lstrip("/") + file)
-            path = self._asset(candidates, given)
+            path = self._asset(candidates)
             if path and depth < _DEEPEST and (inner := _contents(path)) is not None:
                 below = path[: path.rfind("/") + 1]
-                yield from self._included(inner, folder, below, given, depth + 1)
+                yield from self._included(inner, folder, below, depth + 1)
 
-    def _asset(self, candidates: list[str], given: frozenset[str]) -> str:
+    def _asset(self, candidates: list[str]) -> str:
         """Note a file, which is the first of these that is there; it, or nothing."""
-        if candidates and _last(candidates[0]) in given:
+        if candidates and _last(candidates[0]) in self._given:
             return ""
         for candidate in candidates:
             self._note(candidate)

@@ -40,51 +40,44 @@ _WRITERS = (
 
 def wrap(mujoco: ModuleType) -> None:
     """Wrap the functions of an imported MuJoCo."""
-    files = ModelFiles(_read)
     model, spec = getattr(mujoco, "MjModel", None), getattr(mujoco, "MjSpec", None)
 
-    def path(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        files.of_path(_text(_get(args, keywords, 0, "filename")), _given(args, keywords))
+    def reader(find: Callable[[ModelFiles, Any], None], *, assets: bool = True) -> Before:
+        """Finds the files of a model, of which the first argument is the path or the text."""
 
-    def string(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        files.of_text(_get(args, keywords, 0, "xml"), _given(args, keywords))
+        def read(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+            files = ModelFiles(_read, _given(args, keywords), assets=assets)
+            find(files, _get(args, keywords, 0, "filename", "xml"))
 
-    def spec_path(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        name = _text(_get(args, keywords, 0, "filename"))
-        files.of_path(name, _given(args, keywords), assets=False)
-
-    def spec_string(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        files.of_text(_get(args, keywords, 0, "xml"), _given(args, keywords), assets=False)
+        return read
 
     def binary(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         name = _text(_get(args, keywords, 0, "filename"))
         if name not in _given(args, keywords):
             _read(name)
 
-    def compile(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        files.of_spec(args[0])
-
-    def attach(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        files.of_spec(_get(args, keywords, 1, "child"))
-
     of_class: tuple[tuple[Any, str, Before], ...] = (
-        (model, "from_xml_path", path),
-        (model, "from_xml_string", string),
+        (model, "from_xml_path", reader(ModelFiles.of_path)),
+        (model, "from_xml_string", reader(ModelFiles.of_text)),
         (model, "from_binary_path", binary),
-        (spec, "from_file", spec_path),
-        (spec, "from_string", spec_string),
+        (spec, "from_file", reader(ModelFiles.of_path, assets=False)),
+        (spec, "from_string", reader(ModelFiles.of_text, assets=False)),
     )
     for owner, name, before in of_class:
         if hasattr(owner, name):
             setattr(owner, name, staticmethod(wrapped(getattr(owner, name), before)))
-    wrap_method(spec, "compile", compile)
-    wrap_method(spec, "recompile", compile)
-    wrap_method(spec, "attach", attach)
+    for name, position in (("compile", 0), ("recompile", 0), ("attach", 1)):
+        wrap_method(spec, name, _spec_reader(position))
     wrap_method(spec, "to_file", _writer(1))
     wrap_functions(mujoco, ("mj_loadPluginLibrary", "mj_loadAllPluginLibraries"), _library)
-    wrap_functions(mujoco, ("mju_getXMLDependencies",), path)
+    wrap_functions(mujoco, ("mju_getXMLDependencies",), reader(ModelFiles.of_path))
     for name, position in _WRITERS:
         wrap_functions(mujoco, (name,), _writer(position))
+
+
+def _spec_reader(position: int) -> Before:
+    """Finds the files of a specification, which is the argument at a position."""
+    return lambda args, keywords: ModelFiles(_read).of_spec(_get(args, keywords, position, "child"))
 
 
 def _library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
@@ -180,6 +173,12 @@ def replace_rollout(mujoco: Any, new: Callable[[Callable[..., Any]], Callable[..
 
     wrap_functions(mujoco, ("mj_stateSize", "mj_getState"), look_for)
     wrap_method(mujoco.MjData, "__init__", look_for)
+
+
+def note(record: str) -> None:
+    """Add a record to the notes, as `Tracer.note` does."""
+    if tracer is not None:
+        tracer.note(record)
 
 
 def _read(path: str) -> None:

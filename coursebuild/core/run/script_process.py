@@ -15,6 +15,7 @@ import contextlib
 import ctypes
 import importlib
 import io
+import mmap
 import os
 import site
 import sys
@@ -30,7 +31,7 @@ from coursebuild.core.run import (
     mujoco_tracing,
     mujoco_watching,
 )
-from coursebuild.core.run.tracing import Sink, Tracer
+from coursebuild.core.run.tracing import Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
 """What is imported for a package. None does anything that a script could see."""
@@ -100,7 +101,9 @@ class Preloaded:
             self.broken = self.broken or error.name != package
         except BaseException:
             self.broken = True
-        new = {n: m for n, m in sys.modules.items() if n not in before and _is_installed(n)}
+        known = sys.stdlib_module_names | {"coursebuild"}
+        names = [n for n in sys.modules if n not in before and n.partition(".")[0] not in known]
+        new = {name: sys.modules[name] for name in names}
         needed = self._groups.get("numpy", {}) if package == "mujoco" else {}
         self._groups[package] = needed | new
         for name in new:
@@ -163,11 +166,6 @@ class Preloaded:
                 self._tracer.imported(name, None)
 
 
-def _is_installed(name: str) -> bool:
-    top = name.partition(".")[0]
-    return top not in sys.stdlib_module_names and top != "coursebuild"
-
-
 class ScriptProcess:
     """A script that this process is to become."""
 
@@ -176,7 +174,7 @@ class ScriptProcess:
         job: Job,
         environment: Mapping[str, str],
         notes: str,
-        sink: Sink | None,
+        shared: mmap.mmap | None,
         preloaded: Preloaded,
     ) -> None:
         self.job = job
@@ -185,7 +183,7 @@ class ScriptProcess:
         self.names: dict[str, Any] = vars(self.main)
         self._environment = environment
         self._notes = notes
-        self._sink = sink
+        self._shared = shared
         self._preloaded = preloaded
 
     def compiled(self) -> CodeType:
@@ -233,19 +231,11 @@ class ScriptProcess:
         sys.path.insert(0, os.path.dirname(self.path))  # noqa: PTH120
 
     def _tracer(self) -> Tracer:
-        installed = _installed_folders()
-        if "PYTHONPATH" in self._environment:
-            installed += _library_folders(self.job["root"], self.job["library"])
-        root, temporary = self.job["root"], self._environment["TMPDIR"]
-        writable = self.job["writes"]
-        return Tracer(root, temporary, installed, self._notes, self._sink, writable)
-
-
-def _library_folders(root: str, library: str) -> list[str]:
-    """Where `mjcourse` is when it is not installed; nothing where the project itself holds it."""
-    if f"{library}/".startswith(f"{root}/"):
-        return []
-    return [f"{library}/mjcourse"]
+        installed, root, library = _installed_folders(), self.job["root"], self.job["library"]
+        if "PYTHONPATH" in self._environment and not f"{library}/".startswith(f"{root}/"):
+            installed.append(f"{library}/mjcourse")  # unless the project itself holds it
+        temporary, writable = self._environment["TMPDIR"], self.job["writes"]
+        return Tracer(root, temporary, installed, self._notes, self._shared, writable)
 
 
 def _installed_folders() -> list[str]:

@@ -42,7 +42,13 @@ from pathlib import Path
 from typing import TypedDict
 
 from coursebuild.core.run.script_process import Job, Preloaded, ScriptProcess, figure_path
-from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, Launched, Watched, has_ended
+from coursebuild.core.run.watching import (
+    STDERR_KEPT,
+    STDOUT_LIMIT,
+    RunningScript,
+    ScriptHandle,
+    has_ended,
+)
 
 LENGTH = struct.Struct(">I")
 PROGRAM = str(Path(__file__).with_name("worker_main.py"))
@@ -175,7 +181,7 @@ class _Supervisor:
         if self.may_fork:
             self.preloaded.load(job["packages"])
         folder = ""
-        launched: Launched | ScriptProcess | None = None
+        launched: ScriptHandle | ScriptProcess | None = None
         start = time.monotonic()
         try:
             try:
@@ -188,7 +194,7 @@ class _Supervisor:
                 return _unstartable(f"the script cannot be started: {error}\n")
             if isinstance(launched, ScriptProcess):
                 return launched
-            run = Watched(launched, start, job["timeout"], self.awake)
+            run = RunningScript(launched, start, job["timeout"], self.awake)
             try:
                 run.watch(self.jobs, parent)
             finally:
@@ -200,7 +206,7 @@ class _Supervisor:
                 remove_folder(folder)
                 remove_folder(folder + _NOTES)
 
-    def _launch(self, job: Job, environment: dict[str, str]) -> Launched | ScriptProcess:
+    def _launch(self, job: Job, environment: dict[str, str]) -> ScriptHandle | ScriptProcess:
         """Start a script; the script itself in the process that is to become it."""
         if any(b"\0" in os.fsencode(argument) for argument in job["args"]):
             raise ValueError("embedded null byte")
@@ -210,7 +216,7 @@ class _Supervisor:
         try:
             prepare = functools.partial(self._prepare_script, job, stdout, stderr, os.getpid())
             if not self._can_fork(job):
-                return Launched(_spawn(start, prepare), out, err, None)
+                return ScriptHandle(_spawn(start, prepare), out, err, None)
             shared = mmap.mmap(-1, _NOTES_BYTES)
             gc.freeze()  # a script's collector shall not look at, and so copy, what is here
             pid = os.fork()
@@ -219,7 +225,7 @@ class _Supervisor:
                 signal.set_wakeup_fd(-1)
                 os.closerange(3, max(self.awake, stderr, self.reports) + 16)
                 return ScriptProcess(job, environment, notes, shared, self.preloaded)
-            return Launched(pid, out, err, shared)
+            return ScriptHandle(pid, out, err, shared)
         except BaseException:
             os.close(out)
             os.close(err)
@@ -355,7 +361,7 @@ def _drawn(folder: str, names: Sequence[str]) -> list[bytes | None]:
     return found
 
 
-def _finished(run: Watched, trace: bytes, figures: Sequence[bytes | None]) -> bytes:
+def _finished(run: RunningScript, trace: bytes, figures: Sequence[bytes | None]) -> bytes:
     stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
     status = run.exit_status()
     outcome = run.limit or ("killed" if status < 0 else "failed" if status else "ok")
@@ -404,22 +410,14 @@ def remove_folder(folder: str) -> None:
 
 
 def _receive(fd: int) -> bytes | None:
-    """The next message; `None` when there are no more."""
-    header = _read_exactly(fd, LENGTH.size)
-    return None if header is None else _read_exactly(fd, LENGTH.unpack(header)[0])
-
-
-def _read_exactly(fd: int, count: int) -> bytes | None:
-    data = b""
-    while len(data) < count:
-        chunk = os.read(fd, count - len(data))
-        if not chunk:
-            return None
-        data += chunk
-    return data
+    """The next message, after which no other comes before the report; `None` at the end."""
+    with open(fd, "rb", closefd=False) as pipe:
+        header = pipe.read(LENGTH.size)
+        length = LENGTH.unpack(header)[0] if len(header) == LENGTH.size else -1
+        message = pipe.read(max(length, 0))
+    return message if len(message) == length else None
 
 
 def _send(fd: int, data: bytes) -> None:
-    rest = memoryview(data)
-    while rest:
-        rest = rest[os.write(fd, rest) :]
+    with open(fd, "wb", closefd=False) as pipe:
+        pipe.write(data)

@@ -32,21 +32,13 @@ from __future__ import annotations
 
 import _imp
 import contextlib
+import mmap
 import posix
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib.machinery import PathFinder
+from posixpath import normpath
 from types import FrameType
-from typing import Protocol
-
-
-class Sink(Protocol):
-    """Takes whole records, in one call each."""
-
-    def write(self, data: bytes, /) -> object:
-        """Add a record; a ValueError says that there is no more room."""
-        ...
-
 
 _WRITING = posix.O_WRONLY | posix.O_RDWR | posix.O_CREAT | posix.O_TRUNC | posix.O_APPEND
 _SYSTEM = ("/dev/", "/proc/", "/sys/")
@@ -91,8 +83,8 @@ class Tracer:
     """Takes notes for one script.
 
     `root` and `temporary` are absolute; `installed` are the folders of Python and its packages.
-    Records go to the sink; without one, and from processes that the script forks, to files in
-    `overflow`. `writable` are folders that the script may write into.
+    Records go to the shared memory; without it, and from processes that the script forks, to files
+    in `overflow`. `writable` are folders that the script may write into.
     """
 
     def __init__(
@@ -101,7 +93,7 @@ class Tracer:
         temporary: str,
         installed: Iterable[str],
         overflow: str,
-        sink: Sink | None,
+        shared: mmap.mmap | None,
         writable: Iterable[str] = (),
     ) -> None:
         self.root = root.rstrip("/") + "/"
@@ -119,7 +111,7 @@ class Tracer:
         )
         self.has_mujoco = True
         """Whether MuJoCo tells of the files that it opens, if it is imported."""
-        self._sink = sink
+        self._shared = shared
         self._writable = tuple(f"{folder}/" for folder in writable)
         self._overflow = overflow
         self._pid = posix.getpid()
@@ -368,10 +360,10 @@ class Tracer:
             return
         self._noted.add(record)
         data = record.encode("utf-8", "surrogateescape") + b"\0"
-        if self._sink is not None and posix.getpid() == self._pid:
+        if self._shared is not None and posix.getpid() == self._pid:
             try:
-                self._sink.write(data)
-            except ValueError:
+                self._shared.write(data)
+            except ValueError:  # there is no more room
                 if TOO_MUCH not in self._noted:
                     self._noted.add(TOO_MUCH)
                     self._spill(f"o{TOO_MUCH}\0".encode())
@@ -397,16 +389,7 @@ class Tracer:
 
 def _normal(path: str) -> str:
     """An absolute path without `.`, `..` and repeated slashes."""
-    if "/." not in path and "//" not in path and not path.endswith("/"):
-        return path
-    parts: list[str] = []
-    for part in path.split("/"):
-        if part == "..":
-            if parts:
-                parts.pop()
-        elif part not in ("", "."):
-            parts.append(part)
-    return "/" + "/".join(parts)
+    return "/" + normpath(path).lstrip("/")
 
 
 def _below(folder: object, path: object) -> object:

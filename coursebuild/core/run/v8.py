@@ -86,18 +86,12 @@ def start() -> None:
             help="`ulimit -v unlimited` takes the limit away; it reserves addresses, not memory",
         )
     try:
-        from py_mini_racer import LibNotFoundError, init_mini_racer
+        from py_mini_racer import init_mini_racer
 
         init_mini_racer(flags=_FLAGS, ignore_duplicate_init=True)
-    except (ImportError, OSError, AttributeError) as error:
-        raise _missing(error) from None
-    except LibNotFoundError as error:
-        raise _missing(error) from None
-
-
-def _missing(error: Exception) -> EffectError:
-    help = "run `pip install coursebuild` again"
-    return EffectError(f"mini-racer's V8 cannot be used: {error}", help=help)
+    except Exception as error:  # whatever an installation that is broken raises
+        message = f"mini-racer's V8 cannot be used: {error}"
+        raise EffectError(message, help="run `pip install coursebuild` again") from None
 
 
 class Heartbeat(NamedTuple):
@@ -283,10 +277,12 @@ class MathEngine:
             ]
 
     def _batch(self, formulas: Sequence[Formula]) -> Iterator[str | MathError]:
+        request = json.dumps([{"tex": f.tex, "display": f.display} for f in formulas])
+        seconds = _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS
         try:
-            yield from self._call(
-                formulas, _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS
-            )
+            self._isolate = self._isolate or Isolate(*_scripts())
+            replies = json.loads(self._isolate.call("typeset", request, seconds))
+            yield from (_result(f, reply) for f, reply in zip(formulas, replies, strict=True))
         except LimitError as error:
             self.close()
             if len(formulas) > 1:
@@ -294,13 +290,6 @@ class MathEngine:
                     yield from self._batch([formula])
             else:
                 yield MathError(f"the formula {error}", None)
-
-    def _call(self, formulas: Sequence[Formula], seconds: float) -> list[str | MathError]:
-        if self._isolate is None:
-            self._isolate = Isolate(*_scripts())
-        request = json.dumps([{"tex": f.tex, "display": f.display} for f in formulas])
-        replies: list[str | _Failure] = json.loads(self._isolate.call("typeset", request, seconds))
-        return [_result(f, reply) for f, reply in zip(formulas, replies, strict=True)]
 
 
 def _scripts() -> tuple[str, ...]:

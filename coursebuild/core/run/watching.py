@@ -1,6 +1,6 @@
 """A script that runs: its output, its limits, and the end of everything that it started.
 
-Entry point: `Watched`, used by `supervisor`, whose process has one thread and is the one that
+Entry point: `RunningScript`, used by `supervisor`, whose process has one thread and is the one that
 orphans of the script become children of.
 """
 
@@ -29,7 +29,7 @@ GRACE = 0.5
 _CHUNK = 1 << 16
 
 
-class Launched(NamedTuple):
+class ScriptHandle(NamedTuple):
     """The process of a script, and the ends of its pipes that are read here."""
 
     pid: int
@@ -55,10 +55,10 @@ def has_ended(parent: int) -> bool:
         return False
 
 
-class Watched:
+class RunningScript:
     """One script, from its start until nothing of it is left."""
 
-    def __init__(self, launched: Launched, start: float, timeout: float, awake: int) -> None:
+    def __init__(self, launched: ScriptHandle, start: float, timeout: float, awake: int) -> None:
         self.pid = launched.pid
         self.awake = awake
         self.stdout = bytearray()

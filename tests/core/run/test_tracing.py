@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import mmap
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,7 @@ import pytest
 from coursebuild.core.model.results import Trace
 from coursebuild.core.run import tracing
 from coursebuild.core.run.runner import ScriptServer
-from coursebuild.core.run.tracing import Sink, Tracer
+from coursebuild.core.run.tracing import Tracer
 from support.runners import Run, both_ways, hanging, job
 
 pytestmark = pytest.mark.site
@@ -180,8 +181,8 @@ def test_what_could_hide_a_module_and_what_is_not_installed(traced: Traced) -> N
 def noting(root: str, installed: Path) -> tuple[Tracer, bytearray]:
     """A tracer in this process, and what it notes."""
     records = bytearray()
-    sink = cast("Sink", SimpleNamespace(write=records.extend))
-    return Tracer(root, "/nowhere/t", [str(installed)], "/nowhere/o", sink), records
+    shared = cast("mmap.mmap", SimpleNamespace(write=records.extend))
+    return Tracer(root, "/nowhere/t", [str(installed)], "/nowhere/o", shared), records
 
 
 def test_an_environment_in_the_course_s_folder(tmp_path: Path) -> None:
