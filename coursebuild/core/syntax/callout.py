@@ -2,7 +2,7 @@
 
 `[!kind]- Title` makes one that starts folded.
 
-Entry points: `read_head` (what the first line says), `resolve` (the kind that it names).
+Entry point: `read_head`, what the first line says.
 """
 
 from __future__ import annotations
@@ -24,41 +24,35 @@ FALLBACK = "note"
 class Head(Struct, frozen=True):
     """The first line of a callout, and what follows it in its paragraph."""
 
-    kind: Excerpt
-    folded: bool
-    stray: Span | None
-    """What stands between the kind and the title and is neither a space nor the mark that folds."""
+    kind: str
+    kind_span: Span
     title: Excerpt
+    folded: bool
     rest: Excerpt
 
 
-def read_head(paragraph: Excerpt) -> Head | None:
-    """The head of a callout, if a blockquote's first paragraph begins with one."""
+def read_head(paragraph: Excerpt, known: Collection[str]) -> Parsed[Head] | None:
+    """The head of a callout, if a blockquote's first paragraph begins with one.
+
+    Its kind is one that is known, without regard to case.
+    """
     found = _HEAD.match(paragraph.text)
     if found is None:
         return None
-    start = found.start(3)
-    stray = found[3][:1].strip() != ""
-    return Head(
-        trimmed(paragraph.slice(found.start(1), found.end(1))),
-        bool(found[2]),
-        paragraph.span(start, start + 1) if stray else None,
-        trimmed(paragraph.slice(found.start(3), found.end(3))),
-        trimmed(paragraph.slice(found.end())),
-    )
-
-
-def resolve(head: Head, known: Collection[str]) -> Parsed[str]:
-    """The known kind that is meant, without regard to case."""
-    name = head.kind.text
-    if head.stray is not None:
-        message = f"`{head.stray.text}` cannot follow the kind of a callout"
+    written, name, wrong = trimmed(paragraph.slice(*found.span(1))), FALLBACK, None
+    if found[3][:1].strip():
+        start = found.start(3)
+        message = f"`{found[3][0]}` cannot follow the kind of a callout"
         help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
-        return Parsed(FALLBACK, (diagnose("callout-unknown", head.stray, message, help=help),))
-    if name.lower() in known:
-        return Parsed(name.lower())
-    message = f"no callout kind `{name}`" if name else "the kind of this callout is missing"
-    help = did_you_mean(name.lower(), known) or "known: " + ", ".join(
-        f"`{k}`" for k in sorted(known)
-    )
-    return Parsed(FALLBACK, (diagnose("callout-unknown", head.kind.span(), message, help=help),))
+        wrong = diagnose("callout-unknown", paragraph.span(start, start + 1), message, help=help)
+    elif written.text.lower() in known:
+        name = written.text.lower()
+    else:
+        kinds = ", ".join(f"`{kind}`" for kind in sorted(known))
+        message = "the kind of this callout is missing"
+        message = f"no callout kind `{written.text}`" if written.text else message
+        help = did_you_mean(written.text.lower(), known) or f"known: {kinds}"
+        wrong = diagnose("callout-unknown", written.span(), message, help=help)
+    title, rest = trimmed(paragraph.slice(*found.span(3))), trimmed(paragraph.slice(found.end()))
+    head = Head(name, written.span(), title, bool(found[2]), rest)
+    return Parsed(head, () if wrong is None else (wrong,))

@@ -85,35 +85,27 @@ def _repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
 
 
 class _TableParts(Struct):
-    """A table to which more may be added."""
+    """A table to which more may be added, or the tables that share a `[[header]]`."""
 
     start: int
     end: int
     mark: tuple[int, int]
     members: dict[str, tuple[StringNode, _Item]] = field(default_factory=dict)
+    tables: list[_TableParts] = field(default_factory=list)
 
 
-class _TableList(Struct):
-    """The tables that share a `[[header]]`."""
-
-    start: int
-    end: int
-    mark: tuple[int, int]
-    items: list[_TableParts]
-
-
-_Item: TypeAlias = _TableParts | _TableList | Node
+_Item: TypeAlias = _TableParts | Node
 
 
 def _node(body: Excerpt, item: _Item) -> Node:
     """A table, when nothing can be added any more."""
-    if isinstance(item, _TableParts):
-        members = tuple(Member(key, _node(body, inner)) for key, inner in item.members.values())
-        return ObjectNode(body, item.start, item.end, item.mark, members)
-    if isinstance(item, _TableList):
-        items = tuple(_node(body, table) for table in item.items)
-        return ArrayNode(body, item.start, item.end, item.mark, items)
-    return item
+    if not isinstance(item, _TableParts):
+        return item
+    if item.tables:
+        tables = tuple(_node(body, table) for table in item.tables)
+        return ArrayNode(body, item.start, item.end, item.mark, tables)
+    members = tuple(Member(key, _node(body, inner)) for key, inner in item.members.values())
+    return ObjectNode(body, item.start, item.end, item.mark, members)
 
 
 class _Reader:
@@ -159,10 +151,10 @@ class _Reader:
             self.known = (last, first)
         if statement.type == "table_array_element":
             if first is last:
-                item = _TableList(start, end, mark, [])
+                item = _TableParts(start, end, mark)
                 parent.members[last.value] = (last, item)
-            if isinstance(item, _TableList):
-                item.items.append(table)
+            if isinstance(item, _TableParts):
+                item.tables.append(table)
                 item.end = end
         elif first is not last:  # a table inside it has a header above
             table = self.inner(parent, [last], end)
@@ -188,11 +180,11 @@ class _Reader:
             first, item = table.members.setdefault(key.value, (key, new))
             if first is not key:
                 self.known = (key, first)
-            if isinstance(item, _TableList):
-                item.end = max(item.end, end)
-                item = item.items[-1]
             table = item if isinstance(item, _TableParts) else new
             table.end = max(table.end, end)
+            if table.tables:
+                table = table.tables[-1]
+                table.end = max(table.end, end)
         return table
 
     # ------------------------------------------------------------------------------------ values

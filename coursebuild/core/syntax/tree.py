@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 from coursebuild.core import model
 from coursebuild.core.syntax.attributes import LABEL, read_label
-from coursebuild.core.syntax.callout import Head, read_head, resolve
+from coursebuild.core.syntax.callout import Head, read_head
 from coursebuild.core.syntax.dispatch import fence_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_ours, read_fence
 from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
@@ -247,21 +247,21 @@ class TextReader:
 
     def _quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, opened = self._span(token), self.tokens[self.at]
-        head = read_head(self._content(opened)) if opened.type == "paragraph_open" else None
-        if head is None:
-            return model.BlockQuote(span, self._blocks("blockquote_close"))
-        return self._callout(span, head)
+        if opened.type == "paragraph_open":
+            head = read_head(self._content(opened), self.session.callouts)
+            if head is not None:
+                self.session.diagnostics += head.diagnostics
+                return self._callout(span, head.value)
+        return model.BlockQuote(span, self._blocks("blockquote_close"))
 
     def _callout(self, span: Span, head: Head) -> model.Callout:
-        kind = resolve(head, self.session.callouts)
-        self.session.diagnostics += kind.diagnostics
         title = self.inlines.read(head.title)
         self.at += 3
         first: tuple[model.Block, ...] = ()
         if head.rest.text:
             first = (model.Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
         blocks = (*first, *self._blocks("blockquote_close"))
-        return model.Callout(span, kind.value, head.kind.span(), title, head.folded, blocks)
+        return model.Callout(span, head.kind, head.kind_span, title, head.folded, blocks)
 
     def _list(self, token: PositionedToken) -> model.ListBlock:
         ordered = token.type == "ordered_list_open"
