@@ -29,8 +29,8 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
     verify = root.object("verify")
     for node, fields in decoding.each([verify], VerifyTable):
         yield from _check_verify(node, fields)
-    for node, _ in decoding.each(verify.objects("filter"), Filter):
-        yield from _check_filter(node)
+    for node, filter in decoding.each(verify.objects("filter"), Filter):
+        yield from _check_filter(node, filter)
     for member in verify.object("env").members:
         if not _VARIABLE.fullmatch(member.key.value):
             message = f"{named(member.key.value)} cannot be set for scripts"
@@ -72,23 +72,21 @@ def _decimal(node: ObjectNode, name: str) -> Decimal | None:
     return Decimal(value.raw) if isinstance(value.value, float) else Decimal(value.value)
 
 
-def _check_filter(node: ObjectNode) -> Iterator[Diagnostic]:
-    pattern, replacement = node.get("pattern"), node.get("replacement")
-    if not isinstance(pattern, StringNode) or not isinstance(replacement, StringNode):
-        return
-    if (mistake := pattern_mistake(pattern.value)) is not None:
+def _check_filter(node: ObjectNode, fields: Filter) -> Iterator[Diagnostic]:
+    if (mistake := pattern_mistake(fields.pattern)) is not None:
         message = f"the pattern does not compile: {mistake[0]}"
-        yield diagnose("field-value", _place(pattern, mistake[1]), message)
-    elif (mistake := pattern_mistake(pattern.value, replacement.value)) is not None:
+        yield diagnose("field-value", _place(node, "pattern", mistake[1]), message)
+    elif (mistake := pattern_mistake(fields.pattern, fields.replacement)) is not None:
         message = f"the replacement cannot be used: {mistake[0]}"
-        yield diagnose("field-value", _place(replacement, mistake[1]), message)
+        yield diagnose("field-value", _place(node, "replacement", mistake[1]), message)
 
 
-def _place(node: StringNode, at: int | None) -> Span:
-    """The character at an offset, or the whole string."""
-    if at is None or at >= len(node.value):
-        return node.span
-    return node.excerpt.span(at, at + 1)
+def _place(node: ObjectNode, name: str, at: int | None) -> Span:
+    """The character at an offset of a string, or the whole string."""
+    value = node.get(name)
+    if not isinstance(value, StringNode) or at is None or at >= len(value.value):
+        return node.place(name)
+    return value.excerpt.span(at, at + 1)
 
 
 def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind, ...]:
