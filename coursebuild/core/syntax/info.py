@@ -157,9 +157,7 @@ def _malformed(info: Excerpt, at: int, end: int) -> tuple[Diagnostic, int]:
 
 
 def _word(info: Excerpt, found: re.Match[str]) -> Word:
-    value: Excerpt | None = None
-    if found[2] is not None:
-        value = info.slice(*found.span(4 if found[3] is None else 3))
+    value = info.slice(*found.span(found.lastindex or 0)) if found[2] else None
     if value is not None and found[3]:
         value = _unescaped(value)
     return Word(info.span(*found.span()), found[1], info.span(*found.span(1)), value)

@@ -235,15 +235,10 @@ class _Reader:
             self.report(self.at, self.at + len(line), message, help)
             raise _LostError
         self.at = match.end()
-        escapes = _ESCAPE.finditer(self.text, *match.span(1))
+        content = match.span(1)
+        escapes = _ESCAPE.finditer(self.text, *content)
         return escaped_string(
-            self.body,
-            match.span(),
-            match.span(1),
-            escapes,
-            self.escape,
-            _double,
-            self.diagnostics,
+            self.body, match.span(), content, escapes, self.escape, _double, self.diagnostics
         )
 
     def escape(self, match: re.Match[str]) -> str:

@@ -338,9 +338,8 @@ def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnost
         first = len(table.controls[0])
         if len(row) != first:
             message = f"this command has {len(row)} numbers, and the first one has {first}"
-            yield diagnose(
-                "field-value", item.mark, message, help="give one number for every actuator"
-            )
+            help = "give one number for every actuator"
+            yield diagnose("field-value", item.mark, message, help=help)
     hold, duration = table.hold, table.duration
     if hold is not None and duration is not None and len(table.controls) > 1:
         used = -(-duration * (1 - _SLACK) // hold)

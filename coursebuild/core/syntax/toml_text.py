@@ -226,7 +226,7 @@ class _Reader:
                 return DateNode(self.body, start, end)
 
     def string(self, node: tree_sitter.Node) -> StringNode:
-        start, end = node.byte_range
+        quoted = start, end = node.byte_range
         quote = self.text[start]
         width = 3 if end - start >= 6 and self.text.startswith(quote * 3, start) else 1
         content = (start + width, end - width)
@@ -234,13 +234,7 @@ class _Reader:
             content = (content[0] + 1, content[1])
         escapes = _ESCAPE.finditer(self.text, *content) if quote == '"' else ()
         return escaped_string(
-            self.body,
-            (start, end),
-            content,
-            escapes,
-            _meaning,
-            double_backslash,
-            self.diagnostics,
+            self.body, quoted, content, escapes, _meaning, double_backslash, self.diagnostics
         )
 
 

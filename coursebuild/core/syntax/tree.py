@@ -224,13 +224,8 @@ class TextReader:
         tex = trimmed(text.slice(start, end), " \t\n")
         if token.info == "unclosed":
             help = "close it with `$$` on a line below, with no empty line before it"
-            wrong = diagnose(
-                "math-unclosed",
-                text.span(start - 2, start),
-                "display math is never closed",
-                help=help,
-            )
-            self.session.report(wrong)
+            place, message = text.span(start - 2, start), "display math is never closed"
+            self.session.report(diagnose("math-unclosed", place, message, help=help))
         elif not tex.text:
             self.session.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
         return model.MathBlock(self._span(token), tex, self._label(text, end + 2))
