@@ -60,13 +60,6 @@ _COPIES, _MOST_STEPS = 8, 2000
 """Scenarios that each thread runs in a rollout, and steps of one at most."""
 
 
-class Variant(Struct, frozen=True, eq=False):
-    """The model with a parameter at a value."""
-
-    row: SweepRow
-    model: Any
-
-
 def measure_sweep(
     spec: Any,
     scene: Scene,
@@ -82,29 +75,24 @@ def measure_sweep(
     Raises:
         SceneError: a parameter or a value is none of the model.
     """
-    base = Variant(SweepRow("", "", own=True, status="ok"), _runnable(spec.compile()))
-    variants = [
-        one
-        for part in sweep.vary
-        if part.parameter != THREADS
-        for one in _variants(spec, scene.scenario, part)
-    ]
-    own = _motion(scene, base)
-    rows = [_measured(scene, base, own, one) for one in variants]
+    base = _runnable(spec.compile())
+    threads = [part for part in sweep.vary if part.parameter == THREADS]
+    parts = [part for part in sweep.vary if part.parameter != THREADS]
+    variants = [one for part in parts for one in _variants(spec, scene.scenario, part)]
+    own = simulate(Setup(scenario=scene.scenario), base, thickness(base))
+    states = own.states if own.judgement.ok else None
+    rows = [_measured(scene, base, states, row, model) for row, model in variants]
     if clocks is not None:
+        models = [base, *(model for _, model in variants)]
         with silent():
-            rows = _timed(scene, [base, *variants], rows, clocks[0], quick=quick)
-            rows += [
-                row
-                for part in sweep.vary
-                if part.parameter == THREADS
-                for row in _rollouts(scene.scenario, base.model, part, clocks[1], quick=quick)
-            ]
+            rows = _timed(scene.scenario, models, rows, clocks[0], quick=quick)
+            for part in threads:
+                rows += _rollouts(scene.scenario, base, part, clocks[1], quick=quick)
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, sweep.show, tuple(rows))
 
 
-def _variants(spec: Any, scenario: Scenario, part: Variation) -> Iterator[Variant]:
-    """The model with the parameter at each of its values."""
+def _variants(spec: Any, scenario: Scenario, part: Variation) -> Iterator[tuple[SweepRow, Any]]:
+    """The model with the parameter at each of its values, and a row on which nothing is known."""
     for value in part.values:
         changed = spec.copy()
         before, after = _change(changed, part, value)
@@ -116,7 +104,7 @@ def _variants(spec: Any, scenario: Scenario, part: Variation) -> Iterator[Varian
             raise SceneError(message, part.span) from None
         shown = f"{100 * (float(value) - 1):+g} %" if part.relative else _text(value)  # type: ignore[arg-type]
         same = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
-        yield Variant(SweepRow(part.parameter, shown, own=same, status="ok"), model)
+        yield SweepRow(part.parameter, shown, own=same, status="ok"), model
 
 
 def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], list[Any]]:
@@ -171,28 +159,25 @@ def _runnable(model: Any) -> Any:
     return with_integrator(model, integrator_of(model), float(model.opt.timestep))
 
 
-def _motion(scene: Scene, one: Variant) -> EngineStates | None:
-    """The states of a variant; none of one that is lost."""
-    run = simulate(Setup(scenario=scene.scenario), one.model, thickness(one.model))
-    return run.states if run.judgement.ok else None
-
-
-def _measured(scene: Scene, base: Variant, own: EngineStates | None, one: Variant) -> SweepRow:
+def _measured(
+    scene: Scene, base: Any, own: EngineStates | None, row: SweepRow, model: Any
+) -> SweepRow:
+    """With what a model does; `own`: the motion of the model as it is, unless it is lost."""
     try:
-        run = simulate(Setup(scenario=scene.scenario), one.model, thickness(one.model))
+        run = simulate(Setup(scenario=scene.scenario), model, thickness(model))
     except mujoco.FatalError as error:
-        return replace(one.row, status="diverged", reasons=(f"MuJoCo does not run it: {error}",))
+        return replace(row, status="diverged", reasons=(f"MuJoCo does not run it: {error}",))
     judged = run.judgement
-    row = replace(one.row, status=judged.status.value, reasons=judged.reasons)
+    row = replace(row, status=judged.status.value, reasons=judged.reasons)
     if not judged.ok:
         return row
-    row = _contacts(scene.scenario, one.model, row)
+    row = _contacts(scene.scenario, model, row)
     if own is None:
         return row
-    row = replace(row, change=visible_error(base.model, scene, run.states, own))
-    if quantity_name(base.model, scene):
-        mine = quantity_values(one.model, scene, run.states)
-        apart = np.linalg.norm(mine - quantity_values(base.model, scene, own), axis=1)
+    row = replace(row, change=visible_error(base, scene, run.states, own))
+    if quantity_name(base, scene):
+        mine = quantity_values(model, scene, run.states)
+        apart = np.linalg.norm(mine - quantity_values(base, scene, own), axis=1)
         row = replace(row, figure=float(apart.max()))
     return row
 
@@ -257,12 +242,11 @@ def _contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
 
 
 def _timed(
-    scene: Scene, variants: list[Variant], rows: list[SweepRow], clock: Clock, *, quick: bool
+    scenario: Scenario, models: list[Any], rows: list[SweepRow], clock: Clock, *, quick: bool
 ) -> list[SweepRow]:
-    """With costs; variants have the model as it is before those of the rows."""
+    """With costs; the first model is as it is, the others are those of the rows."""
     usable = [n for n, row in enumerate(rows) if row.status == "ok"]
-    jobs = [_job(scene.scenario, variants[0].model)]
-    jobs += [_job(scene.scenario, variants[n + 1].model) for n in usable]
+    jobs = [_job(scenario, models[n]) for n in (0, *(n + 1 for n in usable))]
     for n, timing in zip(usable, time_jobs(jobs, 0, clock, quick=quick)[1:], strict=True):
         rows[n] = replace(rows[n], cost=timing.ratio)
     return rows

@@ -22,7 +22,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escaped, guarded
 from coursebuild.features.bench.figures import Grid, where
 from coursebuild.features.bench.model import Bench, declared_scenarios
-from coursebuild.features.bench.scenarios import plots, scenario_view
+from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.records import BENCH
 from coursebuild.numerics.reports.sweep import SweepReport
@@ -51,14 +51,11 @@ class BenchView(Struct, frozen=True):
     href: str
     """Where the model's page shows the same."""
     command: str
-    title: str = ""
-    """Of the scenario; empty where nothing was measured, like all that follows."""
-    verdict: str = ""
-    notes: tuple[str, ...] = ()
+    shown: ScenarioView | None = None
+    """`None` where nothing was measured."""
     tables: tuple[Grid, ...] = ()
     folded: Grid | None = None
     """The settings, where they stand below something else."""
-    about: tuple[str, ...] = ()
     where: str = ""
 
 
@@ -127,15 +124,13 @@ def _view(page: PageContext, block: Bench) -> BenchView:
     alone, swept = block.shows == ("table",), isinstance(shown.report, SweepReport)
     grids = {"stable": view.stable, "orders": view.orders}
     tables = [grid for name in block.shows if (grid := grids.get(name)) is not None]
-    settings = swept or not {"plot", "table"}.isdisjoint(block.shows)
+    if not swept and {"plot", "table"}.isdisjoint(block.shows):  # nothing is said of settings
+        view = replace(view, verdict="", notes=())
     return replace(
         nothing,
-        title=view.title,
-        verdict=view.verdict if settings else "",
-        notes=view.notes if settings else (),
+        shown=view,
         tables=(view.settings,) if alone else tuple(tables),
         folded=view.settings if not alone and (swept or "table" in block.shows) else None,
-        about=view.about,
         where=where(words, shown.machine),
     )
 
