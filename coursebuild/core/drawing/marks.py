@@ -6,11 +6,14 @@ Entry points: `markup_text`, `text_width`, `shortened`; `apart`.
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Sequence
 from html import escape
 
 _REMEMBERED = 1024
 """Texts: those of a drawing stand in others as well, in several sizes."""
+_NO_MARKUP = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+"""Halves of surrogate pairs among them, which stand for bytes that are no text."""
 _NARROW = frozenset("ijl.,:;'|!()[] ·ft")
 _BROAD = frozenset("mwMW—%@")
 
@@ -18,14 +21,7 @@ _BROAD = frozenset("mwMW—%@")
 @functools.lru_cache(maxsize=_REMEMBERED)
 def markup_text(text: str) -> str:
     """Text for markup; characters that no markup can hold are left out."""
-    return escape(
-        "".join(c for c in text if c >= " " and c not in "\x7f\ufffe\uffff" and not _half(c))
-    )
-
-
-def _half(char: str) -> bool:
-    """Half of a surrogate pair, which stands for a byte that is no text."""
-    return "\ud800" <= char <= "\udfff"
+    return escape(_NO_MARKUP.sub("", text))
 
 
 @functools.lru_cache(maxsize=_REMEMBERED)

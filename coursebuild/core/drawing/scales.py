@@ -1,7 +1,7 @@
 """The scales of axes: where the ticks are, and what they say.
 
-Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (even); `log_ticks`, `decades`,
-`power_text`, `log` (logarithmic); `number_text`.
+Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (even); `log_ticks`, `log`
+(logarithmic); `number_text`.
 """
 
 from __future__ import annotations
@@ -115,7 +115,9 @@ def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
         most: how many ticks have room.
     """
     first, last = math.ceil(low - 1e-9), math.floor(high + 1e-9)
-    found = [(float(n), power_text(n)) for n in decades(first, last, most)] if first <= last else []
+    found = (
+        [(float(n), _scaled(1, n)) for n in _decades(first, last, most)] if first <= last else []
+    )
     if last - first < 2:
         finer = [
             (n + math.log10(m), _scaled(m, n))
@@ -132,7 +134,7 @@ def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
     return [(math.log10(v), text) for v, text in zip(values, texts, strict=True) if v > 0]
 
 
-def decades(low: int, high: int, most: int) -> list[int]:
+def _decades(low: int, high: int, most: int) -> list[int]:
     """Exponents from `low` to `high`, no more than `most`: all, or each second, third or fifth one.
 
     One of them there is always.
@@ -149,18 +151,13 @@ def _wider(step: int) -> int:
     return next(power * m for m in (2, 3, 5, 10) if power * m > step)
 
 
-def power_text(exponent: int) -> str:
-    """A power of ten: plain where it is short."""
-    return _scaled(1, exponent)
-
-
 def number_text(value: float) -> str:
     """A number as a tick would say it, with few digits."""
     return tick_texts([float(f"{value:.2g}")])[0].removeprefix("1·")
 
 
 def _scaled(mantissa: int, exponent: int) -> str:
-    """A small whole number times a power of ten."""
+    """A small whole number times a power of ten: plain where it is short."""
     if -3 <= exponent <= 3:
         return f"{mantissa * 10**exponent if exponent >= 0 else mantissa / 10**-exponent:g}"
     power = "10" + str(exponent).translate(_RAISED)

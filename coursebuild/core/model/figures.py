@@ -6,7 +6,6 @@ Entry point: `recorded_figures`.
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Iterator
 
 from msgspec import Struct
 
@@ -36,7 +35,20 @@ class RecordedFigure(Struct, frozen=True):
 
 def recorded_figures(document: Document) -> tuple[RecordedFigure, ...]:
     """The figures of a document's scripts that paragraphs show, each with its data after it."""
-    return tuple(_recorded(document))
+    drawn: dict[str, str] = {}
+    found: list[RecordedFigure] = []
+    for block in document_blocks(document):
+        if isinstance(block, Script):
+            drawn |= {figure.name: block.path for figure in block.figures}
+        elif isinstance(block, Paragraph) and block.figure:
+            inlines = walk_inlines(block_inlines(block))
+            image = next(inline for inline in inlines if isinstance(inline, Image))
+            path = local_file(image.url, document.source.path)
+            for file in (path, f"{posixpath.splitext(path)[0]}.csv"):
+                name = posixpath.basename(file)
+                if name in drawn:
+                    found.append(RecordedFigure(drawn[name], name, file, image.url_span))
+    return tuple(found)
 
 
 def unshown_figures(document: Document) -> tuple[FigureName, ...]:
@@ -49,19 +61,3 @@ def unshown_figures(document: Document) -> tuple[FigureName, ...]:
         for figure in block.figures
         if (block.path, figure.name) not in shown
     )
-
-
-def _recorded(document: Document) -> Iterator[RecordedFigure]:
-    drawn: dict[str, str] = {}
-    for block in document_blocks(document):
-        if isinstance(block, Script):
-            drawn |= {figure.name: block.path for figure in block.figures}
-        elif isinstance(block, Paragraph) and block.figure:
-            for inline in walk_inlines(block_inlines(block)):
-                if isinstance(inline, Image):
-                    path = local_file(inline.url, document.source.path)
-                    for file in (path, f"{posixpath.splitext(path)[0]}.csv"):
-                        name = posixpath.basename(file)
-                        if name in drawn:
-                            yield RecordedFigure(drawn[name], name, file, inline.url_span)
-                    break

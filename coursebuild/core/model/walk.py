@@ -1,14 +1,13 @@
 """Walking a document: every block and every inline in order.
 
-Entry points: `document_blocks`, `document_scripts`, `document_inlines`; `walk_blocks` and
-`walk_inlines`; `is_blank`, `is_comment`.
+Entry points: `document_blocks`, `document_scripts`, `document_inlines`, `sibling_groups`;
+`walk_blocks` and `walk_inlines`; `is_blank`, `is_comment`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator
 
 from coursebuild.core.model.blocks import (
     Block,
@@ -57,23 +56,20 @@ def child_blocks(block: Block) -> tuple[Block, ...]:
 
 def block_inlines(block: Block) -> tuple[Inline, ...]:
     """The inlines directly inside a block (not inside its child blocks)."""
-    kind = type(block)
-    if kind in _LINES:
-        return block.children  # type: ignore[union-attr]
-    if isinstance(block, FeatureBlock):
-        return block.child_inlines()
-    inner = _INLINES.get(kind)
-    return () if inner is None else inner(block)
-
-
-_LINES = frozenset((Paragraph, Heading, HtmlFlow))
-_INLINES: dict[type, Callable[[Any], tuple[Inline, ...]]] = {
-    Callout: lambda callout: callout.title,
-    Table: lambda table: tuple(
-        i for row in (table.header, *table.rows) for cell in row for i in cell.children
-    ),
-    Recording: lambda recording: recording.caption,
-}
+    match block:
+        case Paragraph() | Heading() | HtmlFlow():
+            return block.children
+        case FeatureBlock():
+            return block.child_inlines()
+        case Callout():
+            return block.title
+        case Table():
+            rows = (block.header, *block.rows)
+            return tuple(inline for row in rows for cell in row for inline in cell.children)
+        case Recording():
+            return block.caption
+        case _:
+            return ()
 
 
 def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
@@ -114,6 +110,18 @@ def document_blocks(document: Document) -> Iterator[Block]:
     return iter(known)
 
 
+def sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
+    """The blocks of a document, those that stand side by side together."""
+    waiting = [document.blocks, *(footnote.blocks for footnote in document.footnotes)]
+    for group in waiting:  # which grows meanwhile
+        yield group
+        for block in group:
+            if isinstance(block, ListBlock):
+                waiting += [item.blocks for item in block.items]
+            else:
+                waiting.append(child_blocks(block))
+
+
 def is_blank(blocks: Iterable[Block]) -> bool:
     """Whether all blocks of a document show nothing: comments, and paragraphs of odd blanks."""
     return all(
@@ -126,15 +134,6 @@ def is_blank(blocks: Iterable[Block]) -> bool:
 def is_comment(html: HtmlBlock | RawInline) -> bool:
     """Whether HTML shows nothing: comments only."""
     return _COMMENTS.fullmatch(html.html) is not None
-
-
-def document_has(document: Document, *kinds: type[Block]) -> bool:
-    """Whether a document has blocks of one of these types."""
-    known: frozenset[type] | None = document.__dict__.get("kinds")
-    if known is None:
-        known = frozenset(map(type, document_blocks(document)))
-        document.__dict__["kinds"] = known
-    return not known.isdisjoint(kinds)
 
 
 def document_scripts(document: Document) -> tuple[Script, ...]:
@@ -153,6 +152,4 @@ def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
 def document_inlines(document: Document) -> Iterator[Inline]:
     """Every inline of a document."""
     for block in document_blocks(document):
-        inlines = block_inlines(block)
-        if inlines:
-            yield from walk_inlines(inlines)
+        yield from walk_inlines(block_inlines(block))
