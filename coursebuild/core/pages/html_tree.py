@@ -106,13 +106,8 @@ def _read(parent: LexborNode, into: HtmlElement, levels: int) -> None:
             if levels:
                 _read(node, made, levels - 1)
             else:
-                _read_flat(node, into)
+                into.children.append(node.text(deep=True))
         node = node.next
-
-
-def _read_flat(parent: LexborNode, into: HtmlElement) -> None:
-    """The texts in a node, one after the other."""
-    into.children.append(parent.text(deep=True))
 
 
 def to_html(content: Iterable[HtmlContent]) -> str:

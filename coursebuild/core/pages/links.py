@@ -68,23 +68,6 @@ class BrokenLink(Struct, frozen=True):
     """The nearest file or id that is there."""
 
 
-class _Base(Struct, frozen=True):
-    """Where the site is served."""
-
-    root: str
-    """The address of its root, with `_ORIGIN` for the host."""
-    own: str | None
-    """The host, where it is known."""
-
-    @staticmethod
-    @functools.lru_cache(maxsize=8)
-    def of(base_url: str) -> _Base:
-        base = urlsplit(base_url)
-        own = f"{base.scheme}://{base.netloc}" if base.netloc else None
-        folder = f"{base.path.rstrip('/')}/"
-        return _Base(f"{_ORIGIN}{folder}", own)
-
-
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
     """What is broken in a site that is served at `base_url`."""
     contents = {file.path: file.data for file in files}
@@ -94,12 +77,11 @@ def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[Broken
         if path.endswith(".html")
     }
     ids = {path: found for path, (found, _) in pages.items()}
-    base = _Base.of(base_url)
     broken = (
         problem
         for path, (_, addresses) in pages.items()
         for url in addresses
-        if (problem := _problem(path, url, contents.keys(), ids, base)) is not None
+        if (problem := _problem(path, url, contents.keys(), ids, base_url)) is not None
     )
     return tuple(sorted(broken, key=lambda one: (one.page, one.url)))
 
@@ -110,18 +92,19 @@ def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
     addresses: set[str] = set()
     for tag, attributes in elements_with(html, _NOTED):
         for name, value in attributes.items():
-            named, urls = attribute_targets(tag, name, value or "")
-            ids.update(named)
-            addresses.update(urls)
+            if name == "id" or (name == "name" and tag == "a"):
+                ids.add(value or "")
+            elif name in _ADDRESSES.get(tag, ()):
+                several = name == "srcset"
+                addresses.update(_srcset(value or "") if several else (value or "",))
     return frozenset(ids), frozenset(addresses)
 
 
 def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[Reference]:
     """Where the addresses of a page lead."""
-    base = _Base.of(base_url)
     found: set[Reference] = set()
     for url in addresses:
-        target = _target(path, url, base)
+        target = _target(path, url, base_url)
         if target is not None:
             found.add(target if isinstance(target, tuple) else ("", target))
     return frozenset(found)
@@ -153,16 +136,24 @@ def without_lines(ids: Iterable[str]) -> frozenset[str]:
     return frozenset(kept | {f"{stem}.L{last}" for stem, last in longest.items()})
 
 
-def _target(path: str, url: str, base: _Base) -> Reference | str | None:
+@functools.lru_cache(maxsize=8)
+def _base(base_url: str) -> tuple[str, str]:
+    """The folder that a site is served from, and the host; empty where that is not known."""
+    parts = urlsplit(base_url)
+    host = f"{parts.scheme}://{parts.netloc}" if parts.netloc else ""
+    return f"{parts.path.rstrip('/')}/", host
+
+
+def _target(path: str, url: str, base_url: str) -> Reference | str | None:
     """The file and the anchor of an address; why it has none; `None` where it leads elsewhere."""
+    folder, own = _base(base_url)
     try:
-        parts = urlsplit(urljoin(base.root + urls.encode(path), url.strip()))
+        parts = urlsplit(urljoin(_ORIGIN + folder + urls.encode(path), url.strip()))
     except ValueError:
         return "the address cannot be read"
     host = f"{parts.scheme}://{parts.netloc}"
-    if host not in (_ORIGIN, base.own):
+    if host not in (_ORIGIN, own):
         return None
-    folder = urlsplit(base.root).path
     if not f"{parts.path}/".startswith(folder):
         return "the address leads out of the site" if host == _ORIGIN else None
     target = unquote(parts.path[len(folder) :])
@@ -176,12 +167,12 @@ def _problem(
     url: str,
     files: Collection[str],
     ids: Mapping[str, Collection[str]],
-    base: _Base,
+    base_url: str,
 ) -> BrokenLink | None:
     def broken(reason: str, near: str | None = None) -> BrokenLink:
         return BrokenLink(path, url, reason, near)
 
-    found = _target(path, url, base)
+    found = _target(path, url, base_url)
     if found is None:
         return None
     if isinstance(found, str):
@@ -195,15 +186,4 @@ def _problem(
 
 
 def _srcset(value: str) -> Iterator[str]:
-    for part in value.split(","):
-        if part.strip():
-            yield part.split()[0]
-
-
-def attribute_targets(tag: str, name: str, value: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The ids and the addresses in an attribute of an element."""
-    if name == "id" or (name == "name" and tag == "a"):
-        return (value,), ()
-    if name not in _ADDRESSES.get(tag, ()):
-        return (), ()
-    return (), (tuple(_srcset(value)) if name == "srcset" else (value,))
+    return (part.split()[0] for part in value.split(",") if part.strip())
