@@ -40,13 +40,6 @@ class FontFamily(Struct, frozen=True):
     licence: ThemeFile
 
 
-class Accent(Struct, frozen=True):
-    """The colour of links and of what can be pressed, as `#rrggbb`."""
-
-    colour: str
-    span: Span
-
-
 class Theme(Struct, frozen=True):
     """Logo, icons, colours, style sheets, fonts and templates; the tool's where there is none."""
 
@@ -54,8 +47,9 @@ class Theme(Struct, frozen=True):
     logo_dark: ThemeFile | None = None
     icon: ThemeFile | None = None
     touch_icon: ThemeFile | None = None
-    accent: Accent | None = None
-    accent_dark: Accent | None = None
+    accent: str = ""
+    """The colour of links and of what can be pressed, as `#rrggbb`."""
+    accent_dark: str = ""
     css: tuple[ThemeFile, ...] = ()
     fonts: tuple[FontFamily, ...] = ()
     templates: tuple[Source, ...] = ()

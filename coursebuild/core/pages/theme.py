@@ -35,11 +35,10 @@ def theme_style(theme: Theme) -> str:
 
 def accents(theme: Theme) -> tuple[str, str]:
     """The accent on light and on dark pages."""
-    light, dark = theme.accent, theme.accent_dark
-    if light is None and dark is None:
+    if not theme.accent and not theme.accent_dark:
         return _ACCENT
-    first = light.colour if light else _ACCENT[0]
-    return first, dark.colour if dark else legible(first, GROUNDS_DARK, ENOUGH)
+    light = theme.accent or _ACCENT[0]
+    return light, theme.accent_dark or legible(light, GROUNDS_DARK, ENOUGH)
 
 
 def _accent(theme: Theme) -> str:

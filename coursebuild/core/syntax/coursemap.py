@@ -69,7 +69,7 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(found))
     course = _course(source, root, decoding.value, levels)
-    found += check_contrast(course.theme)
+    found += check_contrast(root.object("theme"), course.theme)
     return Parsed(course, sort_diagnostics(found))
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from msgspec import Meta, Struct
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, LEAST, contrast, legible
-from coursebuild.core.model.theme import PICTURES, Accent, FontFamily, Theme, ThemeFile
+from coursebuild.core.model.theme import PICTURES, FontFamily, Theme, ThemeFile
 from coursebuild.core.syntax.fields import matching
 from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
@@ -63,14 +63,11 @@ def theme(node: ObjectNode, fields: ThemeTable) -> Theme:
     def file(name: str, path: str | None) -> ThemeFile | None:
         return None if path is None else ThemeFile(path, node.place(name))
 
-    def accent(name: str, colour: str | None) -> Accent | None:
-        return None if colour is None else Accent(colour.lower(), node.place(name))
-
     pictures: dict[str, Any] = {name: file(name, getattr(fields, name)) for name in PICTURES}
     return Theme(
         **pictures,
-        accent=accent("accent", fields.accent),
-        accent_dark=accent("accent_dark", fields.accent_dark),
+        accent=(fields.accent or "").lower(),
+        accent_dark=(fields.accent_dark or "").lower(),
         css=_files(node, "css", fields.css),
         fonts=tuple(
             FontFamily(
@@ -83,15 +80,18 @@ def theme(node: ObjectNode, fields: ThemeTable) -> Theme:
     )
 
 
-def check_contrast(theme: Theme) -> Iterator[Diagnostic]:
+def check_contrast(node: ObjectNode, theme: Theme) -> Iterator[Diagnostic]:
     """Warnings of accents that cannot be read on the grounds of a page."""
-    schemes = ((theme.accent, GROUNDS_LIGHT, "light"), (theme.accent_dark, GROUNDS_DARK, "dark"))
-    for accent, grounds, scheme in schemes:
-        if accent is not None and (ratio := contrast(accent.colour, grounds)) < LEAST:
-            message = f"on {scheme} pages `{accent.colour}` has a contrast of {ratio:.2f} : 1"
-            near = legible(accent.colour, grounds)
+    for name, colour, grounds in (
+        ("accent", theme.accent, GROUNDS_LIGHT),
+        ("accent_dark", theme.accent_dark, GROUNDS_DARK),
+    ):
+        if colour and (ratio := contrast(colour, grounds)) < LEAST:
+            scheme = "light" if grounds is GROUNDS_LIGHT else "dark"
+            message = f"on {scheme} pages `{colour}` has a contrast of {ratio:.2f} : 1"
+            near = legible(colour, grounds)
             help = f"text needs {LEAST} : 1; the nearest colour that has it is `{near}`"
-            yield diagnose("theme-contrast", accent.span, message, help=help)
+            yield diagnose("theme-contrast", node.place(name), message, help=help)
 
 
 def _files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[ThemeFile, ...]:
