@@ -30,12 +30,12 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import strings_for
 from coursebuild.core.pages.equations import equations_of
+from coursebuild.core.pages.folding import imported
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, known_mathml, mark_now
 from coursebuild.core.pages.templates import Texts, templates_of
 from coursebuild.core.pages.urls import Place
-from coursebuild.core.pages.zips import imports
 from coursebuild.core.registry import summarize
 from coursebuild.core.run.versions import package_version
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -140,7 +140,6 @@ def prepare_to_read(sample: SourceText) -> None:
     # Much is made only when it is needed for the first time.
     read = parse_document(sample.source, sample.callouts, lesson=sample.lesson).value
     mark_now("python", 'f"{x}"\n')
-    imports("x\n")
     if document_formulas(read):
         from coursebuild.core.run.v8 import start
 
@@ -195,10 +194,10 @@ class PageReader:
             bare = replace(bare, equations=equations, summaries=known.value)
             wrong = (*whole.diagnostics, *found, *known.diagnostics)
             scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
-            imported = tuple((s.path, tuple(sorted(imports(s.code.text)))) for s in scripts)
+            imports = tuple((s.path, tuple(sorted(imported(s.code.text)))) for s in scripts)
             lasting = not found  # that a formula took too long may not happen again
             fingerprint = document_fingerprint(bare)
-            data = encode(DocumentSummary(bare, wrong, imported, lasting, fingerprint))
+            data = encode(DocumentSummary(bare, wrong, imports, lasting, fingerprint))
             if lasting:
                 self._store.put(SUMMARIES, text.key, data)
             self._keep(text, whole)
@@ -276,7 +275,7 @@ class PageReader:
         assert inputs.shown is not None, "a page with a document shows it"
         whole = self._whole(text)
         renderer = self._renderer_for(language, templates, whole)
-        return PageContext.made(renderer, inputs.shown, Place(inputs.head.path), whole.document)
+        return PageContext(renderer, inputs.shown, Place(inputs.head.path), whole.document)
 
     def _renderer_for(self, language: str, own: Texts, whole: _Whole | None) -> Renderer:
         """Words, templates and marked code, with the formulas of a document."""

@@ -16,7 +16,6 @@ from msgspec.structs import replace
 from coursebuild.core.checks.course import check_course
 from coursebuild.core.model import Course, Document, Filter
 from coursebuild.core.model.results import CompileResult
-from coursebuild.core.pages.plain import plain_html
 from coursebuild.core.run.run_record import from_bytes
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import updated_body
@@ -30,6 +29,7 @@ from coursebuild.features.lab.export.trial import LabExport
 from coursebuild.report.terminal import Style
 from coursebuild.report.text import diagnostic_text
 from support.fixture_cases import read_cases
+from support.plain_html import plain_html
 from support.random_lessons import KINDS, PIECES
 from support.sample_lessons import (
     DIGITS,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import re
 
-from coursebuild.core.pages.plain import plain_html
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.format import format_document
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.quiz.model import Quiz
+from support.plain_html import plain_html
 from support.random_lessons import KINDS
 
 

@@ -36,6 +36,7 @@ from coursebuild.core.model.results import (
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.urls import Place, lesson_path
 from coursebuild.core.syntax.coursemap import parse_course_map
@@ -112,11 +113,11 @@ def read_assets() -> Assets:
             for path in sorted(templates.rglob("*"))
             if path.is_file()
         ),
-        tuple(
-            (path.relative_to(dist).as_posix(), path.read_bytes())
+        {
+            path.relative_to(dist).as_posix(): path.read_bytes()
             for path in sorted(dist.rglob("*"))
             if path.is_file()
-        ),
+        },
     )
 
 
@@ -132,7 +133,9 @@ class Made(Struct, frozen=True):
         library = Library.of(self.course, self.results, self.assets)
         found = library.lessons[lesson]
         assert found.document is not None
-        return PageContext.of(library, Place(lesson_path(found)), found.document)
+        place = Place(lesson_path(found))
+        shown = document_inputs(library, place, found.document)
+        return PageContext(library.renderer, shown, place, found.document)
 
     def html(self, lesson: str = "0.1") -> str:
         """The text of a lesson as HTML."""

@@ -370,7 +370,9 @@ class Equation(Struct, frozen=True):
     id: str
     """Its anchor."""
     number: str = ""
-    """Of one with a label: `3`."""
+    """By which it is referred to, as `3`; empty where it has no label."""
+    shown: bool = False
+    """Whether its page writes the number beside it: the formula itself does not show one."""
 
 
 def title_line(source: Source) -> Span | None:

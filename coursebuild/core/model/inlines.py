@@ -1,6 +1,6 @@
 """Inlines: what stands in a paragraph, a heading, a cell.
 
-Entry point: the union `Inline`; `plain_text(inlines)`.
+Entry points: the union `Inline`; `plain_text`, `without_links`.
 """
 
 from __future__ import annotations
@@ -272,3 +272,26 @@ def plain_text(inlines: tuple[Inline, ...]) -> str:
             case _:
                 pass
     return "".join(parts)
+
+
+def without_links(inlines: tuple[Inline, ...]) -> tuple[Inline, ...]:
+    """Inlines as they may stand inside a link, or on another page than their own.
+
+    Without links, terms, footnotes, raw HTML and pictures, in one line.
+    """
+    kept: list[Inline] = []
+    for inline in inlines:
+        match inline:
+            case Link() | Term():
+                kept += without_links(inline.children)
+            case Emphasis() | Strong() | Strikethrough():
+                kept.append(type(inline)(inline.span, without_links(inline.children)))
+            case Image():
+                kept.append(Text(inline.span, inline.alt))
+            case SoftBreak() | HardBreak():
+                kept.append(Text(inline.span, " "))
+            case RawInline() | FootnoteRef():
+                pass
+            case _:
+                kept.append(inline)
+    return tuple(kept)

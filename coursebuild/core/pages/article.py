@@ -22,9 +22,9 @@ from coursebuild.core.model import (
     Script,
     Table,
     main_and_further,
+    without_links,
 )
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.link_texts import without_links
 from coursebuild.core.registry import kind_of_block
 
 
@@ -93,18 +93,13 @@ def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
     rest = blocks
     while (at := next((i for i, b in enumerate(rest) if _docked(b)), None)) is not None:
         docked = _docked(rest[at])
-        start = next((i + 1 for i in range(at - 1, -1, -1) if _is_wide(rest[i])), 0)
-        start = next(
-            (i for i in range(at - 1, start - 1, -1) if isinstance(rest[i], Heading)), start
-        )
-        end = next(
-            (
-                i
-                for i in range(at + 1, len(rest))
-                if _is_wide(rest[i]) or isinstance(rest[i], Heading)
-            ),
-            len(rest),
-        )
+        start, end = at, at + 1
+        while start and not _is_wide(rest[start - 1]):
+            start -= 1
+            if isinstance(rest[start], Heading):
+                break
+        while end < len(rest) and not (_is_wide(rest[end]) or isinstance(rest[end], Heading)):
+            end += 1
         if start:
             groups.append(_Group(rest[:start]))
         groups.append(_Group(rest[start:at], docked, rest[at + 1 : end]))

@@ -36,9 +36,9 @@ class Assets(Struct, frozen=True):
 
     templates: tuple[tuple[str, str], ...]
     """Path relative to `templates/`, and text."""
-    dist: tuple[tuple[str, bytes], ...] | Mapping[str, bytes]
+    dist: Mapping[str, bytes]
     """Path relative to the bundle (`css/site.css`, `js/site.js`, `fonts/fonts.json`, …), and
-    bytes; a mapping may read them when they are asked for."""
+    bytes, which may be read when they are asked for."""
     compiled: Path | None = None
     """Where the templates lie compiled, see `templates_of`."""
 
@@ -48,15 +48,12 @@ class Assets(Struct, frozen=True):
 
     def file(self, path: str) -> bytes:
         """The bytes of a bundled file (`KeyError` where there is none)."""
-        return self._bundle()[path]
+        return self.dist[path]
 
     def files(self, folder: str) -> tuple[tuple[str, bytes], ...]:
         """The bundled files of a folder."""
-        bundle = self._bundle()
-        return tuple((path, bundle[path]) for path in bundle if path.startswith(f"{folder}/"))
-
-    def _bundle(self) -> Mapping[str, bytes]:
-        return self.dist if isinstance(self.dist, Mapping) else dict(self.dist)
+        paths = (path for path in self.dist if path.startswith(f"{folder}/"))
+        return tuple((path, self.dist[path]) for path in paths)
 
 
 def hashed_name(path: str, data: bytes) -> str:
@@ -87,7 +84,7 @@ def _strings_for(
 ) -> Strings:
     files = [(path, text) for path, text in templates if path.startswith("strings/")]
     texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
-    strings = Strings((), language)
+    strings = Strings({}, language)
     for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
         for text in (text for of, text in (*texts, *added) if of == name):
             strings = parse_strings(text, strings, language)

@@ -1,4 +1,4 @@
-"""The blocks that carry code and what the build knows of it; callouts and io cards.
+"""The blocks that carry code and what the build knows of it; figures and callouts.
 
 Entry points: one function for each block, from the page's context and the block to HTML. What is
 shown is worked out here as values; templates in `blocks/` say how it looks.
@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Iterable
 from decimal import Decimal
 from typing import TYPE_CHECKING, assert_never
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.model import (
@@ -25,6 +26,7 @@ from coursebuild.core.model import (
     Recording,
     Script,
     Table,
+    line_anchor,
     listing_anchor,
     output_anchor,
 )
@@ -33,9 +35,7 @@ from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.folding import Part, fold
-from coursebuild.core.pages.listings import numbered
-from coursebuild.core.pages.page_inputs import ShownRun, ShownVerdict
-from coursebuild.core.pages.renderer import Renderer
+from coursebuild.core.pages.page_inputs import ShownRun
 from coursebuild.core.pages.strings import Strings
 
 if TYPE_CHECKING:
@@ -63,16 +63,15 @@ class Receipt(Struct, frozen=True):
 
 def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) -> Markup:
     """A script and the outputs that belong to it, as one object."""
-    run = page.shown.runs.get(block.path)
     return page.template(
         "blocks/script.html",
         script=block,
-        parts=_parts(page.renderer, block),
+        parts=_parts(page, block),
         anchor=listing_anchor(block.path),
         href=page.place.href(block.path),
         command=shlex.join(("python", block.path, *block.args)),
         outputs=tuple(_output(page, recording) for recording in recordings),
-        receipt=None if recordings else script_receipt(page, run),
+        receipt=None if recordings else script_receipt(page, block),
     )
 
 
@@ -115,8 +114,7 @@ def callout(page: PageContext, block: Callout) -> Markup:
     return page.template(
         "blocks/callout.html",
         callout=block,
-        label=page.shown.callouts[block.kind].label,
-        promise=page.shown.callouts[block.kind].promise,
+        kind=page.shown.callouts[block.kind],
         title=page.inlines(block.title),
         body=page.blocks(block.blocks),
     )
@@ -167,24 +165,17 @@ def _output(page: PageContext, block: Recording) -> ShownOutput:
 
 def output_receipt(page: PageContext, block: Recording) -> Receipt:
     """What can be said for a recorded output."""
-    verdict = page.shown.verdicts.get(block.span.start)
-    run = page.shown.runs.get(block.script) if block.script is not None else None
-    return _output_receipt(page, verdict, run, isinstance(block.body, Table))
-
-
-def _output_receipt(
-    page: PageContext, verdict: ShownVerdict | None, run: ShownRun | None, table: bool
-) -> Receipt:
-    words, shown = page.renderer.words, page.shown
+    words, shown = page.words, page.shown
+    verdict, run = shown.verdicts.get(block.span.start), shown.runs.get(block.script or "")
     versions = {"engine": shown.engine, "python": shown.python}
     if verdict is None or verdict.status == "unchecked":
         return _not_run(words, run)
     match verdict.status:
         case "verified":
-            how = compared(words, verdict.comparison)
+            ran = words("receipt.verified", **versions)
             if run is not None and run.recorded:
-                return Receipt("verified", f"{words('receipt.once', when=run.recorded)} {how}.")
-            return Receipt("verified", f"{words('receipt.verified', **versions)} {how}.")
+                ran = words("receipt.once", when=run.recorded)
+            return Receipt("verified", f"{ran} {compared(words, verdict.comparison)}.")
         case "volatile":
             return Receipt("volatile", words("receipt.volatile", **versions))
         case "drift":
@@ -224,9 +215,10 @@ def short(value: Decimal) -> str:
     return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
 
 
-def script_receipt(page: PageContext, run: ShownRun | None) -> Receipt:
+def script_receipt(page: PageContext, block: Script) -> Receipt:
     """What can be said for a script without a recorded output."""
-    words, shown = page.renderer.words, page.shown
+    words, shown = page.words, page.shown
+    run = shown.runs.get(block.path)
     if run is not None and run.recorded:
         return Receipt("verified", words("receipt.once_ran", when=run.recorded))
     if run is not None and run.outcome is Outcome.OK:
@@ -246,20 +238,31 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 # --- code
 
 
-def _parts(renderer: Renderer, block: Script) -> tuple[CodePart, ...]:
+def _parts(page: PageContext, block: Script) -> tuple[CodePart, ...]:
     """The code as it is shown; what draws is folded whole, since its figure tells the story."""
     text = block.code.text.rstrip("\n")
-    lines = renderer.mark("python", text)
+    lines = page.renderer.mark("python", text)
     parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
     return tuple(
         CodePart(
-            numbered(lines[part.first - 1 : part.last], block.path, part.first),
+            numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
             part.first,
             part.folded,
-            _fold_label(renderer.words, part),
+            _fold_label(page.words, part),
         )
         for part in parts
     )
+
+
+def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:
+    """Lines of the file at a path, from its line `first` on, each of which can be linked to.
+
+    No highlighted token reaches over the end of a line, so that each can be an element. Its number
+    is in its anchor and nowhere in the text, so that it is neither copied nor read out.
+    """
+    start, _, _ = line_anchor(path, first).rpartition(str(first))
+    before = f'<span id="{escape(start)}'
+    return Markup("\n".join(f'{before}{n}">{line}</span>' for n, line in enumerate(lines, first)))
 
 
 def _fold_label(words: Strings, part: Part) -> str:

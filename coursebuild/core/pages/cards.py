@@ -6,7 +6,6 @@ Entry points: `pictures_of(library, place, owner)`; `lesson_cards`, `galleries`.
 from __future__ import annotations
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.model import FeatureBlock, Lesson, document_blocks
 from coursebuild.core.pages import urls
@@ -30,7 +29,6 @@ class LessonCard(Struct, frozen=True):
 
     link: LessonLink
     level: str
-    level_href: str
     picture: PictureLink | None
 
 
@@ -65,14 +63,10 @@ def lesson_cards(library: Library, place: urls.Place) -> tuple[LessonCard, ...]:
 
 
 def _lesson_card(library: Library, place: urls.Place, lesson: Lesson) -> LessonCard:
-    level = library.levels[lesson.level]
     pictures = pictures_of(library, place, lesson)
-    return LessonCard(
-        replace(lesson_link(library, place, lesson), asked=library.asked.get(lesson.path, "")),
-        level.title,
-        place.href(urls.level_path(level)),
-        pictures[0] if pictures else None,
-    )
+    link = lesson_link(library, place, lesson, whole=True)
+    level = library.levels[lesson.level].title
+    return LessonCard(link, level, pictures[0] if pictures else None)
 
 
 def galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:

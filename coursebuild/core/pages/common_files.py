@@ -70,9 +70,7 @@ def common_characters(library: Library) -> frozenset[str]:
     text = {*course.title, *course.licence}
     for page in course.pages:
         text.update(page.title)
-    for _, words in library.words.entries:
-        text.update(words)
-    return frozenset(text)
+    return frozenset(text.union(*library.words.texts.values()))
 
 
 def needed_fonts(assets: Assets, facts: PageFacts, theme: Theme) -> tuple[fonts.FontJob, ...]:

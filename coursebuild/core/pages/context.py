@@ -1,6 +1,6 @@
 """What the Markdown renderer asks about a page: addresses, formulas, code, our own blocks.
 
-Entry point: `PageContext`, the renderer's context for one document on one page.
+Entry point: `PageContext`, the `Context` of one document on one page.
 
 A recorded output that directly follows its script is drawn as one object with it; `joined` says
 which recordings those are, and such a recording gives nothing where it stands by itself.
@@ -9,20 +9,21 @@ which recordings those are, and such a recording gives nothing where it stands b
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import assert_never
-from urllib.parse import quote, unquote
+from functools import cached_property
+from typing import Literal, assert_never
+from urllib.parse import unquote
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.model import (
     Block,
     Callout,
     Document,
+    Equation,
     FeatureBlock,
     Image,
     Inline,
-    ListBlock,
     Mjcf,
     NumberBinding,
     PlainCode,
@@ -30,57 +31,59 @@ from coursebuild.core.model import (
     Script,
     Target,
     UrlTarget,
-    child_blocks,
     document_blocks,
+    sibling_groups,
 )
 from coursebuild.core.pages import blocks, formulas, markup, urls
 from coursebuild.core.pages.direction import direction
-from coursebuild.core.pages.document_inputs import document_inputs, file_address
-from coursebuild.core.pages.equations import NumberedFormula, numbered
-from coursebuild.core.pages.html_context import HtmlOptions, OwnBlock, Words
-from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.document_inputs import file_address
+from coursebuild.core.pages.equations import numbered
+from coursebuild.core.pages.html_context import Context, OwnBlock
 from coursebuild.core.pages.page_inputs import ShownDocument
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.registry import kind_of_block
 
 
-class PageContext(Struct, frozen=True):
+class PageContext(Context, Struct, frozen=True, dict=True):
     """One document on one page."""
 
     renderer: Renderer
     shown: ShownDocument
     place: urls.Place
     document: Document
-    joined: Mapping[int, tuple[Recording, ...]]
-    """The recordings drawn with a script, by the offset at which the script begins."""
-    options: HtmlOptions
-    """The words that Markdown's own elements need."""
-    outputs: Mapping[int, int]
-    """Which output of its script a recording is, from 1, by the offset at which it begins."""
-    equations: Mapping[int, NumberedFormula]
-    """Formulas on lines of their own, by their offset."""
 
-    @classmethod
-    def of(cls, library: Library, place: urls.Place, document: Document) -> PageContext:
-        """The context of a document on a page of a course."""
-        return cls.made(
-            library.renderer, document_inputs(library, place, document), place, document
-        )
+    @cached_property
+    def joined(self) -> Mapping[int, tuple[Recording, ...]]:
+        """The recordings drawn with a script, by the offset at which the script begins."""
+        return dict(_joined(self.document))
 
-    @classmethod
-    def made(
-        cls, renderer: Renderer, shown: ShownDocument, place: urls.Place, document: Document
-    ) -> PageContext:
-        """The context, once it is known what the page shows of the course."""
-        options = HtmlOptions(
-            words=_markup_words(renderer.words), quantities=direction(renderer.words.language)
-        )
-        joined, outputs = dict(_joined(document)), _numbers(document)
-        equations = numbered(document, lambda tex: renderer.mathml(tex, True))
-        return cls(renderer, shown, place, document, joined, options, outputs, equations)
+    @cached_property
+    def outputs(self) -> Mapping[int, int]:
+        """Which output of its script a recording is, from 1, by the offset at which it begins."""
+        counts: dict[str, int] = {}
+        numbers: dict[int, int] = {}
+        for block in document_blocks(self.document):
+            if isinstance(block, Recording) and block.script is not None:
+                counts[block.script] = numbers[block.span.start] = counts.get(block.script, 0) + 1
+        return numbers
+
+    @cached_property
+    def equations(self) -> Mapping[int, Equation]:
+        """Formulas on lines of their own, by their offset."""
+        return numbered(self.document, self.renderer.mathml)
 
     # what the Markdown renderer asks
+
+    @property
+    def words(self) -> Strings:
+        """The interface's words."""
+        return self.renderer.words
+
+    @property
+    def direction(self) -> Literal["ltr", "rtl"]:
+        """Which way the course's language runs."""
+        return direction(self.words.language)
 
     def href(self, target: Target) -> str:
         """The address of a link's target."""
@@ -96,23 +99,14 @@ class PageContext(Struct, frozen=True):
 
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""
-        label = self.renderer.words("markup.formula")
+        label = self.words("markup.formula")
         return Markup(formulas.in_line(str(self.renderer.mathml(tex, False)), label))
 
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, which scrolls inside itself where it is too wide."""
         mathml = self.renderer.mathml(tex, True)
-        html = self.template("blocks/formula.html", mathml=mathml)
         known = self.equations.get(start)
-        if known is None:
-            return html
-        number = f'<span class="equation-number">({escape(known.number)})</span>'
-        label = escape(self.options.words.formula)
-        link = f'<a class="anchor" href="#{quote(known.id)}" aria-label="{label}">#</a>'
-        return Markup(
-            f'<span class="equation" id="{escape(known.id)}">{html}'
-            f"{number if known.shown else ''}{link}</span>"
-        )
+        return self.template("blocks/formula.html", mathml=mathml, known=known)
 
     def reference(self, target: Target) -> str:
         """What a link without a text says: the number of the formula that it leads to."""
@@ -158,15 +152,15 @@ class PageContext(Struct, frozen=True):
 
     def blocks(self, content: tuple[Block, ...]) -> Markup:
         """Blocks as HTML, without the last line end."""
-        return Markup(str.rstrip(markup.render_blocks(content, self, self.options), "\n"))
+        return Markup(str.rstrip(markup.render_blocks(content, self), "\n"))
 
     def inlines(self, content: tuple[Inline, ...]) -> Markup:
         """Inlines as HTML."""
-        return markup.render_inlines(content, self, self.options)
+        return markup.render_inlines(content, self)
 
     def footnotes(self) -> Markup:
         """The document's footnotes."""
-        return markup.render_footnotes(self.document.footnotes, self, self.options)
+        return markup.render_footnotes(self.document.footnotes, self)
 
     def highlight(self, language: str, text: str) -> Markup:
         """Code with its tokens marked."""
@@ -177,53 +171,15 @@ class PageContext(Struct, frozen=True):
         return self.renderer.render(name, **values)
 
 
-def _markup_words(words: Strings) -> Words:
-    return Words(
-        anchor=words("markup.anchor"),
-        formula=words("markup.formula_anchor"),
-        footnotes=words("markup.footnotes"),
-        footnote=words("markup.footnote"),
-        back=words("markup.back"),
-        back_again=words("markup.back_again"),
-        table=words("markup.table"),
-        done=words("markup.done"),
-        not_done=words("markup.not_done"),
-    )
-
-
-def _numbers(document: Document) -> dict[int, int]:
-    """The outputs of each script, counted."""
-    counts: dict[str, int] = {}
-    numbers: dict[int, int] = {}
-    for block in document_blocks(document):
-        if isinstance(block, Recording) and block.script is not None:
-            counts[block.script] = numbers[block.span.start] = counts.get(block.script, 0) + 1
-    return numbers
-
-
 def _joined(document: Document) -> Iterator[tuple[int, tuple[Recording, ...]]]:
-    yield from _joined_in(document.blocks)
-    for footnote in document.footnotes:
-        yield from _joined_in(footnote.blocks)
-
-
-def _joined_in(siblings: tuple[Block, ...]) -> Iterator[tuple[int, tuple[Recording, ...]]]:
-    """The scripts among siblings, each with the recordings that follow it at once."""
-    for number, block in enumerate(siblings):
-        if isinstance(block, Script):
+    """Where each script begins, and the recordings that follow it at once."""
+    for siblings in sibling_groups(document):
+        for number, block in enumerate(siblings):
+            if not isinstance(block, Script):
+                continue
             following: list[Recording] = []
             for sibling in siblings[number + 1 :]:
                 if not isinstance(sibling, Recording) or sibling.script != block.path:
                     break
                 following.append(sibling)
             yield block.span.start, tuple(following)
-        for children in _sibling_groups(block):
-            if children:
-                yield from _joined_in(children)
-
-
-def _sibling_groups(block: Block) -> tuple[tuple[Block, ...], ...]:
-    """The blocks inside a block; those of different list items are no siblings."""
-    if isinstance(block, ListBlock):
-        return tuple(item.blocks for item in block.items)
-    return (child_blocks(block),)

@@ -8,20 +8,13 @@ from __future__ import annotations
 from typing import assert_never
 from urllib.parse import urlsplit
 
-from msgspec import Struct
-
 from coursebuild.core import model
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import (
-    ShownCallout,
-    ShownDocument,
-    ShownRun,
-    ShownVerdict,
-)
+from coursebuild.core.pages.page_inputs import ShownDocument, ShownRun, ShownVerdict
 from coursebuild.core.registry import kind_of_block
 
 
@@ -30,97 +23,48 @@ def document_inputs(library: Library, place: urls.Place, document: model.Documen
 
     The summary of a document does as well as the document.
     """
-    page = _Page(library, place, document)
-    for block in model.document_blocks(document):
-        page.note(block)
+    path = document.source.path
+    blocks = tuple(model.document_blocks(document))
+    ours = [block for block in blocks if isinstance(block, model.FeatureBlock)]
+    recordings = [block for block in blocks if isinstance(block, model.Recording)]
+    models = dict.fromkeys(name for block in ours for name in block.models())
+    linked = (one.target for one in model.document_inlines(document) if isinstance(one, model.Link))
+    targets = dict.fromkeys((*linked, *map(model.ModelTarget, models)))
+    names = {target: equation_name(library, path, target) for target in targets}
+    verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
+    trials = ((b.span.start, library.tried.get((b.span.path, b.span.start))) for b in ours)
+    values = ((block, kind_of_block(block).values) for block in ours)
     return ShownDocument(
         engine=library.results.engine,
         python=library.results.python,
-        hrefs=page.hrefs,
-        equations=page.equations,
-        callouts=page.callouts,
-        runs=page.runs(),
-        verdicts=page.verdicts,
-        trials=page.trials,
-        blocks=page.blocks,
-        keyframes=page.keyframes,
+        hrefs={target: address(library, place, path, target) for target in targets},
+        equations={target: name for target, name in names.items() if name},
+        callouts={b.kind: library.callout(b.kind) for b in blocks if isinstance(b, model.Callout)},
+        runs={
+            path: _shown_run(library.runs[path], lines)
+            for path, lines in _quoted_lines(blocks).items()
+            if path in library.runs
+        },
+        verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
+        trials={start: tried for start, tried in trials if tried is not None},
+        blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
+        keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course, place.path),
     )
 
 
-class _Page:
-    """Collects what a document asks for."""
-
-    def __init__(self, library: Library, place: urls.Place, document: model.Document) -> None:
-        self.library = library
-        self.place = place
-        self.path = document.source.path
-        self.hrefs: dict[model.Target, str] = {}
-        self.equations: dict[model.Target, str] = {}
-        self.callouts: dict[str, ShownCallout] = {}
-        self.verdicts: dict[int, ShownVerdict] = {}
-        self.trials: dict[int, Struct] = {}
-        self.blocks: dict[int, Struct] = {}
-        self.keyframes: dict[str, tuple[str, ...]] = {}
-        self.scripts: dict[str, set[int]] = {}
-        """Paths of scripts, and the numbers of the lines that are quoted."""
-
-    def note(self, block: model.Block) -> None:
-        """Note what a block asks for."""
-        match block:
-            case model.Script():
-                self.scripts.setdefault(block.path, set())
-            case model.Recording():
-                self._recording(block)
-            case model.FeatureBlock():
-                self._feature(block)
-            case model.Callout():
-                library, kind = self.library, block.kind
-                words = ShownCallout(library.callout_label(kind), library.callout_promise(kind))
-                self.callouts[kind] = words
-            case _:
-                pass
-        for inline in model.walk_inlines(model.block_inlines(block)):
-            if isinstance(inline, model.Link):
-                self._link(inline.target)
-
-    def _recording(self, block: model.Recording) -> None:
-        if block.script is not None:
-            self.scripts.setdefault(block.script, set())
-        verdict = self.library.verdict(block)
-        if verdict is not None:
-            self.verdicts[block.span.start] = ShownVerdict(verdict.status, verdict.comparison)
-
-    def _feature(self, block: model.FeatureBlock) -> None:
-        values = kind_of_block(block).values
-        if values is not None:
-            self.blocks[block.span.start] = values(self.library, self.place, block)
-        for script, line in block.quoted_lines():
-            self.scripts.setdefault(script, set()).add(line)
-        tried = self.library.tried.get((block.span.path, block.span.start))
-        if tried is not None:
-            self.trials[block.span.start] = tried
-        for name in block.models():
-            self._link(model.ModelTarget(name))
-            compiled = self.library.models.get(name)
-            if compiled is not None and compiled.facts is not None:
-                self.keyframes[name] = compiled.facts.keyframes
-
-    def _link(self, target: model.Target) -> None:
-        if target not in self.hrefs:
-            self.hrefs[target] = address(self.library, self.place, self.path, target)
-            name = equation_name(self.library, self.path, target)
-            if name:
-                self.equations[target] = name
-
-    def runs(self) -> dict[str, ShownRun]:
-        """What is shown of the scripts that ran."""
-        runs = self.library.runs
-        return {
-            path: _shown_run(runs[path], lines)
-            for path, lines in self.scripts.items()
-            if path in runs
-        }
+def _quoted_lines(blocks: tuple[model.Block, ...]) -> dict[str, set[int]]:
+    """The paths of scripts that a document has or names, each with the lines that it quotes."""
+    found: dict[str, set[int]] = {}
+    for block in blocks:
+        if isinstance(block, model.Script):
+            found.setdefault(block.path, set())
+        elif isinstance(block, model.Recording) and block.script is not None:
+            found.setdefault(block.script, set())
+        elif isinstance(block, model.FeatureBlock):
+            for script, line in block.quoted_lines():
+                found.setdefault(script, set()).add(line)
+    return found
 
 
 def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:

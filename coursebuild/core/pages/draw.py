@@ -11,9 +11,9 @@ from msgspec.structs import replace
 from coursebuild.core.model import Document, Paragraph, plain_text
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.article import article, contents
+from coursebuild.core.pages.blocks import numbered_lines
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
-from coursebuild.core.pages.listings import numbered
 from coursebuild.core.pages.page_inputs import (
     AddedParts,
     Graphed,
@@ -36,7 +36,7 @@ def draw(
     values = {name: _drawn(value, renderer) for name, value in inputs.values.items()}
     head = inputs.head
     if document is not None and inputs.shown is not None:
-        page = PageContext.made(renderer, inputs.shown, urls.Place(head.path), document)
+        page = PageContext(renderer, inputs.shown, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor
@@ -51,7 +51,7 @@ def draw(
 def _drawn(value: object, renderer: Renderer) -> object:
     match value:
         case Highlighted():
-            return numbered(renderer.mark(value.language, value.text), value.path)
+            return numbered_lines(renderer.mark(value.language, value.text), value.path)
         case Graphed():
             return drawings(value, renderer.words)
         case AddedParts():

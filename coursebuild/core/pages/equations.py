@@ -9,10 +9,7 @@ on where ours left off. A formula with such numbers of its own, or with a `\tag`
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from html import unescape
-
-from msgspec import Struct
 
 from coursebuild.core.features import Mathml
 from coursebuild.core.model import Document, Equation
@@ -23,22 +20,12 @@ _TAGGED = 'class="tml-tag"'
 _TAG = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
-class NumberedFormula(Struct, frozen=True):
-    """A formula on a line of its own, as its page shows it."""
-
-    id: str
-    number: str
-    """By which it is referred to; empty where it has no label."""
-    shown: bool
-    """Whether the number is to be written beside it: the formula itself does not show one."""
-
-
-def numbered(document: Document, mathml: Callable[[str], str]) -> dict[int, NumberedFormula]:
-    """The formulas of a document by their offset; `mathml` gives that of a formula's TeX."""
-    found: dict[int, NumberedFormula] = {}
+def numbered(document: Document, mathml: Mathml) -> dict[int, Equation]:
+    """The formulas of a document that have an id, by their offset."""
+    found: dict[int, Equation] = {}
     count = 0
     for formula in display_formulas(document):
-        html = mathml(formula.tex)
+        html = mathml(formula.tex, True)
         counted = html.count(_COUNTED)
         tag = _TAG.search(html) if _TAGGED in html else None
         number, shown = "", False
@@ -47,13 +34,12 @@ def numbered(document: Document, mathml: Callable[[str], str]) -> dict[int, Numb
             number = unescape(tag[1]) if tag is not None and not counted else str(count + 1)
         count += counted + shown
         if formula.id:
-            found[formula.start] = NumberedFormula(formula.id, number, shown)
+            found[formula.start] = Equation(formula.id, number, shown)
     return found
 
 
 def equations_of(document: Document, mathml: Mathml) -> tuple[Equation, ...]:
-    """The formulas on lines of their own of a document, or of a summary."""
+    """The formulas that have an id, of a document or of a summary."""
     if document.summaries is not None:
         return document.equations
-    found = numbered(document, lambda tex: mathml(tex, True)).values()
-    return tuple(Equation(one.id, one.number) for one in found)
+    return tuple(numbered(document, mathml).values())

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Iterable
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -124,48 +125,44 @@ class PageFrame(Struct, frozen=True):
 
     def around(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
         """The text of a page that has this body, and these parts; see `parts_of`."""
-        values = _values(self.library, self.names, head, parts)
-        html = self.library.render("base.html", body=Markup(body), **values)
+        library, names = self.library, self.names
+        course, known = library.course, page_kind(head.kind)
+        language, place = course.language or "en", place_of(library, head.path)
+        html = library.render(
+            "base.html",
+            body=Markup(body),
+            policy=policy(head.json_ld, form=known is not None and known.form),
+            head_title=meta.head_title(course, head.title, head.kind),
+            description=head.description,
+            social=meta.social(course, head),
+            canonical=urls.absolute(course, head.path) if head.path != urls.NOT_FOUND else "",
+            json_ld=head.json_ld,
+            copies=_copies(head.path),
+            kind=head.kind,
+            language=language,
+            direction=direction(language),
+            course_key=course.key,
+            root=place.href(urls.HOME).removesuffix(urls.HOME),
+            robots="" if head.indexed else "noindex",
+            icon=place.href(names.icon),
+            style=place.href(names.style),
+            theme_script=place.href(names.theme_script),
+            script=place.href(names.script),
+            part_scripts=_part_scripts(place, names, parts),
+            manifest=place.href(urls.MANIFEST),
+            touch_icon=place.href(names.touch_icon) if names.touch_icon else "",
+            logos=_logos(place, names),
+            logo_size=(names.logo_width, LOGO_HEIGHT) if names.logo_width else (),
+            home=place.href(urls.HOME),
+            credits=place.href(names.credits),
+            menu=_links(place, ((urls.page_path(page), page.title) for page in library.menu)),
+            own=_links(place, ((k.path, page_title(library, k)) for k in library.added_pages)),
+            course=course,
+            source=course.repository if "{path}" not in course.repository else "",
+            results=library.results,
+            page_words=_page_words(library, parts),
+        )
         return f"{visible(html)}\n"
-
-
-def _values(
-    library: Library, names: Names, head: PageHead, parts: tuple[str, ...]
-) -> dict[str, object]:
-    course, known = library.course, page_kind(head.kind)
-    place = place_of(library, head.path)
-    return {
-        "policy": policy(head.json_ld, form=known is not None and known.form),
-        "head_title": meta.head_title(course, head.title, head.kind),
-        "description": head.description,
-        "social": meta.social(library, head.path, head.title, head.description, head.og_type),
-        "canonical": urls.absolute(course, head.path) if head.path != urls.NOT_FOUND else "",
-        "json_ld": head.json_ld,
-        "copies": _copies(head.path),
-        "kind": head.kind,
-        "language": course.language or "en",
-        "direction": direction(course.language or "en"),
-        "course_key": course.key,
-        "root": place.href(urls.HOME).removesuffix(urls.HOME),
-        "robots": "" if head.indexed else "noindex",
-        "icon": place.href(names.icon),
-        "style": place.href(names.style),
-        "theme_script": place.href(names.theme_script),
-        "script": place.href(names.script),
-        "part_scripts": _part_scripts(place, names, parts),
-        "manifest": place.href(urls.MANIFEST),
-        "touch_icon": place.href(names.touch_icon) if names.touch_icon else "",
-        "logos": _logos(place, names),
-        "logo_size": (names.logo_width, LOGO_HEIGHT) if names.logo_width else (),
-        "home": place.href(urls.HOME),
-        "credits": place.href(names.credits),
-        "menu": _menu(library, place),
-        "own": _own_navigation(library, place),
-        "course": course,
-        "source": course.repository if "{path}" not in course.repository else "",
-        "results": library.results,
-        "page_words": _page_words(library, parts),
-    }
 
 
 def _logos(place: urls.Place, names: Names) -> tuple[tuple[str, str], ...]:
@@ -198,7 +195,7 @@ def _part_scripts(
 
 def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
     """Keys of the texts that the page carries for its scripts."""
-    keys = library.words.keys
+    keys = library.words.texts
     known = known_parts()
     needed = [key for part in parts for key in known[part].texts]
     begun = tuple(key for key in needed if key.endswith("."))
@@ -206,15 +203,6 @@ def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
     return (*PAGE_WORDS, *found, *(key for key in needed if key in keys))
 
 
-def _menu(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
-    """Links to the pages that are in the menu; the home page has a place of its own there."""
-    paths = ((urls.page_path(page), page.title) for page in library.menu)
-    return tuple(NavLink(place.href(path), title, path == place.path) for path, title in paths)
-
-
-def _own_navigation(library: Library, place: urls.Place) -> tuple[NavLink, ...]:
-    """Links to what the site adds to the pages of the course."""
-    return tuple(
-        NavLink(place.href(kind.path), page_title(library, kind), kind.path == place.path)
-        for kind in library.added_pages
-    )
+def _links(place: urls.Place, pages: Iterable[tuple[str, str]]) -> tuple[NavLink, ...]:
+    """Links to pages by their paths, each with its title."""
+    return tuple(NavLink(place.href(path), title, path == place.path) for path, title in pages)

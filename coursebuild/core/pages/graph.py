@@ -57,7 +57,8 @@ _EDGE = 2.0
 
 def neighbourhood(library: Library, place: urls.Place, lesson: Lesson) -> Graphed | None:
     """What a lesson needs and leads to, and what comes before that; `None` for next to nothing."""
-    needs = _first(library, lesson.prerequisites)
+    # The last few in the order of the course: what comes right before counts most.
+    needs = sorted(lesson.prerequisites, key=library.positions.__getitem__)[-_BESIDE:]
     leads = [other.id for other in library.leads[lesson.id]][:_BESIDE]
     shown = dict.fromkeys([lesson.id, *needs, *leads])
     for need in needs:
@@ -78,11 +79,6 @@ def of_level(library: Library, place: urls.Place, level: Level) -> Graphed | Non
     shown = own | others if len(others) <= _IN_LEVEL else own
     graph = _graph(library, place, shown, level=level.id)
     return graph if graph.edges else None
-
-
-def _first(library: Library, ids: Iterable[str]) -> list[str]:
-    """The last few in the order of the course: what comes right before counts most."""
-    return sorted(ids, key=library.positions.__getitem__)[-_BESIDE:]
 
 
 def _graph(

@@ -1,15 +1,14 @@
-"""What the writer of HTML (`markup.py`) asks a page.
+"""What the writer of HTML (`markup.py`) asks, since it depends on the course.
 
-Entry points: `Context`, which is asked what depends on the course; `HtmlOptions`, details of the
-HTML; `OwnBlock`, the blocks that are more than Markdown.
+Entry points: `Context`, the answers for text that stands on no page; `OwnBlock`, the blocks that
+are more than Markdown.
 """
 
 from __future__ import annotations
 
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
-from markupsafe import Markup
-from msgspec import Struct, field
+from markupsafe import Markup, escape
 
 from coursebuild.core.model import (
     Callout,
@@ -22,70 +21,57 @@ from coursebuild.core.model import (
     Script,
     Target,
 )
+from coursebuild.core.pages.strings import Strings
 
 OwnBlock: TypeAlias = Callout | Mjcf | PlainCode | FeatureBlock | Recording | Script
 """The blocks that are more than Markdown."""
 
 
-class Context(Protocol):
-    """Answers for one page. A `Markup` is HTML already, a string is not."""
+class Context:
+    """Answers for text that stands on no page. A `Markup` is HTML already, a string is not."""
+
+    @property
+    def words(self) -> Strings:
+        """The interface's words, which headings, tables, tasks and footnotes need."""
+        return Strings({})
+
+    @property
+    def direction(self) -> Literal["", "ltr", "rtl"]:
+        """Which way text runs, so that numbers are kept with their units; empty: they are not."""
+        return ""
 
     def href(self, target: Target) -> str:
         """The address of a link."""
-        ...
+        return ""
 
     def reference(self, target: Target) -> str:
         """What a link without a text says; empty where it says nothing."""
-        ...
+        return ""
 
     def url(self, url: str) -> str:
         """The address of an image that is written as `url`."""
-        ...
+        return url
 
     def figure(self, image: Image, caption: Markup) -> Markup:
         """An image with a caption, with its line end."""
-        ...
+        return Markup()
 
     def math(self, tex: str) -> Markup:
         """A formula in a line of text, set."""
-        ...
+        return Markup(rf'<span class="math">\({escape(tex)}\)</span>')
 
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, which begins at an offset of the document."""
-        ...
+        return Markup(rf'<span class="math">\[{escape(tex)}\]</span>')
 
     def code(self, language: str, text: str) -> Markup:
         """A whole block of code that is only shown."""
-        ...
+        return Markup(f"<pre><code>{escape(text)}</code></pre>\n")
 
     def binding(self, binding: NumberBinding) -> Markup:
         """A number that is bound to an output."""
-        ...
+        return escape(binding.text)
 
     def block(self, block: OwnBlock) -> Markup:
         """A block that is more than Markdown."""
-        ...
-
-
-class Words(Struct, frozen=True):
-    """The words that Markdown's own elements need; `{number}` and `{occurrence}` are filled in."""
-
-    anchor: str = "Link to this section"
-    formula: str = "Link to this formula"
-    footnotes: str = "Footnotes"
-    footnote: str = "Footnote {number}"
-    back: str = "Back to reference {number}"
-    back_again: str = "Back to reference {number}, place {occurrence}"
-    table: str = "Table"
-    done: str = "Done"
-    not_done: str = "Not done"
-
-
-class HtmlOptions(Struct, frozen=True):
-    """Details of the HTML."""
-
-    words: Words = field(default_factory=Words)
-    plain: bool = False
-    """Whether it is CommonMark's own: headings without ids, tables without a box that scrolls."""
-    quantities: Literal["", "ltr", "rtl"] = ""
-    """Whether numbers are kept with their units, and in which direction the text runs."""
+        return Markup()

@@ -6,8 +6,9 @@ Entry points: `lesson_inputs`, and for a planned lesson `stub_inputs`.
 from __future__ import annotations
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from coursebuild.core.model import Document, Lesson, Status, document_scripts
+from coursebuild.core.model import Document, Lesson, Level, Status, document_scripts
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.graph import neighbourhood
@@ -18,7 +19,7 @@ from coursebuild.core.registry import page_copies
 
 
 class LessonLink(Struct, frozen=True):
-    """A lesson as other pages name it."""
+    """A lesson as other pages name it, and as its own does."""
 
     id: str
     title: str
@@ -28,44 +29,29 @@ class LessonLink(Struct, frozen=True):
     further: int | None
     summary: str
     needs: tuple[LessonLink, ...] = ()
+    objectives: tuple[str, ...] = ()
+    aliases: tuple[str, ...] = ()
+    """Other names, which no page shows."""
     asked: str = ""
-    """Its questions, where a list names them; see `quiz_index`."""
+    """Its questions; see `quiz_index`."""
 
 
-class LessonHead(Struct, frozen=True):
-    """What stands over a lesson."""
+class LevelView(Struct, frozen=True):
+    """A level and its lessons."""
 
     id: str
     title: str
     summary: str
-    minutes: int | None
-    further: int | None
-    objectives: tuple[str, ...]
-    aliases: tuple[str, ...] = ()
-    """Other names, which the page does not show."""
-
-    @classmethod
-    def of(cls, lesson: Lesson) -> LessonHead:
-        """The head of a lesson of the map."""
-        minutes = (lesson.minutes, lesson.further)
-        about = (lesson.summary, *minutes, lesson.objectives, lesson.aliases)
-        return cls(lesson.id, lesson.title, *about)
-
-
-class LessonLevel(Struct, frozen=True):
-    """The level of a lesson, with all its lessons."""
-
-    id: str
-    title: str
+    href: str
     lessons: tuple[LessonLink, ...]
+    written: int
 
 
 def lesson_link(
-    library: Library, place: urls.Place, lesson: Lesson, *, needs: bool = False
+    library: Library, place: urls.Place, lesson: Lesson, *, whole: bool = False
 ) -> LessonLink:
-    """A lesson as a link from a place; with `needs`, its prerequisites as well."""
-    required = (library.lessons[need] for need in lesson.prerequisites) if needs else ()
-    return LessonLink(
+    """A lesson as a link from a place; with `whole`, all that is known of it."""
+    link = LessonLink(
         lesson.id,
         lesson.title,
         place.href(urls.lesson_path(lesson)),
@@ -73,7 +59,29 @@ def lesson_link(
         lesson.minutes,
         lesson.further,
         lesson.summary,
-        tuple(lesson_link(library, place, need) for need in required),
+    )
+    if not whole:
+        return link
+    return replace(
+        link,
+        needs=tuple(lesson_link(library, place, library.lessons[n]) for n in lesson.prerequisites),
+        objectives=lesson.objectives,
+        aliases=lesson.aliases,
+        asked=library.asked.get(lesson.path, ""),
+    )
+
+
+def level_view(
+    library: Library, place: urls.Place, level: Level, *, whole: bool = False
+) -> LevelView:
+    """A level with its lessons, as seen from a place; `whole` as in `lesson_link`."""
+    return LevelView(
+        level.id,
+        level.title,
+        level.summary,
+        place.href(urls.level_path(level)),
+        tuple(lesson_link(library, place, lesson, whole=whole) for lesson in level.lessons),
+        sum(lesson.status is not Status.PLANNED for lesson in level.lessons),
     )
 
 
@@ -93,7 +101,7 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
     }
     data = meta.lesson_data(library, lesson)
     return PageInputs(
-        PageHead(place.path, "lesson", lesson.title, lesson.summary, data, "article"),
+        PageHead(place.path, "lesson", lesson.title, lesson.summary, data),
         "lesson.html",
         values,
         document=document.source.path,
@@ -113,20 +121,11 @@ def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
 
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
     """What a lesson's page says whether it is written or not."""
-    level = library.levels[lesson.level]
     order, at = library.order, library.positions[lesson.id]
     return {
-        "lesson": LessonHead.of(lesson),
-        "status": lesson.status.value,
-        "draft": lesson.status is Status.DRAFT,
-        "level": LessonLevel(
-            level.id,
-            level.title,
-            tuple(lesson_link(library, place, other) for other in level.lessons),
-        ),
+        "lesson": lesson_link(library, place, lesson, whole=True),
+        "level": level_view(library, place, library.levels[lesson.level]),
         "home": place.href(urls.HOME),
-        "level_href": place.href(urls.level_path(level)),
-        "needs": lesson_link(library, place, lesson, needs=True).needs,
         "leads": tuple(lesson_link(library, place, other) for other in library.leads[lesson.id]),
         "graph": neighbourhood(library, place, lesson),
         "referrers": owner_links(library, place, library.referrers.get(lesson.id, ())),

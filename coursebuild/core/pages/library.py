@@ -37,9 +37,9 @@ from coursebuild.core.model import (
     resolve,
 )
 from coursebuild.core.model.results import (
-    CompileResult,
     Formula,
     MathError,
+    ModelFacts,
     OutputFile,
     Results,
     ScriptRun,
@@ -48,7 +48,7 @@ from coursebuild.core.model.results import (
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, strings_for
-from coursebuild.core.pages.quiz_index import QuizIndex, quiz_index
+from coursebuild.core.pages.quiz_index import quiz_index
 from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import templates_of
@@ -61,13 +61,16 @@ Owner: TypeAlias = Lesson | Page
 """What a document belongs to."""
 
 
+BY_LAB, BY_SCRIPT, BY_LINK = WAYS = "model.by_lab", "model.by_script", "model.by_link"
+"""How a document uses a model: keys of interface texts, in the order in which a page says them."""
+
+
 class ModelUse(Struct, frozen=True):
     """A document that uses a model, and how."""
 
     owner: Owner
-    by_lab: bool
-    by_script: bool
-    by_link: bool
+    ways: tuple[str, ...]
+    """Of `WAYS`."""
 
 
 class Library(Struct, frozen=True, dict=True):
@@ -81,7 +84,8 @@ class Library(Struct, frozen=True, dict=True):
     levels: Mapping[str, Level]
     pages: Mapping[str, Page]
     callouts: Mapping[str, CalloutKind]
-    models: Mapping[str, CompileResult]
+    facts: Mapping[str, ModelFacts]
+    """What the models hold that compile, by name."""
     scripts: Mapping[str, tuple[Script, Owner]]
     """By path, in the order of the course."""
     runs: Mapping[str, ScriptRun]
@@ -97,15 +101,15 @@ class Library(Struct, frozen=True, dict=True):
     """Who links to a lesson, by its id, in the order of the course."""
     terms: Mapping[str, Owner]
     """Where a term is defined, by its id."""
-    asked: QuizIndex
-    """The questions of each document, as lists of lessons name them."""
+    asked: Mapping[str, str]
+    """The questions of documents that ask any, by their path; see `quiz_index`."""
     tried: Mapping[tuple[str, int], Struct]
     """What features show of what was tried, by path and offset of the block."""
     feature_files: tuple[OutputFile, ...]
     """What of that is files of the site."""
     _formulas: Mapping[Formula, str | MathError]
     verdicts: Mapping[tuple[str, int], Verdict]
-    """By `recording_place`."""
+    """By path and offset of the recording."""
     reports: Reports
     """What was measured on models and hard cases, as far as it fits the course."""
 
@@ -130,7 +134,8 @@ class Library(Struct, frozen=True, dict=True):
             text = quiz_index(document)  # while its blocks are at hand
             if text:
                 questions[document.source.path] = text
-            for id in _linked_lessons(course, document):
+            linked = links(course, document)
+            for id in {target.id for target in linked if isinstance(target, LessonTarget)}:
                 if not (isinstance(owner, Lesson) and owner.id == id):
                     referrers.setdefault(id, []).append(owner)
             for inline in document_inlines(document):
@@ -147,7 +152,7 @@ class Library(Struct, frozen=True, dict=True):
             levels={level.id: level for level in course.levels},
             pages={page.id: page for page in course.pages},
             callouts={kind.name: kind for kind in course.callouts},
-            models=dict(results.models),
+            facts={name: result.facts for name, result in results.models if result.facts},
             scripts=course_scripts(course),
             runs={run.path: run for run in results.runs},
             order=course.lessons,
@@ -160,7 +165,7 @@ class Library(Struct, frozen=True, dict=True):
             tried=_placed(course, trials),
             feature_files=trials.files,
             _formulas=dict(results.formulas),
-            verdicts={recording_place(verdict.recording): verdict for verdict in results.verdicts},
+            verdicts={(v.recording.span.path, v.recording.span.start): v for v in results.verdicts},
             reports=reports or Reports(),
         )
 
@@ -204,23 +209,21 @@ class Library(Struct, frozen=True, dict=True):
 
     def verdict(self, recording: Recording) -> Verdict | None:
         """How a recorded output compared with the run; `None` where nobody compared it."""
-        return self.verdicts.get(recording_place(recording))
+        return self.verdicts.get((recording.span.path, recording.span.start))
 
-    def callout_label(self, kind: str) -> str:
-        """The label of a kind of callout: the course's own, else that of the interface."""
-        ours, theirs = _OURS.get(kind), self.callouts.get(kind)
+    def callout(self, name: str) -> CalloutKind:
+        """A kind of callout, in the course's own words where it has some."""
+        ours, theirs = _OURS.get(name), self.callouts.get(name)
+        label, promise = name.capitalize(), ""
+        if ours is not None:
+            key = f"promise.{name}"
+            label = self.words(f"callout.{name}")
+            promise = self.words(key) if self.words.has(key) else ours.promise
         if theirs is not None and (ours is None or theirs.label != ours.label):
-            return theirs.label
-        return self.words(f"callout.{kind}") if ours is not None else kind.capitalize()
-
-    def callout_promise(self, kind: str) -> str:
-        """What a kind of callout promises; empty where nobody says."""
-        ours, theirs = _OURS.get(kind), self.callouts.get(kind)
+            label = theirs.label
         if theirs is not None and (ours is None or theirs.promise != ours.promise):
-            return theirs.promise
-        if self.words.has(f"promise.{kind}"):
-            return self.words(f"promise.{kind}")
-        return ours.promise if ours is not None else ""
+            promise = theirs.promise
+        return CalloutKind(name, label, promise)
 
 
 def _placed(course: Course, trials: PublishedTrials) -> dict[tuple[str, int], Struct]:
@@ -249,10 +252,6 @@ def links(course: Course, document: Document) -> Iterator[Target]:
             yield resolve(inline.target, course, document.source.path)
 
 
-def _linked_lessons(course: Course, document: Document) -> set[str]:
-    return {one.id for one in links(course, document) if isinstance(one, LessonTarget)}
-
-
 _MODEL_NAMED = re.compile(
     r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?<![\w./-])(?P<file>[\w./-]+)\.xml\b"""
     r"""|(["'])(?P<word>[A-Za-z_][\w/-]{0,80})\4"""
@@ -272,29 +271,26 @@ def models_named(script: Script) -> frozenset[str]:
     return frozenset(found)
 
 
-class NamedModels(Struct, frozen=True):
-    """What a document names that may be models."""
+def _named_models(document: Document) -> dict[str, set[str]]:
+    """What a document names that may be models, each with the ways in which it uses them."""
+    known: dict[str, set[str]] | None = document.__dict__.get("models")
+    if known is None:  # asked for with each edit of another
+        known = document.__dict__["models"] = {}
+        for way, name in _model_names(document):
+            known.setdefault(name, set()).add(way)
+    return known
 
-    by_labs: frozenset[str]
-    by_scripts: frozenset[str]
-    by_links: frozenset[str]
 
-
-def _named_models(document: Document) -> NamedModels:
-    """The models that a document may use."""
-    known: NamedModels | None = document.__dict__.get("models")
-    if known is not None:  # asked for with each edit of another
-        return known
-    blocks = tuple(document_blocks(document))
-    ours = [block for block in blocks if isinstance(block, FeatureBlock)]
-    labs = {name for block in ours for name in block.models()}
-    scripts = {n for block in blocks if isinstance(block, Script) for n in models_named(block)}
-    targets = (i.target for i in document_inlines(document) if isinstance(i, Link))
-    links = {target.name for target in targets if isinstance(target, ModelTarget)}
-    shown = {name for block in ours for name in block.mentioned_models()}
-    found = NamedModels(frozenset(labs), frozenset(scripts), frozenset(links | shown))
-    document.__dict__["models"] = found
-    return found
+def _model_names(document: Document) -> Iterator[tuple[str, str]]:
+    for block in document_blocks(document):
+        if isinstance(block, FeatureBlock):
+            yield from ((BY_LAB, name) for name in block.models())
+            yield from ((BY_LINK, name) for name in block.mentioned_models())
+        elif isinstance(block, Script):
+            yield from ((BY_SCRIPT, name) for name in models_named(block))
+    for inline in document_inlines(document):
+        if isinstance(inline, Link) and isinstance(inline.target, ModelTarget):
+            yield BY_LINK, inline.target.name
 
 
 def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
@@ -304,11 +300,6 @@ def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
         for script in document_scripts(document):
             found.setdefault(script.path, (script, owner))
     return found
-
-
-def recording_place(recording: Recording) -> tuple[str, int]:
-    """What a recorded output is found by."""
-    return recording.span.path, recording.span.start
 
 
 def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
@@ -323,9 +314,7 @@ def _uses(course: Course) -> dict[str, tuple[ModelUse, ...]]:
     """Where each model is used."""
     found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
     for owner, document in documents(course) if found else ():
-        named = _named_models(document)
-        for name in sorted(named.by_labs | named.by_scripts | named.by_links):
+        for name, ways in _named_models(document).items():
             if name in found:
-                how = (name in named.by_labs, name in named.by_scripts, name in named.by_links)
-                found[name].append(ModelUse(owner, *how))
+                found[name].append(ModelUse(owner, tuple(way for way in WAYS if way in ways)))
     return {name: tuple(uses) for name, uses in found.items()}

@@ -1,6 +1,6 @@
 """Blocks and inlines into HTML.
 
-Entry points: `render_blocks`, `render_inlines`, `render_footnotes`, `render_table`.
+Entry points: `render_blocks`, `render_inlines`, `render_footnotes`.
 
 What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like)
 is asked of the context (`html_context.py`), which may call back for what its blocks hold. All else
@@ -18,57 +18,36 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from coursebuild.core import model
-from coursebuild.core.pages.html_context import Context, HtmlOptions
+from coursebuild.core.pages.html_context import Context
 from coursebuild.core.pages.quantities import in_order, joined, quantities, unit_length
 
-_OPTIONS = HtmlOptions()
 
+def escape(text: str) -> str:
+    """Text as HTML, also for attributes in double quotes.
 
-def escape(text: str) -> Markup:
-    """Text as HTML, also for attributes in double quotes."""
-    return Markup(_escaped(text))
-
-
-def _escaped(text: str) -> str:
-    """The same as a string; where there is nothing to escape, as is the rule, nothing is copied."""
+    Where there is nothing to escape, as is the rule, nothing is copied.
+    """
     text = str.replace(text, "&", "&amp;").replace("<", "&lt;")
     return text.replace(">", "&gt;").replace('"', "&quot;")
 
 
 _SIMPLE = re.compile('[^0-9&<>"]*+')
 """Text without quantities, and with nothing to escape."""
-_PLAIN_ANCHOR = re.compile("[A-Za-z0-9_.~-]*+")
 
 
-def _quoted(anchor: str) -> str:
-    """An anchor in an address."""
-    return anchor if _PLAIN_ANCHOR.fullmatch(anchor) else quote(anchor)
-
-
-def render_blocks(
-    blocks: Iterable[model.Block], context: Context, options: HtmlOptions = _OPTIONS
-) -> Markup:
+def render_blocks(blocks: Iterable[model.Block], context: Context) -> Markup:
     """Blocks one after the other, each with its line end."""
-    return Markup(_Writer(context, options).blocks(blocks))
+    return Markup(_Writer(context).blocks(blocks))
 
 
-def render_inlines(
-    inlines: Iterable[model.Inline], context: Context, options: HtmlOptions = _OPTIONS
-) -> Markup:
+def render_inlines(inlines: Iterable[model.Inline], context: Context) -> Markup:
     """Inlines one after the other."""
-    return Markup(_Writer(context, options).inlines(inlines))
+    return Markup(_Writer(context).inlines(inlines))
 
 
-def render_table(table: model.Table, context: Context, options: HtmlOptions = _OPTIONS) -> Markup:
-    """A table."""
-    return Markup(_Writer(context, options).table(table))
-
-
-def render_footnotes(
-    footnotes: Iterable[model.Footnote], context: Context, options: HtmlOptions = _OPTIONS
-) -> Markup:
+def render_footnotes(footnotes: Iterable[model.Footnote], context: Context) -> Markup:
     """The footnotes of a document in a section at its end; empty where there are none."""
-    return Markup(_Writer(context, options).footnotes(footnotes))
+    return Markup(_Writer(context).footnotes(footnotes))
 
 
 def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:
@@ -76,7 +55,7 @@ def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str])
     parts, at = list[str](), 0
     for media in node.media:
         if (address := url(media.url)) != media.url:  # what stays is left as it is written
-            parts += (node.html[at : media.start], _escaped(address))
+            parts += (node.html[at : media.start], escape(address))
             at = media.end
     return "".join((*parts, node.html[at:]))
 
@@ -94,16 +73,14 @@ def is_tight(block: model.Block) -> bool:
 class _Writer:
     """Writes in a context; every string that it gives is HTML."""
 
-    def __init__(self, context: Context, options: HtmlOptions) -> None:
-        self.context, self.options = context, options
-        self.end = " />" if options.plain else ">"
-        """Of a tag without content."""
+    def __init__(self, context: Context) -> None:
+        self.context, self.words, self.direction = context, context.words, context.direction
 
     def blocks(self, blocks: Iterable[model.Block]) -> str:
         return "".join(map(self.block, blocks))
 
     def inlines(self, inlines: Iterable[model.Inline]) -> str:
-        if not self.options.quantities:
+        if not self.direction:
             return "".join(map(self.inline, inlines))
         return "".join(self._with_units(tuple(inlines)))
 
@@ -121,8 +98,8 @@ class _Writer:
                 isinstance(inline, model.Math) and not inline.display
             )
             if number and isinstance(after, model.Text) and (taken := unit_length(after.text)):
-                html += _escaped(after.text[:taken].replace(" ", "\u00a0"))
-                if self.options.quantities == "rtl":
+                html += escape(after.text[:taken].replace(" ", "\u00a0"))
+                if self.direction == "rtl":
                     html = in_order(Markup(html))
             written.append(html)
         return written
@@ -132,9 +109,9 @@ class _Writer:
         if _SIMPLE.fullmatch(text):  # as most are
             return text
         text = joined(text)
-        if self.options.quantities == "ltr":
-            return _escaped(text)
-        pieces = ((_escaped(piece), kept) for piece, kept in quantities(text))
+        if self.direction == "ltr":
+            return escape(text)
+        pieces = ((escape(piece), kept) for piece, kept in quantities(text))
         return "".join(in_order(Markup(piece)) if kept else piece for piece, kept in pieces)
 
     # -- blocks
@@ -160,7 +137,7 @@ class _Writer:
             case model.HtmlFlow():
                 return f"{self.inlines(block.children)}\n"
             case model.ThematicBreak():
-                return f"<hr{self.end}\n"
+                return "<hr>\n"
             case model.MathBlock():
                 return f"{self.context.display(block.tex.text, block.span.start)}\n"
             case model.Table():
@@ -180,12 +157,10 @@ class _Writer:
 
     def _heading(self, heading: model.Heading) -> str:
         inner, name = self.inlines(heading.children), f"h{heading.level}"
-        if self.options.plain:
-            return f"<{name}>{inner}</{name}>\n"
-        anchor = _escaped(heading.anchor)
-        kinds = f' class="{_escaped(" ".join(heading.classes))}"' if heading.classes else ""
-        label = _escaped(self.options.words.anchor)
-        link = f'<a class="anchor" href="#{_quoted(heading.anchor)}" aria-label="{label}">#</a>'
+        anchor = escape(heading.anchor)
+        kinds = f' class="{escape(" ".join(heading.classes))}"' if heading.classes else ""
+        label = escape(self.words("markup.anchor"))
+        link = f'<a class="anchor" href="#{quote(heading.anchor)}" aria-label="{label}">#</a>'
         return f'<{name} id="{anchor}"{kinds}>{inner} {link}</{name}>\n'
 
     def _list(self, block: model.ListBlock) -> str:
@@ -209,10 +184,9 @@ class _Writer:
         return "".join([*parts, "</li>\n"])
 
     def _box(self, checked: bool) -> str:
-        words = self.options.words
-        label = _escaped(words.done if checked else words.not_done)
+        label = escape(self.words("markup.done" if checked else "markup.not_done"))
         state = " checked" if checked else ""
-        return f'<input type="checkbox" disabled{state} aria-label="{label}"{self.end} '
+        return f'<input type="checkbox" disabled{state} aria-label="{label}"> '
 
     def table(self, table: model.Table) -> str:
         """A table; its columns are aligned by class."""
@@ -220,9 +194,7 @@ class _Writer:
         rows = "".join(self._row(row, table, "td") for row in table.rows)
         body = f"<tbody>\n{rows}</tbody>\n" if rows else ""
         html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
-        if self.options.plain:
-            return html
-        label = _escaped(self.options.words.table)
+        label = escape(self.words("markup.table"))
         return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
 
     def _row(self, cells: tuple[model.Cell, ...], table: model.Table, tag: str) -> str:
@@ -239,18 +211,18 @@ class _Writer:
         """One inline."""
         match inline:
             case model.Text():
-                return _escaped(inline.text)
+                return escape(inline.text)
             case model.SoftBreak():
                 return "\n"
             case model.CodeSpan():
-                return f"<code>{_escaped(inline.text)}</code>"
+                return f"<code>{escape(inline.text)}</code>"
             case model.Math():
                 if inline.display:
                     return self.context.display(inline.tex.text, inline.span.start)
                 return self.context.math(inline.tex.text)
             case model.Term():
-                name = "" if self.options.plain else f' id="{_escaped(inline.anchor)}"'
-                return f"<dfn{name}>{self.inlines(inline.children)}</dfn>"
+                inner = self.inlines(inline.children)
+                return f'<dfn id="{escape(inline.anchor)}">{inner}</dfn>'
             case model.Emphasis():
                 return f"<em>{self.inlines(inline.children)}</em>"
             case model.Strong():
@@ -264,7 +236,7 @@ class _Writer:
             case model.RawInline():
                 return raw_html(inline, self.context.url)
             case model.HardBreak():
-                return f"<br{self.end}\n"
+                return "<br>\n"
             case model.NumberBinding():
                 return self.context.binding(inline)
             case model.FootnoteRef():
@@ -273,23 +245,22 @@ class _Writer:
                 assert_never(inline)
 
     def _link(self, link: model.Link) -> str:
-        title = f' title="{_escaped(link.title)}"' if link.title else ""
-        href = _escaped(self.context.href(link.target))
-        inner = self.inlines(link.children) or _escaped(self.context.reference(link.target))
-        bare = inner == href and not self.options.plain  # an address that stands for itself
-        own = ' class="url"' if bare else ""
+        title = f' title="{escape(link.title)}"' if link.title else ""
+        href = escape(self.context.href(link.target))
+        inner = self.inlines(link.children) or escape(self.context.reference(link.target))
+        own = ' class="url"' if inner == href else ""  # an address that stands for itself
         return f'<a href="{href}"{title}{own}>{inner}</a>'
 
     def _image(self, image: model.Image) -> str:
-        title = f' title="{_escaped(image.title)}"' if image.title else ""
-        url = _escaped(self.context.url(image.url))
-        return f'<img src="{url}" alt="{_escaped(image.alt)}"{title}{self.end}'
+        title = f' title="{escape(image.title)}"' if image.title else ""
+        url = escape(self.context.url(image.url))
+        return f'<img src="{url}" alt="{escape(image.alt)}"{title}>'
 
     # -- footnotes
 
     def _reference(self, reference: model.FootnoteRef) -> str:
         number = reference.number
-        label = _escaped(self.options.words.footnote.format(number=number))
+        label = escape(self.words("markup.footnote", number=number))
         name = reference_id(number, reference.occurrence)
         return (
             f'<sup class="footnote-ref"><a href="#fn:{number}" id="{name}" role="doc-noteref"'
@@ -300,7 +271,7 @@ class _Writer:
         items = "".join(map(self._footnote, footnotes))
         if not items:
             return ""
-        label = _escaped(self.options.words.footnotes)
+        label = escape(self.words("markup.footnotes"))
         start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
         return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
 
@@ -316,10 +287,10 @@ class _Writer:
         return f'<li id="fn:{footnote.number}">\n{inner}</li>\n'
 
     def _back(self, number: int, occurrence: int) -> str:
-        words = self.options.words.back if occurrence == 1 else self.options.words.back_again
-        label = _escaped(words.format(number=number, occurrence=occurrence))
+        key = "markup.back" if occurrence == 1 else "markup.back_again"
+        label = escape(self.words(key, number=number, occurrence=occurrence))
         mark = "" if occurrence == 1 else f"<sup>{occurrence}</sup>"
-        arrow = "↪" if self.options.quantities == "rtl" else "↩"
+        arrow = "↪" if self.direction == "rtl" else "↩"
         return (
             f'<a href="#{reference_id(number, occurrence)}" class="footnote-back"'
             f' role="doc-backlink" aria-label="{label}">{arrow}{mark}</a>'

@@ -18,6 +18,7 @@ from coursebuild.core.model import Course, Lesson, Status
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import PageHead
 
 Json: TypeAlias = "str | int | list[Json] | dict[str, Json]"
 
@@ -27,17 +28,14 @@ def head_title(course: Course, title: str, kind: str) -> str:
     return title if kind == "home" or title == course.title else f"{title} · {course.title}"
 
 
-def social(
-    library: Library, path: str, title: str, description: str, og_type: str
-) -> tuple[tuple[str, str], ...]:
+def social(course: Course, head: PageHead) -> tuple[tuple[str, str], ...]:
     """Open Graph properties."""
-    course = library.course
     pairs = (
-        ("og:type", og_type),
+        ("og:type", "article" if head.kind == "lesson" else "website"),
         ("og:site_name", course.title),
-        ("og:title", title),
-        ("og:description", description),
-        ("og:url", urls.absolute(course, path)),
+        ("og:title", head.title),
+        ("og:description", head.description),
+        ("og:url", urls.absolute(course, head.path)),
     )
     return tuple((name, value) for name, value in pairs if value)
 

@@ -16,7 +16,7 @@ from typing import Literal
 from markupsafe import Markup
 from msgspec import Struct, field
 
-from coursebuild.core.model import Comparison, Target
+from coursebuild.core.model import CalloutKind, Comparison, Target
 from coursebuild.core.model.results import Outcome
 
 
@@ -40,13 +40,6 @@ class ShownVerdict(Struct, frozen=True):
     comparison: Comparison
 
 
-class ShownCallout(Struct, frozen=True):
-    """The words of a kind of callout."""
-
-    label: str
-    promise: str
-
-
 class ShownDocument(Struct, frozen=True):
     """What the page of a document shows of the rest of the course, and of what running it found.
 
@@ -60,7 +53,7 @@ class ShownDocument(Struct, frozen=True):
     """Addresses of links, as seen from the page."""
     equations: Mapping[Target, str] = field(default_factory=dict)
     """What links to formulas of other pages say, where they have no text."""
-    callouts: Mapping[str, ShownCallout] = field(default_factory=dict)
+    callouts: Mapping[str, CalloutKind] = field(default_factory=dict)
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
     """By path of the script."""
     verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
@@ -121,7 +114,6 @@ class PageHead(Struct, frozen=True):
     title: str
     description: str
     json_ld: Markup = Markup()
-    og_type: str = "website"
     indexed: bool = True
     """Whether search engines should list it."""
 

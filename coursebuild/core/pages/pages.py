@@ -9,39 +9,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.features import ModelPart
-from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, Status, listing_anchor
+from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, listing_anchor
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.cards import PictureLink, galleries, lesson_cards
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
-from coursebuild.core.pages.lesson import LessonHead, LessonLink, edit_address, lesson_link
+from coursebuild.core.pages.lesson import LessonLink, edit_address, lesson_link, level_view
 from coursebuild.core.pages.library import Library, ModelUse
 from coursebuild.core.pages.page_inputs import AddedParts, Highlighted, PageHead, PageInputs
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.registry import model_parts
-
-
-class LevelView(Struct, frozen=True):
-    """A level and its lessons."""
-
-    id: str
-    title: str
-    summary: str
-    href: str
-    lessons: tuple[LessonLink, ...]
-    written: int
-
-
-class CourseHead(Struct, frozen=True):
-    """What stands over the course map."""
-
-    title: str
-    summary: str
 
 
 class Named(Struct, frozen=True):
@@ -72,10 +53,11 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     place = urls.Place(urls.HOME)
     written = [lesson for lesson in library.order if lesson.document is not None]
     values = {
-        "course": CourseHead(course.title, course.summary),
+        "title": course.title,
+        "summary": course.summary,
         "cards": lesson_cards(library, place),
         "galleries": galleries(library, place),
-        "levels": tuple(level_view(library, place, level) for level in course.levels),
+        "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written[0]) if written else None,
         "total": len(library.order),
         "written": len(written),
@@ -97,12 +79,9 @@ def level_inputs(library: Library, level: Level) -> PageInputs:
     place = urls.Place(urls.level_path(level))
     levels = library.course.levels
     at = next(i for i, other in enumerate(levels) if other.id == level.id)
-    view = level_view(library, place, level)
-    heads = map(LessonHead.of, level.lessons)
     values = {
         "home": place.href(urls.HOME),
-        "level": view,
-        "entries": tuple(zip(heads, view.lessons, strict=True)),
+        "level": level_view(library, place, level, whole=True),
         "graph": of_level(library, place, level),
         "previous": _level_link(library, place, levels[at - 1]) if at else None,
         "following": _level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
@@ -115,24 +94,6 @@ def level_inputs(library: Library, level: Level) -> PageInputs:
 def _level_link(library: Library, place: urls.Place, level: Level) -> Named:
     label = library.words("level.label", id=level.id)
     return Named(place.href(urls.level_path(level)), level.title, label)
-
-
-def level_view(library: Library, place: urls.Place, level: Level) -> LevelView:
-    """A level with its lessons, as seen from a place."""
-    return LevelView(
-        level.id,
-        level.title,
-        level.summary,
-        place.href(urls.level_path(level)),
-        tuple(
-            replace(
-                lesson_link(library, place, lesson, needs=True),
-                asked=library.asked.get(lesson.path, ""),
-            )
-            for lesson in level.lessons
-        ),
-        sum(lesson.status is not Status.PLANNED for lesson in level.lessons),
-    )
 
 
 def gallery_inputs(library: Library) -> PageInputs:
@@ -162,9 +123,8 @@ def _model_card(library: Library, place: urls.Place, model: MjcfModel) -> ModelC
 def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
     """What the page of a model shows: what it is, where it is used, what it holds, its text."""
     place = urls.Place(urls.model_page_path(model.name))
-    compiled = library.models.get(model.name)
     title = library.words("model.title", name=model.name)
-    facts = None if compiled is None else compiled.facts
+    facts = library.facts.get(model.name)
     parts = {} if facts is None else model_parts()
     more = [fact for part in parts.values() for fact in part.facts(library, model)]
     shown = {name: part.values(library, place, model) for name, part in parts.items()}
@@ -181,7 +141,7 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "about": model.about,
         "opening": _added(parts, shown, opens=True),
         "added": _added(parts, shown, opens=False),
-        "uses": model_uses(library, place, model),
+        "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
     return PageInputs(PageHead(place.path, "model", title, model.about), "model.html", values)
 
@@ -191,11 +151,6 @@ def _added(
 ) -> AddedParts:
     chosen = ((name, shown[name]) for name, part in parts.items() if part.opens is opens)
     return AddedParts({name: value for name, value in chosen if value is not None})
-
-
-def model_uses(library: Library, place: urls.Place, model: MjcfModel) -> tuple[Named, ...]:
-    """Who uses a model, and how."""
-    return tuple(_use_link(library, place, use) for use in library.uses[model.name])
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
@@ -220,17 +175,11 @@ def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
 
 
 def _use_link(library: Library, place: urls.Place, use: ModelUse) -> Named:
-    words = library.words
-    ways = (
-        ("model.by_lab", use.by_lab),
-        ("model.by_script", use.by_script),
-        ("model.by_link", use.by_link),
-    )
-    remark = ", ".join(words(key) for key, is_so in ways if is_so)
-    if isinstance(use.owner, Lesson):
-        text = f"{words('lesson.label', id=use.owner.id)}: {use.owner.title}"
-        return Named(place.href(urls.lesson_path(use.owner)), text, remark)
-    return Named(place.href(urls.page_path(use.owner)), use.owner.title, remark)
+    words, owner = library.words, use.owner
+    text = owner.title
+    if isinstance(owner, Lesson):
+        text = f"{words('lesson.label', id=owner.id)}: {owner.title}"
+    return Named(place.href(urls.owner_path(owner)), text, ", ".join(map(words, use.ways)))
 
 
 def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:

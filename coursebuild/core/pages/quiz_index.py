@@ -1,6 +1,6 @@
 """Which questions a document asks, as the lists of lessons name them for the page's script.
 
-Entry points: `quiz_index(document)`, for one document; `QuizIndex`, for all of a course.
+Entry points: `quiz_index(document)`; `count`, of the questions in it.
 
 From it the script knows, without another page, how many questions a lesson has, whether all are
 answered right, and where to find one that is to be reviewed.
@@ -8,14 +8,9 @@ answered right, and where to find one that is to be reviewed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TypeAlias
 from urllib.parse import quote
 
 from coursebuild.core.model import Document, FeatureBlock, document_blocks
-
-QuizIndex: TypeAlias = Mapping[str, str]
-"""By the path of the document; those that ask nothing are left out."""
 
 
 def quiz_index(document: Document) -> str:

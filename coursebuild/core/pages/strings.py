@@ -13,8 +13,7 @@ Entry point: `parse_strings(text, fallback, language)`, which gives `Strings`; a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
@@ -23,31 +22,17 @@ from coursebuild.core.pages.plurals import CATEGORIES, category
 DEFAULT_LANGUAGE = "en"
 
 
-class Strings(Struct, frozen=True, dict=True):
+class Strings(Struct, frozen=True):
     """The interface's words in one language."""
 
-    entries: tuple[tuple[str, str], ...]
-    """Dotted key and text, sorted by key."""
+    texts: Mapping[str, str]
+    """By dotted key, sorted."""
     language: str = DEFAULT_LANGUAGE
     """Of the course that they are for."""
 
-    @classmethod
-    def of(cls, table: dict[str, str], language: str = DEFAULT_LANGUAGE) -> Strings:
-        """The words of a table: dotted key and text."""
-        return cls(tuple(sorted(table.items())), language)
-
-    @cached_property
-    def _table(self) -> dict[str, str]:
-        return dict(self.entries)
-
-    @property
-    def keys(self) -> frozenset[str]:
-        """All keys."""
-        return frozenset(self._table)
-
     def __call__(self, key: str, **values: str | int | float) -> str:
         """The text of a key, with its values put in."""
-        text = self._table.get(key)
+        text = self.texts.get(key)
         if text is None and "n" in values:
             text = self._form(key, values["n"])
         if text is None:
@@ -57,11 +42,11 @@ class Strings(Struct, frozen=True, dict=True):
     def _form(self, key: str, n: str | int | float) -> str | None:
         """The form of a text that goes with a number."""
         name = "other" if isinstance(n, str) else category(self.language, n)
-        return self._table.get(f"{key}.{name}", self._table.get(f"{key}.other"))
+        return self.texts.get(f"{key}.{name}", self.texts.get(f"{key}.other"))
 
     def has(self, key: str) -> bool:
         """Whether there is a text of this key."""
-        return key in self._table
+        return key in self.texts
 
 
 def parse_strings(
@@ -71,14 +56,14 @@ def parse_strings(
     import tomllib
 
     own = dict(_flatten(tomllib.loads(text), ""))
-    table = dict(fallback.entries) if fallback is not None else {}
+    table = dict(fallback.texts) if fallback is not None else {}
     for key in own:
         stem, _, form = key.rpartition(".")
         if form in CATEGORIES and f"{stem}.other" in own:
             for other in CATEGORIES:
                 table.pop(f"{stem}.{other}", None)
     table.update(own)
-    return Strings.of(table, language)
+    return Strings(dict(sorted(table.items())), language)
 
 
 def _flatten(table: dict[str, object], prefix: str) -> Iterator[tuple[str, str]]:

@@ -11,8 +11,10 @@ way to compress.
 from __future__ import annotations
 
 import hashlib
+import io
 import re
 import sys
+import zipfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
 from msgspec import Struct
@@ -20,7 +22,8 @@ from msgspec import Struct
 from coursebuild.core.model import Course, Script, document_scripts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library, models_named, owners
+from coursebuild.core.pages.folding import imported
+from coursebuild.core.pages.library import Library, course_scripts, models_named
 from coursebuild.core.text.source import Excerpt
 
 _NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}
@@ -37,17 +40,6 @@ class Package(Struct, frozen=True):
     version: str
 
 
-def imports(text: str) -> frozenset[str]:
-    """Top-level modules that a Python text imports by name; none where it does not parse."""
-    from coursebuild.core.pages.folding import imported  # with the parser
-
-    return imported(text)
-
-
-def _path(part: tuple[str, object]) -> str:
-    return part[0]
-
-
 class Surroundings(Struct, frozen=True):
     """What scripts need around them, besides the course itself."""
 
@@ -60,7 +52,7 @@ class Surroundings(Struct, frozen=True):
     root."""
     style: tuple[OutputFile, ...] = ()
     """The course's `matplotlibrc`, if it has one: the style of all figures."""
-    imports: Callable[[str], frozenset[str]] = imports
+    imports: Callable[[str], frozenset[str]] = imported
     """What a Python text imports: whoever calls may know it already."""
 
 
@@ -84,7 +76,8 @@ class Archive(Struct, frozen=True):
     def key(self) -> str:
         """A hash of all that is in it."""
         digest = hashlib.sha256()
-        for path, part in sorted(self.parts.items(), key=_path):
+        for path in sorted(self.parts):
+            part = self.parts[path]
             own = hashlib.sha256(part).digest() if isinstance(part, bytes) else part.digest
             digest.update(f"{path}\0".encode() + own)
         return digest.hexdigest()
@@ -112,13 +105,7 @@ def archives(library: Library, around: Surroundings) -> Iterator[Archive]:
 
 def imported_modules(course: Course, around: Surroundings) -> tuple[str, ...]:
     """Top-level modules of others that the scripts, and the packages they come with, import."""
-    documents = (owner.document for owner in owners(course))
-    scripts = [
-        script
-        for document in documents
-        if document is not None
-        for script in document_scripts(document)
-    ]
+    scripts = [script for script, _ in course_scripts(course).values()]
     own = {_module(script.path) for script in scripts}
     return tuple(sorted(_imported(scripts, around, own)[1]))
 
@@ -188,8 +175,6 @@ def _models(
     library: Library, around: Surroundings, scripts: tuple[Script, ...]
 ) -> Mapping[str, bytes]:
     """The models that scripts name, and the files that these pull in."""
-    if not library.course.models:
-        return {}
     sources = {model.source.path: model.source.text.encode() for model in library.course.models}
     others = {file.path: file.data for file in around.model_files}
     named = {name for script in scripts for name in models_named(script)}
@@ -197,8 +182,7 @@ def _models(
     for model in library.course.models:
         if model.name in named:
             found[model.source.path] = sources[model.source.path]
-            compiled = library.models.get(model.name)
-            facts = compiled.facts if compiled is not None else None
+            facts = library.facts.get(model.name)
             for path in facts.includes if facts is not None else ():
                 if (data := sources.get(path, others.get(path))) is not None:
                     found[path] = data
@@ -219,15 +203,12 @@ def _slug(title: str) -> str:
 
 def pack(files: Mapping[str, bytes]) -> bytes:
     """An archive of these files, by path."""
-    import io
-    import zipfile
-
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
-        for path in sorted(files):
+        for path, data in sorted(files.items()):
             entry = zipfile.ZipInfo(path, _DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3
             entry.external_attr = 0o100644 << 16
-            archive.writestr(entry, files[path], compresslevel=9)
+            archive.writestr(entry, data, compresslevel=9)
     return out.getvalue()

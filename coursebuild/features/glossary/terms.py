@@ -19,16 +19,15 @@ from coursebuild.core.model import (
     Inline,
     Math,
     MathBlock,
-    NumberBinding,
     Paragraph,
     Term,
-    child_blocks,
+    sibling_groups,
     walk_inlines,
+    without_links,
 )
 from coursebuild.core.pages import formulas
-from coursebuild.core.pages.link_texts import without_links
+from coursebuild.core.pages.html_context import Context
 from coursebuild.core.pages.markup import render_inlines
-from coursebuild.core.pages.plain import PLAIN, PlainContext
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.features.glossary.sentences import definition_of, runs_on
 
@@ -62,7 +61,7 @@ def document_terms(document: Document, mathml: Mathml) -> Parsed[DocumentTerms |
     return Parsed(DocumentTerms(terms) if terms else None)
 
 
-class _Excerpted(PlainContext):
+class _Excerpt(Context):
     """The context of a sentence that is shown on another page."""
 
     def __init__(self, mathml: Mathml) -> None:
@@ -75,17 +74,14 @@ class _Excerpted(PlainContext):
     def display(self, tex: str, start: int) -> Markup:
         return Markup(self._mathml(tex, True)) or super().display(tex, start)
 
-    def binding(self, binding: NumberBinding) -> Markup:
-        return Markup.escape(binding.text)
-
 
 def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
-    context = _Excerpted(mathml)
+    context = _Excerpt(mathml)
 
     def html(inlines: tuple[Inline, ...]) -> str:
-        return str(render_inlines(without_links(inlines), context, PLAIN))
+        return str(render_inlines(without_links(inlines), context))
 
-    for siblings in _sibling_groups(document):
+    for siblings in sibling_groups(document):
         for number, block in enumerate(siblings):
             if not isinstance(block, Paragraph):
                 continue
@@ -103,7 +99,7 @@ def _pieces(
     definition: tuple[Inline, ...],
     following: Block | None,
     html: Callable[[tuple[Inline, ...]], str],
-    context: _Excerpted,
+    context: _Excerpt,
 ) -> Iterator[DefinitionPart]:
     """A definition, cut at its displayed formulas."""
     line: list[Inline] = []
@@ -118,12 +114,3 @@ def _pieces(
         yield DefinitionPart(html(tuple(line)).strip())
     if isinstance(following, MathBlock) and following.tex.text and runs_on(definition):
         yield DefinitionPart(str(context.display(following.tex.text, 0)), display=True)
-
-
-def _sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
-    """All blocks of a document, those side by side together."""
-    waiting = [document.blocks, *(note.blocks for note in document.footnotes)]
-    while waiting:
-        group = waiting.pop(0)
-        yield group
-        waiting += [child_blocks(block) for block in group]

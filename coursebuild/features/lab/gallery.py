@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from coursebuild.core.features import Picture
 from coursebuild.core.model import Course, Document, FeatureBlock, MjcfModel, document_blocks
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.library import BY_LAB, Library
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.features.lab.files import ShownLab
 from coursebuild.features.lab.model import SIMLAB, START, Lab
@@ -52,7 +52,7 @@ def _own_lab(model: MjcfModel) -> Lab:
 
 
 def _find(library: Library, model: MjcfModel) -> tuple[Lab, ShownLab | None]:
-    documents = (use.owner.document for use in library.uses[model.name] if use.by_lab)
+    documents = (use.owner.document for use in library.uses[model.name] if BY_LAB in use.ways)
     labs = (_labs_by_model(one).get(model.name) for one in documents if one is not None)
     lab = next(filter(None, labs), None) or _own_lab(model)
     shown = library.tried.get((lab.span.path, lab.span.start))

@@ -20,7 +20,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.lesson import LessonHead, LessonLevel, LessonLink
+from coursebuild.core.pages.lesson import LessonLink, LevelView
 from coursebuild.core.pages.marks import code_span, escaped, guarded, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
@@ -87,7 +87,7 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
 def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     """Title, summary, facts and objectives; of a page that is no lesson, its title."""
     lesson = inputs.values.get("lesson")
-    if not isinstance(lesson, LessonHead):
+    if not isinstance(lesson, LessonLink):
         return [f"# {_line(inputs.head.title)}"]
     parts = [f"# {_line(f'{lesson.id} {lesson.title}')}"]
     if lesson.summary:
@@ -99,26 +99,25 @@ def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     return parts
 
 
-def _facts(inputs: PageInputs, lesson: LessonHead, words: Strings, locate: Locate) -> list[str]:
+def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locate) -> list[str]:
     facts = []
-    level, href = inputs.values.get("level"), inputs.values.get("level_href")
-    if isinstance(level, LessonLevel) and isinstance(href, str):
+    level = inputs.values.get("level")
+    if isinstance(level, LevelView):
         name = f"{words('level.label', id=level.id)}: {level.title}"
-        facts.append(link(_line(name), locate(href)))
-    facts.append(_line(words(f"status.{inputs.values['status']}")))
+        facts.append(link(_line(name), locate(level.href)))
+    facts.append(_line(words(f"status.{lesson.status}")))
     if lesson.minutes:
         facts.append(_line(words("lesson.minutes", n=lesson.minutes)))
     if lesson.further:
         facts.append(_line(words("lesson.more_minutes", n=lesson.further)))
-    needs = lesson_links(inputs, "needs", locate)
+    needs = lesson_links(lesson.needs, locate)
     if needs:
         facts.append(f"{_line(words('lesson.needs'))} {', '.join(needs)}")
     return facts
 
 
-def lesson_links(inputs: PageInputs, name: str, locate: Locate) -> list[str]:
-    """Links to the lessons that a value of inputs names."""
-    found = inputs.values.get(name)
+def lesson_links(found: object, locate: Locate) -> list[str]:
+    """Links to the lessons that a value of a page's inputs is, or holds."""
     lessons = found if isinstance(found, tuple) else (found,)
     return [
         link(_line(f"{one.id} {one.title}"), locate(one.href))
@@ -139,7 +138,7 @@ def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
         ("previous", "lesson.previous"),
         ("following", "lesson.next"),
     ):
-        links = lesson_links(inputs, name, locate)
+        links = lesson_links(inputs.values.get(name), locate)
         if links:
             rows.append(f"{_line(words(key))}: {', '.join(links)}")
     return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []

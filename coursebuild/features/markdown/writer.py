@@ -147,7 +147,7 @@ class DocumentWriter(Struct, frozen=True):
         recordings = self.page.joined.get(block.span.start, ())
         parts += [self.recording(recording) for recording in recordings]
         if not recordings:
-            receipt = script_receipt(self.page, self.page.shown.runs.get(block.path))
+            receipt = script_receipt(self.page, block)
             parts.append(f"*{escaped(receipt.text)}*")
         return "\n\n".join(parts)
 

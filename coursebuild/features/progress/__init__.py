@@ -11,8 +11,8 @@ from msgspec import Struct
 from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.lesson import level_view
 from coursebuild.core.pages.library import Library, owners
-from coursebuild.core.pages.pages import level_view
 from coursebuild.core.pages.quiz_index import count
 
 _PROGRESS, _REVIEW = "progress/index.html", "review/index.html"
@@ -37,7 +37,9 @@ def progress_values(library: Library) -> dict[str, object]:
     """What the page of the reader's progress shows: all lessons, by level."""
     place = urls.Place(_PROGRESS)
     return {
-        "levels": tuple(level_view(library, place, level) for level in library.course.levels),
+        "levels": tuple(
+            level_view(library, place, level, whole=True) for level in library.course.levels
+        ),
         "pages": tuple(one for one in _asking(library, place) if not one.id),
         "review": place.href(_REVIEW) if library.asked else "",
         "name": KEPT_AS + library.course.key,

@@ -129,7 +129,7 @@ def _listing(site: SiteContext, plan: IndexPlan, names: str) -> dict[str, object
         ],
         "strings": {
             key.removeprefix(_LIVE): text
-            for key, text in site.library.words.entries
+            for key, text in site.library.words.texts.items()
             if key.startswith(_LIVE)
         },
     }

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from coursebuild.core.model import Document
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.lesson import LessonHead
+from coursebuild.core.pages.lesson import LessonLink
 from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, ShownDocument
 from coursebuild.features.search.sections import (
     Section,
@@ -47,7 +47,7 @@ def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
     if inputs.head.kind in _LEFT_OUT or not (inputs.head.indexed or inputs.head.kind in _LEADS):
         return b""
     head = inputs.values.get("lesson")
-    name = head.id if isinstance(head, LessonHead) else ""
+    name = head.id if isinstance(head, LessonLink) else ""
     sections = page_sections(inputs, None if page is None else page.document, body)
     return call("page", "", packed(sections)) + b"\0" + terms([name, inputs.head.title], sections)
 
@@ -62,7 +62,7 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
     """What stands on a page; see `note_page`."""
     head = inputs.values.get("lesson")
     lead: tuple[str, ...] = (inputs.head.description,)
-    if isinstance(head, LessonHead):
+    if isinstance(head, LessonLink):
         lead += (", ".join(head.aliases), *head.objectives)
     if document is not None:
         known = inputs.shown or ShownDocument()

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.model import Document, NumberBinding, Target, Text
-from coursebuild.core.pages.html_context import HtmlOptions, OwnBlock, Words
+from coursebuild.core.pages.html_context import OwnBlock
 from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
-from coursebuild.core.pages.plain import PlainContext, plain_html
 from coursebuild.core.pages.quantities import in_order, joined, quantities
+from coursebuild.core.pages.strings import Strings, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
+from support.plain_html import WORDS, PlainContext
 
 KINDS = frozenset({"note"})
 
@@ -24,6 +27,9 @@ def parsed(text: str) -> Document:
 
 class Page(PlainContext):
     """A context that shows what it was asked."""
+
+    def __init__(self, words: Strings = WORDS, direction: Literal["", "ltr", "rtl"] = "") -> None:
+        self.words, self.direction = words, direction
 
     def href(self, target: Target) -> str:
         return f"/{type(target).__name__}?a&b"
@@ -50,8 +56,8 @@ class Page(PlainContext):
         return Markup("<x-{}>\n").format(type(block).__name__.lower())
 
 
-def html(text: str, options: HtmlOptions | None = None) -> str:
-    return str(render_blocks(parsed(text).blocks, Page(), options or HtmlOptions()))
+def html(text: str) -> str:
+    return str(render_blocks(parsed(text).blocks, Page()))
 
 
 @pytest.mark.parametrize(
@@ -134,12 +140,15 @@ def test_footnotes_and_their_references_link_to_each_other() -> None:
 
 def test_words_can_be_translated() -> None:
     document = parsed("## A\n\nb[^x]\n\n[^x]: c\n")
-    words = Words(anchor='Zum "Teil"', footnotes="Fußnoten", footnote="Nr. {number}")
-    text = render_blocks(document.blocks, Page(), HtmlOptions(words))
+    german = """[markup]
+        anchor = 'Zum "Teil"'
+        footnotes = "Fußnoten"
+        footnote = "Nr. {number}"
+    """
+    page = Page(parse_strings(german, WORDS))
+    text = render_blocks(document.blocks, page)
     assert 'aria-label="Zum &quot;Teil&quot;"' in text and 'aria-label="Nr. 1"' in text
-    assert 'aria-label="Fußnoten"' in render_footnotes(
-        document.footnotes, Page(), HtmlOptions(words)
-    )
+    assert 'aria-label="Fußnoten"' in render_footnotes(document.footnotes, page)
 
 
 def test_text_is_escaped_wherever_it_stands() -> None:
@@ -150,25 +159,6 @@ def test_text_is_escaped_wherever_it_stands() -> None:
     assert '">' not in html('[a](<b"\\>c>)').removeprefix('<p><a href="/UrlTarget?a&amp;b">')
 
 
-def test_plain_html_of_own_blocks() -> None:
-    text = (
-        "> [!note] *T*\n> a\n\n"
-        "```python file=examples/x.py\nprint(1)\n```\n\n"
-        "Output:\n\n```text\n1\n```\n\nOutput:\n\n| 1 |\n|---|\n\n"
-        "```mjcf\n<mujoco/>\n```\n\n`1`{out} [a](page:b#c) [d](model:e) [f](examples/x.py)\n"
-    )
-    assert str(plain_html(parsed(text))) == (
-        "<blockquote>\n<p><em>T</em></p>\n<p>a</p>\n</blockquote>\n"
-        '<pre><code class="language-python">print(1)\n</code></pre>\n'
-        '<p>Output:</p>\n<pre><code class="language-text">1\n</code></pre>\n'
-        '<p>Output:</p>\n<table>\n<thead>\n<tr>\n<th scope="col">1</th>\n</tr>\n'
-        "</thead>\n</table>\n"
-        '<pre><code class="language-mjcf">&lt;mujoco/&gt;\n</code></pre>\n'
-        '<p><code>1</code> <a href="page:b#c">a</a> <a href="model:e">d</a>'
-        ' <a href="examples/x.py">f</a></p>\n'
-    )
-
-
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
 
 
@@ -176,8 +166,8 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
     inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
     known = joined(text).translate(_ESCAPES)
-    assert render_inlines(inlines, Page(), HtmlOptions(quantities="ltr")) == known
+    assert render_inlines(inlines, Page(direction="ltr")) == known
     pieces = ((Markup(one.translate(_ESCAPES)), kept) for one, kept in quantities(joined(text)))
     known = "".join(in_order(html) if kept else html for html, kept in pieces)
-    assert render_inlines(inlines, Page(), HtmlOptions(quantities="rtl")) == known
+    assert render_inlines(inlines, Page(direction="rtl")) == known
     assert render_inlines(inlines, Page()) == text.translate(_ESCAPES)

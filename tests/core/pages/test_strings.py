@@ -45,7 +45,7 @@ def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Asset
         text += "".join(path.read_text() for path in modules)
     scripts = "".join(p.read_text() for p in sorted((ROOT / "site" / "js").rglob("*.js")))
     words = strings_for(assets.templates, "en")
-    known = {re.sub(r"\.(one|other)$", "", key) for key in words.keys}
+    known = {re.sub(r"\.(one|other)$", "", key) for key in words.texts}
     quoted = set(re.findall(r"""["']([a-z]+\.[a-z_.]+)["']""", text))
     asked = set(re.findall(r"""(?:\bt|words)\(\s*["']([a-z_.]+)["']""", text))
     assert asked - known == {key for key in asked if key.endswith(".")}

@@ -26,7 +26,7 @@ PROMISES = {f"promise.{kind.name}" for kind in CALLOUTS}
 
 
 def entries(language: str) -> dict[str, str]:
-    return dict(parse_strings((FOLDER / f"{language}.toml").read_text("utf-8")).entries)
+    return dict(parse_strings((FOLDER / f"{language}.toml").read_text("utf-8")).texts)
 
 
 def with_forms(table: dict[str, str]) -> dict[str, dict[str, str]]:

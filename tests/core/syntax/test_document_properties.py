@@ -39,11 +39,11 @@ from coursebuild.core.model import (
     walk_blocks,
     walk_inlines,
 )
-from coursebuild.core.pages.plain import plain_html
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.quiz.model import Quiz
+from support.plain_html import plain_html
 from support.random_lessons import KINDS, markdown
 
 

@@ -19,9 +19,9 @@ from coursebuild.core.model import (
     document_blocks,
     document_inlines,
 )
-from coursebuild.core.pages.plain import plain_html
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Excerpt, Source
+from support.plain_html import plain_html
 
 KINDS = frozenset({"note", "try"})
 LESSON = """## Title

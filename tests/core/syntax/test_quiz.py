@@ -10,8 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Block, Paragraph
-from coursebuild.core.pages.markup import render_blocks
-from coursebuild.core.pages.plain import PLAIN, PlainContext
 from coursebuild.features.quiz.model import (
     ChoiceQuestion,
     NumericQuestion,
@@ -19,11 +17,12 @@ from coursebuild.features.quiz.model import (
     OrderQuestion,
     OutputQuestion,
 )
+from support.plain_html import plain_blocks
 from support.quiz_fences import MCQ, parse
 
 
 def html(blocks: tuple[Block, ...]) -> str:
-    return str(render_blocks(blocks, PlainContext(), PLAIN)).removesuffix("\n")
+    return plain_blocks(blocks).removesuffix("\n")
 
 
 COMPLETE = r"""{"id": "4.2-check", "title": "Knowledge check", "questions": [

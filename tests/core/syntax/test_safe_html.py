@@ -18,10 +18,10 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
 from coursebuild.core.pages.markup import render_blocks
-from coursebuild.core.pages.plain import PlainContext
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.hostile_html import PAGES
+from support.plain_html import PlainContext
 
 REFUSED = (
     '<meta http-equiv=refresh content="0;url=https://evil.example">',

@@ -17,12 +17,11 @@ from coursebuild.core.model import (
     SoftBreak,
     document_inlines,
 )
-from coursebuild.core.pages.markup import render_blocks
-from coursebuild.core.pages.plain import PLAIN, PlainContext
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 from coursebuild.features.quiz.model import OpenQuestion, Quiz
+from support.plain_html import plain_blocks
 
 TICKS = "```"
 
@@ -75,7 +74,7 @@ def flow(text: str) -> tuple[Inline, ...]:
     ],
 )
 def test_html_in_a_text(text: str, expected: str) -> None:
-    assert str(render_blocks(good(text), PlainContext(), PLAIN)) == f"{expected}\n"
+    assert plain_blocks(good(text)) == f"{expected}\n"
 
 
 def test_mentions_and_line_ends_in_html() -> None:

@@ -19,10 +19,10 @@ from coursebuild.core.pages.marks import (
     picture,
     quoted,
 )
-from coursebuild.core.pages.plain import PlainContext, plain_html
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.markdown.blocks import write_blocks, write_footnotes, write_inlines
+from support.plain_html import PlainContext, plain_html
 
 ROOT = Path(__file__).parents[3]
 SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"

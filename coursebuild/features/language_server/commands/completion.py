@@ -98,7 +98,7 @@ def _names(texts: OpenTexts, here: Span, what: str, found: re.Match[str]) -> Map
             scripts = library.scripts.items()
             return {path: f"of {one.id}: {one.title}" for path, (_, one) in scripts}
         case "callout":
-            return {name: library.callout_promise(name) for name in library.callouts}
+            return {name: library.callout(name).promise for name in library.callouts}
         case "fence":
             outside = fence_at(here.source, here.start) is None
             return dict.fromkeys((*CORE_FENCES, *fence_names()), "") if outside else {}

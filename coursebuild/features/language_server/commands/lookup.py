@@ -21,7 +21,6 @@ from coursebuild.core.checks.links import anchors
 from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.results import Formula, ModelFacts
 from coursebuild.core.pages.library import Library, Owner, models_named
-from coursebuild.core.pages.link_texts import without_links
 from coursebuild.core.scripts.bindings import Printed
 from coursebuild.core.scripts.bound_numbers import Shown
 from coursebuild.core.syntax.decode import description
@@ -122,9 +121,8 @@ class _Lookup:
             case model.Math() | model.MathBlock():
                 return self.formula(node, offset)
             case model.Callout() if _covers(node.kind_span, offset):
-                label = self.library.callout_label(node.kind)
-                promise = self.library.callout_promise(node.kind)
-                return Referent(node.kind_span, f"**{label}**\n\n{promise}")
+                kind = self.library.callout(node.kind)
+                return Referent(node.kind_span, f"**{kind.label}**\n\n{kind.promise}")
             case model.Script() | model.PlainCode() | model.FeatureBlock() | model.CodeSpan():
                 return self.code(node, offset)
             case _:
@@ -197,8 +195,7 @@ class _Lookup:
 
     def facts(self, models: Iterable[str]) -> ModelFacts | None:
         """Those of the first of some models that compiles."""
-        known = (self.library.models.get(name) for name in models)
-        return next((one.facts for one in known if one is not None and one.facts is not None), None)
+        return next(filter(None, map(self.library.facts.get, models)), None)
 
     def term(self, id: str, owner: Owner) -> tuple[str, Span] | None:
         """What the glossary says of a term."""
@@ -207,7 +204,7 @@ class _Lookup:
             inlines = block.children if isinstance(block, model.Paragraph) else ()
             for term in model.walk_inlines(inlines):
                 if isinstance(term, model.Term) and term.id == id:
-                    inlines = without_links(definition_of(inlines, term))
+                    inlines = model.without_links(definition_of(inlines, term))
                     said = (i.text if isinstance(i, model.Text) else i.span.text for i in inlines)
                     return _paragraphs(f"**{term.name}**", "".join(said).strip()), term.span
         return None

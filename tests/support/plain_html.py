@@ -1,0 +1,95 @@
+"""Documents as CommonMark's own HTML, without a course and without what is only ours.
+
+Entry points: `plain_html`, a document; `plain_blocks`, some blocks; `PlainContext`, a page that
+knows no course.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Literal
+
+from markupsafe import Markup
+
+from coursebuild.core import model
+from coursebuild.core.pages.html_context import Context, OwnBlock
+from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
+from coursebuild.core.pages.strings import Strings, parse_strings
+
+ENGLISH = Path(__file__).parents[2] / "templates/strings/en.toml"
+WORDS = parse_strings(ENGLISH.read_text("utf-8"))
+SCHEMES = {
+    model.LessonTarget: "lesson",
+    model.LevelTarget: "level",
+    model.ModelTarget: "model",
+    model.PageTarget: "page",
+    model.TermTarget: "term",
+}
+OURS = (
+    (r' <a class="anchor" href="#[^"]*" aria-label="[^"]*">#</a>', ""),
+    (r'<(h[1-6]|dfn) id="[^"]*"(?: class="[^"]*")?>', r"<\1>"),
+    (r'<div class="table"[^>]*>\n(<table>.*?</table>\n)</div>\n', r"\1"),
+    (r' class="url">', ">"),
+)
+
+
+def plain_html(document: model.Document) -> str:
+    """A document, its footnotes last."""
+    footnotes = render_footnotes(document.footnotes, PlainContext())
+    return plain_blocks(document.blocks) + str(footnotes)
+
+
+def plain_blocks(blocks: Iterable[model.Block]) -> str:
+    text = str(render_blocks(blocks, PlainContext()))
+    for pattern, plain in OURS:
+        text = re.sub(pattern, plain, text, flags=re.DOTALL)
+    return text
+
+
+def escaped(text: str) -> str:
+    return html.escape(text, quote=False).replace('"', "&quot;")
+
+
+class PlainContext(Context):
+    """Shows what blocks of ours hold, and addresses as an author writes them."""
+
+    words: Strings = WORDS
+    direction: Literal["", "ltr", "rtl"] = ""
+
+    def href(self, target: model.Target) -> str:
+        if isinstance(target, model.UrlTarget):
+            return target.url
+        if isinstance(target, model.ExampleTarget):
+            return target.path
+        name = target.name if isinstance(target, model.ModelTarget) else target.id
+        anchor = getattr(target, "anchor", None)
+        return f"{SCHEMES[type(target)]}:{name}" + (f"#{anchor}" if anchor else "")
+
+    def figure(self, image: model.Image, caption: Markup) -> Markup:
+        return Markup(f"<p>{render_inlines((image,), self)}\n{caption}</p>\n")
+
+    def code(self, language: str, text: str) -> Markup:
+        name = f' class="language-{escaped(language)}"' if language else ""
+        return Markup(f"<pre><code{name}>{escaped(text)}</code></pre>\n")
+
+    def binding(self, binding: model.NumberBinding) -> Markup:
+        return Markup(f"<code>{escaped(binding.text)}</code>")
+
+    def block(self, block: OwnBlock) -> Markup:
+        match block:
+            case model.Callout():
+                title = render_inlines(block.title, self)
+                inner = render_blocks(block.blocks, self)
+                return Markup(f"<blockquote>\n<p>{title}</p>\n{inner}</blockquote>\n")
+            case model.Recording():
+                caption = Markup(f"<p>{render_inlines(block.caption, self)}</p>\n")
+                if isinstance(block.body, model.Table):
+                    return caption + render_blocks((block.body,), self)
+                return caption + self.code("text", block.body.text)
+            case model.FeatureBlock():
+                return render_blocks(block.child_blocks(), self)
+            case _:
+                return self.code(type(block).__name__, block.code.text)
