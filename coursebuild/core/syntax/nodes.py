@@ -135,6 +135,10 @@ class ObjectNode(_Container, frozen=True, eq=False):
             return value
         return ObjectNode(self.body, self.start, self.end, self.opening, ())
 
+    def strings(self, name: str) -> tuple[StringNode, ...]:
+        """The texts in it."""
+        return tuple(item for item in self.items(name) if isinstance(item, StringNode))
+
 
 class Member(Struct, frozen=True):
     """A key and its value."""

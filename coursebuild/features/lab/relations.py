@@ -27,11 +27,13 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
     """Everything that the types of the fields cannot say."""
     yield from one_of(node, SimLab, ("model", "xml"))
     for name in ("toggles", "overlays"):
-        strings = [(item.value, item.span) for item in _strings(node.get(name))]
+        strings = [(item.value, item.span) for item in node.strings(name)]
         yield from repeated(strings, "field-value", "the overlay `{}` is named twice")
     controls = node.objects("controls")
-    labels = [(label.value, label.span) for c in controls if (label := _label(c)) is not None]
-    yield from repeated(labels, "field-value", "two controls are called `{}`")
+    labels = [(c.get("label"), structs.get(c)) for c in controls]
+    named = [(label, struct) for label, struct in labels if isinstance(label, StringNode)]
+    spans = [(label.value, label.span) for label, _ in named]
+    yield from repeated(spans, "field-value", "two controls are called `{}`")
     for control in controls:
         match structs.get(control):
             case Slider() as slider:
@@ -46,7 +48,7 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
         struct = structs.get(plot)
         if isinstance(struct, Plot):
             yield from _check_axis(plot, struct)
-    known = {label.value: structs.get(c) for c in controls if (label := _label(c)) is not None}
+    known = {label.value: struct for label, struct in named}
     for claim in node.objects("expect"):
         yield from _check_expect(claim, known, structs)
     goal = node.get("goal")
@@ -58,16 +60,6 @@ def _check_axis(node: ObjectNode, plot: Plot) -> Iterator[Diagnostic]:
     if plot.ymin is not None and plot.ymax is not None and not plot.ymin < plot.ymax:
         message = f"`ymax` must be greater than `ymin`, which is {plot.ymin:g}"
         yield diagnose("field-value", node.place("ymax"), message)
-
-
-def _strings(node: Node | None) -> tuple[StringNode, ...]:
-    items = node.items if isinstance(node, ArrayNode) else ()
-    return tuple(item for item in items if isinstance(item, StringNode))
-
-
-def _label(control: ObjectNode) -> StringNode | None:
-    label = control.get("label")
-    return label if isinstance(label, StringNode) else None
 
 
 def _check_slider(node: ObjectNode, slider: Slider) -> Iterator[Diagnostic]:
@@ -85,9 +77,7 @@ def _check_slider(node: ObjectNode, slider: Slider) -> Iterator[Diagnostic]:
 
 
 def _check_select(node: ObjectNode, select: Select) -> Iterator[Diagnostic]:
-    options = node.get("options")
-    items = options.items if isinstance(options, ArrayNode) else ()
-    pairs = [pair.items for pair in items if isinstance(pair, ArrayNode)]
+    pairs = [pair.items for pair in node.items("options") if isinstance(pair, ArrayNode)]
     labels = [(o[0], pair[0].span) for o, pair in zip(select.options, pairs, strict=True)]
     yield from repeated(labels, "field-value", "two options are called `{}`")
     values = [(o[1], pair[1].span) for o, pair in zip(select.options, pairs, strict=True)]

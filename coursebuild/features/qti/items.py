@@ -202,7 +202,7 @@ class _Writer:
                 assert_never(question)
 
     def _output(self, question: OutputQuestion) -> dict[str, Any] | None:
-        answer = output_line(self.page, question.script, question.line)
+        answer = output_line(self.page, question)
         if answer is None:
             self.flow.lost.append("it is left out: its script was not run, so nobody knows the key")
             return None

@@ -1,17 +1,16 @@
 """Quizzes: questions that a learner answers in the page, and whose answers the build checks.
 
 A `quiz` fence holds JSON (`schema`). `parse` makes a `Quiz` of it (`model`), `checks` compares it
-with the course and with what scripts printed, `page`, `markdown` and `search` show it.
+with the course and with what scripts printed, `page` and `markdown` show it.
 """
 
 from coursebuild.core.features import Feature, FenceKind, PagePart
 from coursebuild.features.quiz.checks import check_output_lines, check_predictions, check_quizzes
 from coursebuild.features.quiz.markdown import quiz_markdown
 from coursebuild.features.quiz.model import Quiz
-from coursebuild.features.quiz.page import quiz
+from coursebuild.features.quiz.page import index_quiz, quiz
 from coursebuild.features.quiz.parse import parse_fence
 from coursebuild.features.quiz.schema import QuizFile
-from coursebuild.features.quiz.search import index_quiz
 
 FEATURE = Feature(
     name="quiz",

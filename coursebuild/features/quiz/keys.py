@@ -1,6 +1,6 @@
 """Keys by which a learner's answers find their question again, whatever else of a quiz changes.
 
-Entry points: `text_key`, `QuestionKeys`.
+Entry points: `text_key`, `unique_keys`.
 
 A question's key is its `id`, or else a hash of its kind and its text; an option's and an item's is
 a hash of its text. So adding, removing and moving them changes no other's key.
@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import unicodedata
-from collections.abc import Iterable
-
-from msgspec import Struct, field
+from collections.abc import Iterable, Iterator
 
 DIGITS = 8
 """Hexadecimal digits of a hash: so few that an address with them can still be read."""
@@ -25,21 +23,14 @@ def text_key(kind: str, text: str) -> str:
     return hashlib.sha256(data).hexdigest()[:DIGITS]
 
 
-class QuestionKeys(Struct):
-    """Keys that are each given once."""
-
-    taken: set[str] = field(default_factory=set)
-
-    def of(self, kind: str, text: str) -> str:
-        """The key of a text; one that is there already gets a number behind it."""
+def unique_keys(texts: Iterable[tuple[str, str]], taken: Iterable[str] = ()) -> Iterator[str]:
+    """The keys of texts, each after its kind; one that is taken gets a number behind it."""
+    known = set(taken)
+    for kind, text in texts:
         base = key = text_key(kind, text)
         count = 1
-        while key in self.taken:
+        while key in known:
             count += 1
             key = f"{base}-{count}"
-        self.taken.add(key)
-        return key
-
-    def each(self, kind: str, texts: Iterable[str]) -> tuple[str, ...]:
-        """The keys of texts."""
-        return tuple(self.of(kind, text) for text in texts)
+        known.add(key)
+        yield key

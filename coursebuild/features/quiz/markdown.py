@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, assert_never
 
-from coursebuild.core.model import Heading, plain_text
 from coursebuild.core.pages.marks import escaped, fence, hang
 from coursebuild.features.quiz.model import (
     AnyQuestion,
@@ -18,7 +17,7 @@ from coursebuild.features.quiz.model import (
     OutputQuestion,
     Quiz,
 )
-from coursebuild.features.quiz.page import letter, output_line
+from coursebuild.features.quiz.page import is_heading, letter, output_line
 
 if TYPE_CHECKING:
     from coursebuild.core.features import MarkdownWriter
@@ -30,8 +29,7 @@ def quiz_markdown(writer: MarkdownWriter, block: Quiz) -> str:
         hang(f"{at}. ", _question(writer, question))
         for at, question in enumerate(block.questions, 1)
     )
-    headings = (b for b in writer.page.document.blocks if isinstance(b, Heading))
-    said = any(plain_text(h.children).strip() == block.title.strip() for h in headings)
+    said = is_heading(writer.page.document, block.title)
     title = "" if said else f"**{escaped(block.title)}**"
     return "\n\n".join(filter(None, (title, *questions)))
 
@@ -98,7 +96,7 @@ def _answer(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
         case OpenQuestion():
             return [writer.blocks(question.reference), explain]
         case OutputQuestion():
-            line = output_line(writer.page, question.script, question.line)
+            line = output_line(writer.page, question)
             shown = writer.words("quiz.none") if line is None else fence("text", line)
             return [shown, explain]
         case OrderQuestion():

@@ -13,6 +13,7 @@ Entry points: `parse_fence`; `parse_quiz`, from the text inside one.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain, repeat
 from typing import assert_never
 
 from msgspec.structs import replace
@@ -21,13 +22,13 @@ from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.fields import has_value, repeated
 from coursebuild.core.syntax.json_text import one_line, parse_json
-from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.core.syntax.nodes import Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
-from coursebuild.features.quiz.keys import QuestionKeys
+from coursebuild.features.quiz.keys import unique_keys
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     Choice,
@@ -108,19 +109,13 @@ def _sound(question: AnyQuestion, found: list[Diagnostic]) -> AnyQuestion:
 
 def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[ObjectNode, str]:
     """The key of each question: its id, or that of its text, which must not be another's id."""
-    fields = {node: decoding.structs.get(node) for node in nodes}
-    given = {n: f.id for n, f in fields.items() if isinstance(f, AnyFields) and f.id is not None}
-    keys = QuestionKeys(set(given.values()))
-    return {
-        node: given[node] if node in given else keys.of(_kind(node), known.q)
-        for node, known in fields.items()
-        if isinstance(known, AnyFields)
-    }
-
-
-def _kind(node: ObjectNode) -> str:
-    kind = node.get("kind")
-    return kind.value if isinstance(kind, StringNode) else ""
+    fields = ((node, decoding.structs.get(node)) for node in nodes)
+    known = [(node, one) for node, one in fields if isinstance(one, AnyFields)]
+    given = {node: one.id for node, one in known if one.id is not None}
+    others = [(node, one) for node, one in known if node not in given]
+    kinds = ((str(one.__struct_config__.tag), one.q) for _, one in others)
+    keys = unique_keys(kinds, given.values())
+    return given | {node: key for (node, _), key in zip(others, keys, strict=True)}
 
 
 # ---------------------------------------------------------------------------------------- checks
@@ -158,18 +153,13 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
 def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterator[Diagnostic]:
     yield from _check_distinct(node, "options", "two options are the same: `{}`")
     count = len(fields.options)
-    answer = node.get("answer")
-    several = answer.items if isinstance(answer, ArrayNode) else ()
-    places = several or ((answer,) if answer is not None else ())
-    numbers = fields.answer if isinstance(fields.answer, tuple) else (fields.answer,)
-    for number, place in zip(numbers, places, strict=True):
+    spans = [item.span for item in node.items("answer")] or [node.place("answer")]
+    named = list(zip(fields.answers, spans, strict=True))
+    for number, span in named:
         if not 0 <= number < count:
             message = f"there is no option {number}: they are numbered 0 to {count - 1}"
-            yield diagnose("quiz-answer", place.span, message)
-    spans = [place.span for place in places]
-    yield from repeated(
-        zip(map(str, numbers), spans, strict=True), "quiz-answer", "the option {} is named twice"
-    )
+            yield diagnose("quiz-answer", span, message)
+    yield from repeated(named, "quiz-answer", "the option {} is named twice")
     if fields.feedback is not None and len(fields.feedback) != count:
         texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
         message = f"`feedback` has {texts} for {count} options"
@@ -178,9 +168,7 @@ def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterat
 
 
 def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagnostic]:
-    array = node.get(name)
-    items = array.items if isinstance(array, ArrayNode) else ()
-    named = [(item.value.strip(), item.span) for item in items if isinstance(item, StringNode)]
+    named = ((item.value.strip(), item.span) for item in node.strings(name))
     yield from repeated(named, "field-value", message)
 
 
@@ -197,26 +185,21 @@ def _question(
     common = (node.span, key, fields.label, text, explain, prose.each(node.get("hints")))
     match fields:
         case MultipleChoice() | Predict():
-            several = isinstance(fields.answer, tuple)
-            answers = fields.answer if isinstance(fields.answer, tuple) else (fields.answer,)
             sim = node.get("sim")
             lab = None
             if isinstance(sim, ObjectNode):
                 from coursebuild.features.lab.parse import sim_lab
 
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
-            options = _choices(node, fields.options, prose)
-            predict = isinstance(fields, Predict)
-            gate = isinstance(fields, Predict) and fields.gate
             run = node.get("run") if has_value(node, "run") else None
             return ChoiceQuestion(
                 *common,
-                options=options,
-                answers=tuple(sorted(answers)),
-                several=several,
+                options=_choices(node, fields.options, prose),
+                answers=tuple(sorted(fields.answers)),
+                several=isinstance(fields.answer, tuple),
                 sim=lab,
-                predict=predict,
-                gate=gate,
+                predict=isinstance(fields, Predict),
+                gate=isinstance(fields, Predict) and fields.gate,
                 gate_span=node.place("gate"),
                 run=None if run is None else one_line(run),
             )
@@ -231,19 +214,18 @@ def _question(
             script, line = node.place("of"), node.place("line")
             return OutputQuestion(*common, fields.of, script, fields.line, line)
         case OrderFields():
-            keys = QuestionKeys().each("item", fields.items)
+            keys = tuple(unique_keys(("item", text) for text in fields.items))
             return OrderQuestion(*common, prose.each(node.get("items")), keys)
         case _:
             assert_never(fields)
 
 
 def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[Choice, ...]:
-    options = node.get("options")
-    items = options.items if isinstance(options, ArrayNode) else ()
     feedback = prose.each(node.get("feedback"))
-    padded = feedback + ((),) * (len(items) - len(feedback))
-    keys = QuestionKeys().each("option", texts)
+    keys = unique_keys(("option", text) for text in texts)
     return tuple(
         Choice(item.span, key, prose.inlines(item), text)
-        for item, key, text in zip(items, keys, padded, strict=False)
+        for item, key, text in zip(
+            node.items("options"), keys, chain(feedback, repeat(())), strict=False
+        )
     )

@@ -58,6 +58,11 @@ class Chosen(Common, frozen=True, kw_only=True):
         Meta(description="one text for each option, said to a learner who takes it"),
     ] = None
 
+    @property
+    def answers(self) -> tuple[int, ...]:
+        """The indices of all right options."""
+        return self.answer if isinstance(self.answer, tuple) else (self.answer,)
+
 
 class MultipleChoice(Chosen, frozen=True, kw_only=True, tag_field="kind", tag="mcq"):
     """A question with options; with a list of answers all of them must be chosen."""
