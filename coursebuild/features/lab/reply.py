@@ -1,7 +1,7 @@
 """What an engine replies when it has tried a lab.
 
-Entry points: `read_reply`, `reply_bytes`; `unpack_arrays`, of arrays that are base64 in a reply.
-docs/explanation/how-labs-run.md says what a reply means.
+Entry points: `read_reply`, `reply_bytes`; `Parity`; `unpack_arrays`, of arrays that are base64 in a
+reply. docs/explanation/how-labs-run.md says what a reply means.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from coursebuild.features.lab.model import Entry
 _KINDS = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
 _LARGEST = 1 << 28
 """Bytes of a reply."""
+PARITY_RTOL = 1e-9
+"""How far (relative) the two engines may be apart over the first second, unless a lab says."""
 
 Count: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 53)]
 Number: TypeAlias = int | float
@@ -41,15 +43,40 @@ class MainPlots(TypedDict):
     plots: list[list[list[Number | None]]]
 
 
-class MainParity(TypedDict):
-    """How native MuJoCo repeats it, or why it cannot."""
+class Parity(Struct, frozen=True, kw_only=True):
+    """How native MuJoCo repeats it."""
 
-    unrepeated: NotRequired[str]
-    steps: NotRequired[Count]
-    timestep: NotRequired[Number]
-    first: NotRequired[Count | None]
-    relative: NotRequired[Number]
-    exact: NotRequired[bool]
+    unrepeated: str = ""
+    """Why it cannot; then all else says nothing."""
+    steps: Count = 0
+    timestep: Number = 0
+    """s."""
+    first: Count | None = None
+    """The first step after which the states differ; `None`: bit-identical."""
+    relative: Number = 0
+    """Largest difference relative to the largest number of the state, where it counts."""
+    exact: bool = False
+    """Whether nothing in the model can differ between two machines, not even in the last bit."""
+
+    def allowed(self, rtol: float | None) -> float:
+        """The relative difference that is allowed: the lab's own, or what its model may have."""
+        if rtol is not None:
+            return rtol
+        return 0.0 if self.exact else PARITY_RTOL
+
+    def within(self, rtol: float | None) -> bool:
+        """Whether the difference is allowed; one of 0 allows none of any size."""
+        allowed = self.allowed(rtol)
+        return self.first is None or (allowed > 0 and self.relative <= allowed)
+
+    def describe(self) -> str:
+        """For people."""
+        if self.unrepeated:
+            return f"not compared with native MuJoCo: {self.unrepeated}"
+        if self.first is None:
+            return f"bit-identical to native MuJoCo over {self.steps} steps"
+        same = f"bit-identical to native MuJoCo for {self.first - 1} of {self.steps} steps"
+        return f"{same}, then within {self.relative:.0e}" if self.relative > 0 else same
 
 
 class MainRecord(TypedDict):
@@ -80,7 +107,7 @@ class MainRun(TypedDict):
     arrows: dict[str, Number | str] | None
     fill: Number | None
     mostFill: Number | None
-    parity: MainParity | None
+    parity: Parity | None
     recorded: NotRequired[MainRecord | None]
     resetDiffers: ResetDifference | None
 

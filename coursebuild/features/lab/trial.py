@@ -18,18 +18,17 @@ from __future__ import annotations
 import functools
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, Tried
 from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.run.child import MEMORY
-from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.mjcf import model_files
-from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import fingerprint
@@ -38,9 +37,8 @@ from coursebuild.features.lab.custom import custom_lab
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
-from coursebuild.features.lab.export import difference as export_check
-from coursebuild.features.lab.export.trial import LabExport, exported
-from coursebuild.features.lab.files import LabOutput, LabRecord
+from coursebuild.features.lab.export.trial import LabExport, exported, recorded
+from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
 from coursebuild.features.lab.model import MJCF, TRIED, Lab
 from coursebuild.features.lab.models import model_of_lab, saved_model
@@ -48,14 +46,9 @@ from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 from coursebuild.features.lab.verdict import (
-    Parity,
     code_diagnostic,
-    deep_diagnostics,
-    far_diagnostics,
-    parity_diagnostics,
-    reset_diagnostics,
-    shallow_diagnostics,
-    trial_diagnostics,
+    failure_diagnostics,
+    remark_diagnostics,
 )
 
 _PARITY_SECONDS = 1.0
@@ -132,14 +125,11 @@ class _Findings(Struct, frozen=True):
     """What follows from the reply of a trial."""
 
     reply: TrialReply
-    parity: Parity | None
     failures: tuple[Diagnostic, ...]
     """What the lab cannot be shown with."""
     remarks: tuple[Diagnostic, ...]
-    config: str
-    """The lab's data with the camera that its trial has found."""
-    record: LabRecord | None
-    picture: bytes
+    output: LabOutput
+    """Without its model and its script."""
 
 
 class _Attempt(Struct, frozen=True):
@@ -160,7 +150,7 @@ class _Attempt(Struct, frozen=True):
         inputs = inputs_of(lab, module)
         try:
             mjb = saved_model(self.context, self.engines.native, self.model)
-            key = _key(inputs, mjb)
+            key = fingerprint((inputs.text, inputs.around, mjb))
             read = functools.partial(self._read, module, key)
             findings = self.context.memory.store.get("labs", key, read, shared=True)
             cached = findings is not None
@@ -172,8 +162,7 @@ class _Attempt(Struct, frozen=True):
         except NativeError as error:
             wrong = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
             return self._failed(module, began), [wrong]
-        reply, parity = findings.reply, findings.parity
-        found = [*findings.failures]
+        reply, found = findings.reply, findings.failures
         offer = LabExport(None) if found else self._export(reply)
         path, text = self.model.path, self.model.text
         own = () if lab.xml is not None else (path,)
@@ -193,14 +182,12 @@ class _Attempt(Struct, frozen=True):
             seconds=reply.seconds if cached else time.monotonic() - began,
             steps_per_second=reply.steps_per_second,
             tried=len(reply.tried),
-            parity=_parity_text(reply, parity, offer),
+            parity=_parity_text(reply, offer),
             fill=None if reply.main is None else reply.main["fill"],
             cached=cached,
             unexported=offer.reason,
         )
-        output = LabOutput(
-            module.code, findings.config, mjb, findings.record, findings.picture, offer.script
-        )
+        output = replace(findings.output, mjb=mjb, script=offer.script)
         return TrialResult(lab.span, line, output), [*found, *findings.remarks]
 
     def _read(self, module: LabModule, key: str, data: bytes) -> _Findings:
@@ -213,29 +200,13 @@ class _Attempt(Struct, frozen=True):
         lab, reply = self.lab, read_reply(data)
         if reply.main is None and not reply.failures:
             raise ValueError("a lab starts, or it is said why not")
-        parity = _parity(reply)
-        found = (
-            *trial_diagnostics(lab, reply),
-            *self._version(reply),
-            *shallow_diagnostics(lab, reply),
-            *(parity_diagnostics(lab, parity) if parity is not None else ()),
-        )
-        remarks = (
-            *deep_diagnostics(lab, reply),
-            *reset_diagnostics(lab, reply),
-            *far_diagnostics(lab, reply),
-        )
-        failures, main = found if lab.is_of_text else (), reply.main
-        drawn = self.context.static and not failures and main is not None
-        return _Findings(
-            reply,
-            parity,
-            failures,
-            remarks,
-            _framed(module.config, main),
-            lab_record(lab, main) if drawn and main is not None else None,
-            self._picture(key, main) if drawn and main is not None else b"",
-        )
+        failures = tuple(failure_diagnostics(lab, reply)) if lab.is_of_text else ()
+        remarks, main = tuple(remark_diagnostics(lab, reply)), reply.main
+        output = LabOutput(module.code, _framed(module.config, main))
+        if self.context.static and not failures and main is not None:
+            picture = self._picture(key, main)
+            output = replace(output, record=lab_record(lab, main), picture=picture)
+        return _Findings(reply, failures, remarks, output)
 
     def _failed(self, module: LabModule, began: float) -> TrialResult:
         """A lab that could not be tried."""
@@ -246,7 +217,7 @@ class _Attempt(Struct, frozen=True):
 
     def _mistakes(self, mjb: bytes) -> list[Diagnostic]:
         """What no engine could run, and what the code names and is not there."""
-        browser, code = self.engines.browser, pieces(self.lab)
+        browser, code = self.engines.browser, tuple(pieces(self.lab))
         wrong = browser.mistakes(code)
         found = [
             code_diagnostic(self.lab, piece, text)
@@ -270,7 +241,7 @@ class _Attempt(Struct, frozen=True):
         reply = self.engines.browser.trial(request, mjb, self.seconds)
         main = reply["main"]
         if main is not None and main["parity"] is not None:
-            main["recorded"] = export_check.recorded(main["parity"], self._horizon(main))
+            main["recorded"] = recorded(main["parity"], self._horizon(main))
             main["parity"] = self._compared(main, mjb)
         reply["seconds"] = round(time.monotonic() - began, 4)
         reply["made"] = int(time.time())
@@ -306,11 +277,6 @@ class _Attempt(Struct, frozen=True):
             return LabExport(None)
         return exported(self.context, self.engines.native, self.trial, self.lab, trial.main)
 
-    def _version(self, trial: TrialReply) -> Iterator[Diagnostic]:
-        if trial.version != engine_version():
-            message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
-            yield diagnose("lab-engine", self.lab.span.first_line(), message)
-
     def _picture(self, key: str, main: MainRun) -> bytes:
         """The start of the main run, drawn."""
         from coursebuild.features.lab.picture.static import draw_picture
@@ -337,24 +303,10 @@ def _is_lasting(reply: TrialReply) -> bool:
     return all(failure.kind not in _TRANSIENT for failure in reply.failures)
 
 
-def _key(inputs: Inputs, mjb: bytes) -> str:
-    """What the reply of a trial is kept under."""
-    return fingerprint((inputs.text, inputs.around, mjb))
-
-
-def _parity(reply: TrialReply) -> Parity | None:
-    run = reply.main["parity"] if reply.main is not None else None
-    if run is None or "unrepeated" in run:
-        return None
-    return Parity(run["steps"], run["timestep"], run["first"], run["relative"], run["exact"])
-
-
-def _parity_text(reply: TrialReply, parity: Parity | None, offer: LabExport) -> str:
-    if parity is not None:
-        return parity.describe()
+def _parity_text(reply: TrialReply, offer: LabExport) -> str:
     run = reply.main["parity"] if reply.main is not None else None
     if run is None:
         return ""
-    if offer.script is not None:
+    if run.unrepeated and offer.script is not None:
         return "compared with native MuJoCo as its Python export"
-    return f"not compared with native MuJoCo: {run['unrepeated']}"
+    return run.describe()

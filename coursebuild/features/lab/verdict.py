@@ -1,7 +1,7 @@
 """What a trial found, as diagnostics at the entries of the lesson.
 
-Entry points: `trial_diagnostics(lab, trial)`, `deep_diagnostics(lab, trial)`,
-`reset_diagnostics(lab, trial)`, `parity_diagnostics(lab, parity)`, `code_diagnostic`.
+Entry points: `failure_diagnostics` and `remark_diagnostics` of a lab and its trial;
+`code_diagnostic`.
 """
 
 from __future__ import annotations
@@ -9,18 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from msgspec import Struct
-
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
+from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.model import MJCF, Entry, Lab
-from coursebuild.features.lab.reply import TrialFailure, TrialReply
+from coursebuild.features.lab.reply import Parity, TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
-
-PARITY_RTOL = 1e-9
-"""How far (relative) the two engines may be apart over the first second, unless a lab says."""
 
 _RULES = {
     "throws": "lab-throws",
@@ -36,38 +32,6 @@ _RULES = {
     "engine": "lab-engine",
     "shared": "lab-shared",
 }
-
-
-class Parity(Struct, frozen=True):
-    """A run of the browser's engine beside the native one."""
-
-    steps: int
-    timestep: float
-    """s."""
-    first: int | None
-    """The first step after which the states differ; `None`: bit-identical."""
-    relative: float
-    """Largest difference relative to the largest number of the state, where it counts."""
-    exact: bool = False
-    """Whether nothing in the model can differ between two machines, not even in the last bit."""
-
-    def allowed(self, rtol: float | None) -> float:
-        """The relative difference that is allowed: the lab's own, or what its model may have."""
-        if rtol is not None:
-            return rtol
-        return 0.0 if self.exact else PARITY_RTOL
-
-    def within(self, rtol: float | None) -> bool:
-        """Whether the difference is allowed; one of 0 allows none of any size."""
-        allowed = self.allowed(rtol)
-        return self.first is None or (allowed > 0 and self.relative <= allowed)
-
-    def describe(self) -> str:
-        """For people."""
-        if self.first is None:
-            return f"bit-identical to native MuJoCo over {self.steps} steps"
-        same = f"bit-identical to native MuJoCo for {self.first - 1} of {self.steps} steps"
-        return f"{same}, then within {self.relative:.0e}" if self.relative > 0 else same
 
 
 def _named(lab: Lab, entry: Entry) -> str:
@@ -113,15 +77,32 @@ _HELP = {
 }
 
 
-def trial_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
+def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+    """What a lab cannot be shown with: failures, another engine, and what it says in vain."""
+    yield from _failures(lab, trial)
+    if trial.version != engine_version():
+        message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
+        yield diagnose("lab-engine", lab.span.first_line(), message)
+    yield from _shallow(lab, trial)
+    if trial.main is not None and trial.main["parity"] is not None:
+        yield from _parity(lab, trial.main["parity"])
+
+
+def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+    """What is to be said of a lab that can be shown."""
+    yield from _deep(lab, trial)
+    yield from _reset(lab, trial)
+    yield from _far(lab, trial)
+
+
+def _failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Each failure of a trial, at its entry.
 
     What MuJoCo says of the main run it says again of every act; once is enough.
     """
     told = [f for f in trial.failures if f.kind != _DEEP and not _is_claimed(lab, f)]
     always = {f.kind for f in told if f.entry == () and f.kind in _OF_MUJOCO}
-    failures = [f for f in told if f.entry == () or f.kind not in always]
-    return tuple(_failure(lab, failure) for failure in failures)
+    yield from (_failure(lab, f) for f in told if f.entry == () or f.kind not in always)
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
@@ -144,16 +125,15 @@ _DEEP, _DIVERGED = "deep", "diverged"
 _OF_MUJOCO = ("warning", _DIVERGED)
 
 
-def deep_diagnostics(lab: Lab, trial: TrialReply) -> tuple[Diagnostic, ...]:
+def _deep(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Bodies that lie deep in each other, and are not to; once where the main run has some."""
-    if lab.verify.deep:
-        return ()
-    failures = [f for f in trial.failures if f.kind == _DEEP]
-    always = [f for f in failures if f.entry == ()]
-    return tuple(_failure(lab, failure) for failure in always or failures)
+    if not lab.verify.deep:
+        failures = [f for f in trial.failures if f.kind == _DEEP]
+        always = [f for f in failures if f.entry == ()]
+        yield from (_failure(lab, failure) for failure in always or failures)
 
 
-def shallow_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _shallow(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """That no bodies lie deep in each other, though the lab says that they are to."""
     if lab.verify.deep and not any(failure.kind == _DEEP for failure in trial.failures):
         what = "the lab says `deep`, and no bodies lay deep in each other"
@@ -161,7 +141,7 @@ def shallow_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
         yield diagnose("lab-shallow", span, what, help="take `deep` away")
 
 
-def far_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _far(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """That what moves is small in the picture, because of the lab's own camera."""
     main = trial.main
     if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
@@ -248,7 +228,7 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
             return message, ""
 
 
-def reset_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """A reset after the main run that led to another state than that of the start."""
     found = trial.main["resetDiffers"] if trial.main is not None else None
     if found is None:
@@ -267,7 +247,7 @@ def reset_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     yield diagnose("lab-reset", lab.place(entry), message, help=help)
 
 
-def parity_diagnostics(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
+def _parity(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
     """A difference between the engines that is larger than allowed."""
     if parity.within(lab.verify.rtol):
         return

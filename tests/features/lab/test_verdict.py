@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 
+from coursebuild.core.run.versions import engine_version
 from coursebuild.features.lab.reply import (
     Attempt,
+    Parity,
     TrialFailure,
     TrialReply,
     read_reply,
     reply_bytes,
 )
-from coursebuild.features.lab.verdict import (
-    Parity,
-    trial_diagnostics,
-)
+from coursebuild.features.lab.verdict import failure_diagnostics
 from support.lab_values import BALL, lab_of, make_lab
 
 LINES = """{
@@ -99,7 +98,7 @@ def test_what_is_so_from_the_start_is_told_once() -> None:
         TrialFailure(("controls", 1), "warning", "badctrl", 1.5, Attempt("b")),
         TrialFailure(("controls", 2, "run"), "throws", "x", 1.5, Attempt("c")),
     )
-    told = trial_diagnostics(make_lab(LINES), TrialReply("", (), failures, None))
+    told = failure_diagnostics(make_lab(LINES), TrialReply(engine_version(), (), failures, None))
     assert [d.rule for d in told] == ["lab-diverged", "lab-warning", "lab-throws"]
 
 
@@ -110,7 +109,7 @@ def test_parity_in_words() -> None:
         (31, 0.0, f"{whole} for 30 of 100 steps"),
         (31, 2.2e-12, f"{whole} for 30 of 100 steps, then within 2e-12"),
     ):
-        assert Parity(100, 0.01, first, relative).describe() == text
+        assert Parity(steps=100, first=first, relative=relative).describe() == text
 
 
 def test_difference_from_native_mujoco_is_allowed_as_the_lab_or_its_model_says() -> None:
@@ -125,21 +124,21 @@ def test_difference_from_native_mujoco_is_allowed_as_the_lab_or_its_model_says()
         (1e-16, None, True, False),
         (1e-16, 1e-12, True, True),
     ):
-        differs = Parity(10, 0.01, 3, relative, exact)
+        differs = Parity(first=3, relative=relative, exact=exact)
         assert differs.within(rtol) is allowed, (relative, rtol, exact)
-        assert Parity(10, 0.01, None, 0.0, exact).within(rtol)
+        assert Parity(exact=exact).within(rtol)
 
 
 def test_failure_without_a_message_is_told() -> None:
     reply = {
-        "version": "3.14.0",
+        "version": engine_version(),
         "tried": [{"entry": [], "what": "start"}],
         "failures": [{"entry": [], "kind": "throws", "at": None}],
         "main": None,
     }
     trial = read_reply(reply_bytes(reply))
     assert (trial.tried, trial.steps_per_second) == ((Attempt("start"),), None)
-    (told,) = trial_diagnostics(make_lab(LINES), trial)
+    (told,) = failure_diagnostics(make_lab(LINES), trial)
     assert told.message == "the lab throws: something that has no text"
 
 
@@ -147,7 +146,7 @@ def test_what_only_the_browsers_engine_says_of_an_edited_model_is_told_at_its_li
     lab = lab_of('```lab mjcf\n<mujoco>\n  <include file="part.xml"/>\n</mujoco>\n```\n')
     message = "XML Error: Error opening file 'part.xml'\nElement 'include', line 2\n\n"
     failure = TrialFailure((), "engine", message, None, Attempt("start"))
-    (told,) = trial_diagnostics(lab, TrialReply("3.14.0", (), (failure,), None))
+    (told,) = failure_diagnostics(lab, TrialReply(engine_version(), (), (failure,), None))
     assert (told.rule, told.span.text) == ("lab-engine", '<include file="part.xml"/>')
     said = "the browser's engine says: error opening file 'part.xml' in <include>"
     assert (told.message, "beside which there are no files" in told.help) == (said, True)

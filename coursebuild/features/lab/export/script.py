@@ -30,6 +30,7 @@ from coursebuild.features.lab.javascript import UntranslatableError
 from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.schema import Button, Control, Select, Slider
 
+_HALF_CHARACTER = re.compile("[\ud800-\udfff]")
 _PLACE = re.compile(r"\{\{control:(\d+)\}\}")
 _TEMPLATE = Path(__file__).with_name("script.jinja")
 _WIDTH = 88
@@ -140,7 +141,7 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
         resets="sim.reset" in "".join(button.run for button in pressed.values()),
         readouts=[(label, translate_expression(e, fields), digits) for label, e, digits in values],
     )
-    if len(_PLACE.findall(text)) != len(setters) or not _is_unicode(text):
+    if len(_PLACE.findall(text)) != len(setters) or _HALF_CHARACTER.search(text):
         raise UntranslatableError("a text that no script can hold")
     return Export(metadata.name, text, tuple(names[i] for i in pressed))
 
@@ -235,11 +236,3 @@ def _long_text(text: str) -> str:
     if "\\" in text or '"""' in text or odd or text.endswith('"'):
         return repr(text)
     return f'"""\\\n{text}"""'
-
-
-def _is_unicode(text: str) -> bool:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True

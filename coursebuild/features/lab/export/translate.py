@@ -69,7 +69,8 @@ def translate_expression(code: str, fields: Collection[str]) -> str:
 def context_fields(pieces: Iterable[str]) -> dict[str, str]:
     """The fields of `ctx`, those that code assigns to, with what they hold before."""
     found: dict[str, str] = {}
-    for node in (node for code in pieces for node in _nodes(code)):
+    statements = (statement for code in pieces for statement in parse_statements(code))
+    for node in (node for statement in statements for node in walk(statement)):
         if node.type == "assignment_expression":
             match dotted_name(field(node, "left")):
                 case ("ctx", name):
@@ -81,12 +82,6 @@ def context_fields(pieces: Iterable[str]) -> dict[str, str]:
         if keyword.iskeyword(name) or name.startswith("__") or not name.isidentifier():
             raise UntranslatableError(f"the name `ctx.{name}`")
     return dict(sorted(found.items()))
-
-
-def _nodes(code: str) -> Iterator[Node]:
-    """All nodes of a piece of code that can be translated."""
-    for statement in parse_statements(code):
-        yield from walk(statement)
 
 
 class _Statements(Expressions):

@@ -1,12 +1,16 @@
 """The script that a lab's page offers, run natively and held against the lab's trial.
 
-Entry point: `exported(…)`. A script whose result is not that of the lab, or that fails for any
-value that the page may put into it, is not offered.
+Entry points: `exported(…)`; `recorded(run, …)`, which keeps of a trial what is compared. A script
+whose result is not that of the lab, or that fails for any value that the page may put into it, is
+not offered.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct
 
@@ -16,7 +20,6 @@ from coursebuild.core.run.versions import engine_version
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
-from coursebuild.features.lab.export.difference import difference
 from coursebuild.features.lab.export.script import (
     ExportMetadata,
     export_script,
@@ -25,13 +28,17 @@ from coursebuild.features.lab.export.script import (
     initial_values,
 )
 from coursebuild.features.lab.model import Lab
-from coursebuild.features.lab.reply import MainRun
+from coursebuild.features.lab.reply import PARITY_RTOL, MainRun, unpack_arrays
 from coursebuild.features.lab.schema import Select, Slider
-from coursebuild.features.lab.verdict import PARITY_RTOL
 
 _SECONDS = 5.0
 _MOST_STEPS = 20_000
 """How long a trial's main run is, unless the lab says so."""
+_RELATIVE = 1e-9
+_ABSOLUTE = 1e-12
+"""How far readouts of the same state may be apart."""
+_INFINITE: dict[Any, str] = {math.inf: "∞", -math.inf: "−∞"}
+"""As the trial has them."""
 
 
 class LabExport(Struct, frozen=True):
@@ -102,7 +109,7 @@ def _offered(
     if run["failure"]:
         return LabExport(None, f"the script fails: {run['failure']}")
     rtol = PARITY_RTOL if lab.verify.rtol is None else lab.verify.rtol
-    reason = difference(main, run, rtol)
+    reason = _difference(main, run, rtol)
     return LabExport(None, reason) if reason else LabExport((export.name, export.text))
 
 
@@ -137,3 +144,66 @@ def _others(lab: Lab) -> list[dict[int, float | str]]:
             values = [value for _, value in control.options]
         found += [{**start, i: value} for value in values if value != start[i]]
     return found
+
+
+# --- what the script does, beside what the lab did
+
+
+def recorded(run: dict[str, Any], horizon: int) -> dict[str, Any] | None:
+    """What is kept of the main run of a trial, as JSON; `None` where no step was made.
+
+    The state is the last one recorded before the step `horizon`, after which a difference in the
+    last bit may have grown.
+    """
+    steps, stride, width = run["steps"], run["stride"], run["width"]
+    if steps < stride:
+        return None
+    row = max(1, min(horizon, steps) // stride)
+    states = unpack_arrays(run["states"])
+    return {
+        "steps": steps,
+        "last": int(unpack_arrays(run["checksums"])[-1]),
+        "near": row * stride,
+        "state": states[(row - 1) * width : row * width].tolist(),
+    }
+
+
+def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
+    """How a script's run differs from the main run of the trial, in words; `None` if it does not.
+
+    The state that was recorded may be apart by `rtol`, relative to its largest number, which counts
+    as at least 1. Where the end is the same to the last bit, its readouts are compared, too.
+    """
+    kept = main["recorded"]
+    assert kept is not None, "where nothing was recorded, no script is offered"
+    if run["steps"] != kept["steps"]:
+        return f"it makes {run['steps']} steps, and the lab {kept['steps']}"
+    apart = _apart(run["state"], kept["state"])
+    if not apart <= rtol:
+        return f"its state after {kept['near']} steps is apart from the lab's by {apart:.1e}"
+    first, last = main["pictures"][0], main["pictures"][-1]
+    found = _readouts(first["readouts"], run["start"], "start")
+    if found is None and run["last"] == kept["last"]:
+        found = _readouts(last["readouts"], run["end"], "end")
+    return found
+
+
+def _apart(mine: Sequence[float], theirs: Sequence[float]) -> float:
+    if len(mine) != len(theirs):
+        return math.inf
+    largest = max([1.0, *(abs(x) for x in theirs)])
+    return max([0.0, *(abs(a - b) / largest for a, b in zip(mine, theirs, strict=True))])
+
+
+def _readouts(theirs: Any, mine: list[list[Any]], when: str) -> str | None:
+    for (label, value), known in zip(mine, theirs or (), strict=False):
+        if known is None:  # not a number, which is a gap
+            continue
+        value = _INFINITE.get(value, value)
+        if isinstance(value, str) or isinstance(known, str):
+            same = value == known
+        else:
+            same = math.isclose(value, known, rel_tol=_RELATIVE, abs_tol=_ABSOLUTE)
+        if not same:
+            return f"its readout `{label}` is {value} at the {when}, and that of the lab {known}"
+    return None
