@@ -1,7 +1,7 @@
 """The marks of Markdown: links, fences, tables, escapes.
 
-Entry points: `escaped`, `guarded`; `link`, `picture`, `code_span`, `fence`, `table`, `quoted`,
-`hang`.
+Entry points: `escaped`, `escaped_line`, `guarded`; `link`, `picture`, `code_span`, `fence`,
+`table`, `quoted`, `hang`.
 """
 
 from __future__ import annotations
@@ -54,6 +54,11 @@ def escaped(text: str) -> str:
     return _MARKS.sub(lambda match: f"\\{match[0]}", text)
 
 
+def escaped_line(text: str) -> str:
+    """Text in one line with all its marks escaped."""
+    return escaped(" ".join(text.split()))
+
+
 def link(text: str, href: str, title: str = "") -> str:
     """A link; `text` is Markdown."""
     return f"[{text}]({_destination(href)}{_title(title)})"
@@ -61,8 +66,7 @@ def link(text: str, href: str, title: str = "") -> str:
 
 def picture(alt: str, url: str, title: str = "") -> str:
     """A picture; `alt` is plain text."""
-    alt = escaped(" ".join(alt.split()))
-    return f"![{alt}]({_destination(url)}{_title(title)})"
+    return f"![{escaped_line(alt)}]({_destination(url)}{_title(title)})"
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[str] = ()) -> str:

@@ -53,22 +53,15 @@ def check_model_names(
 
 
 def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
-    span, key = lab.place(("key",)), lab.fields.key
+    key = lab.fields.key
     if isinstance(key, int) and not 0 <= key < len(facts.keyframes):
-        have = f"it has {len(facts.keyframes)}" if facts.keyframes else "it has none"
-        yield diagnose("lab-name", span, f"the model has no keyframe {key}: {have}, counted from 0")
-    names = [name for name in facts.keyframes if name]
-    if isinstance(key, str) and key not in names:
-        yield diagnose(
-            "lab-name",
-            span,
-            f"the model has no keyframe `{key}`",
-            help=did_you_mean(key, names),
-        )
-    if lab.fields.trail is not None and lab.fields.trail not in facts.sites:
-        yield diagnose(
-            "lab-name",
-            lab.place(("trail",)),
-            f"the model has no site `{lab.fields.trail}`",
-            help=did_you_mean(lab.fields.trail, facts.sites),
-        )
+        have = f"it has {len(facts.keyframes) or 'none'}"
+        message = f"the model has no keyframe {key}: {have}, counted from 0"
+        yield diagnose("lab-name", lab.place(("key",)), message)
+    for field, what, name, names in (
+        ("key", "keyframe", key, [name for name in facts.keyframes if name]),
+        ("trail", "site", lab.fields.trail, facts.sites),
+    ):
+        if isinstance(name, str) and name not in names:
+            message, help = f"the model has no {what} `{name}`", did_you_mean(name, names)
+            yield diagnose("lab-name", lab.place((field,)), message, help=help)

@@ -71,22 +71,17 @@ class LabModule(Struct, frozen=True):
     """What is data, as JSON."""
 
 
-def pieces(lab: Lab) -> tuple[LabCode, ...]:
+def pieces(lab: Lab) -> Iterator[LabCode]:
     """Every piece of code of a lab, in the order of its fields."""
-    return tuple(_pieces(lab))
-
-
-def _pieces(lab: Lab) -> Iterator[LabCode]:
     for name in ("setup", "controller"):
         if code := getattr(lab.fields, name):
             yield LabCode((name,), "statements", code)
     for i, control in enumerate(lab.fields.controls):
         if isinstance(control, Button):
             yield LabCode(("controls", i, "run"), "statements", control.run)
-            continue
-        if control.set is not None:
+        elif control.set is not None:
             yield LabCode(("controls", i, "set"), "target", control.set)
-        if control.apply is not None:
+        elif control.apply is not None:
             yield LabCode(("controls", i, "apply"), "setter", control.apply)
     for i, readout in enumerate(lab.fields.readouts):
         yield LabCode(("readouts", i, "expr"), "expression", readout.expr)
@@ -115,13 +110,13 @@ def _members(lab: Lab) -> Iterator[tuple[str, str]]:
             yield name, functions[(name,)]
     controls = (_control(functions, i, control) for i, control in enumerate(fields.controls))
     yield "controls", _list(controls)
-    yield "readouts", _list(functions["readouts", i, "expr"] for i in range(len(fields.readouts)))
+    yield "readouts", _list(functions["readouts", i, "expr"] for i, _ in enumerate(fields.readouts))
     plots = (
-        _list(functions["plots", i, "traces", j, "expr"] for j in range(len(plot.traces)))
+        _list(functions["plots", i, "traces", j, "expr"] for j, _ in enumerate(plot.traces))
         for i, plot in enumerate(fields.plots)
     )
     yield "plots", _list(plots)
-    claims = (functions.get(("expect", i, "expr"), "null") for i in range(len(fields.expect)))
+    claims = (functions.get(("expect", i, "expr"), "null") for i, _ in enumerate(fields.expect))
     yield "expect", _list(claims)
     if fields.goal is not None:
         yield "goal", functions["goal", "expr"]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 
+from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.features import PublishedTrials
@@ -32,7 +33,7 @@ class LabRecord(Struct, frozen=True):
     """Label and value at the end of the main run."""
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
-    plots: tuple[str, ...]
+    plots: tuple[Markup, ...]
     """SVG elements, one a plot."""
 
 

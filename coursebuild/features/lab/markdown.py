@@ -8,16 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from coursebuild.core.model import ModelTarget
-from coursebuild.core.pages.marks import code_span, escaped, fence, link, picture, table
-from coursebuild.features.lab.model import MJCF, Lab
-from coursebuild.features.lab.page import (
-    LabView,
-    RecordedView,
-    lab_view,
-    shown_lab,
-    start_name,
+from coursebuild.core.pages.marks import (
+    code_span,
+    escaped,
+    escaped_line,
+    fence,
+    link,
+    picture,
+    table,
 )
+from coursebuild.features.lab.model import MJCF, Lab
+from coursebuild.features.lab.page import LabView, RecordedView, page_view
 
 if TYPE_CHECKING:
     from coursebuild.core.features import MarkdownWriter
@@ -25,19 +26,17 @@ if TYPE_CHECKING:
 
 def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     """A lab as it was recorded, with a link to where it runs."""
-    words, page = writer.words, writer.page
-    live = shown_lab(page, lab)
-    view = lab_view(page.renderer.words, page.place, lab, live, page.shown.engine)
+    words, view = writer.words, page_view(writer.page, lab)
     parts = [f"**{words('lab.label')}: {escaped(view.title)}**"]
     if view.recorded is not None:
         parts += _recorded(writer, view.recorded)
     if lab.goal:
         parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
-    parts.append(_about(writer, lab, view))
+    parts.append(_about(writer, view))
     if lab.kind == MJCF and lab.xml is not None:
         parts.append(fence("xml", lab.xml.text))
     if view.controls:
-        rows = [(_cell(control.label), _cell(control.values)) for control in view.controls]
+        rows = [(escaped_line(label), escaped_line(values)) for label, values in view.controls]
         parts.append(table((words("lab.control"), words("lab.range")), rows))
     shows = _shows(writer, view)
     parts.append("\n".join(f"- {escaped(name)}: {escaped(', '.join(of))}" for name, of in shows))
@@ -48,22 +47,21 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
 def _recorded(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
     """The picture, and the readouts at the end."""
     yield picture(recorded.alt, writer.locate(recorded.picture))
-    if recorded.readouts:
+    if readouts := recorded.record.readouts:
         yield f"{escaped(recorded.at)}:"
-        rows = [(_cell(label), _cell(value)) for label, value in recorded.readouts]
+        rows = [(escaped_line(label), escaped_line(value)) for label, value in readouts]
         yield table((writer.words("lab.readouts"), ""), rows)
 
 
-def _about(writer: MarkdownWriter, lab: Lab, view: LabView) -> str:
+def _about(writer: MarkdownWriter, view: LabView) -> str:
     """What is simulated, and from where to where."""
     words = writer.words
     about = f"{words('lab.static_xml')}."
     if view.model is not None:
-        name = link(escaped(view.model), writer.href(ModelTarget(view.model)))
+        name = link(escaped(view.model), writer.locate(view.model_href))
         about = f"{words('lab.static')} {name}."
-    start = start_name(writer.page, lab)
-    if start:
-        about += f" {words('lab.start')} {code_span(start)}."
+    if view.start:
+        about += f" {words('lab.start')} {code_span(view.start)}."
     if view.stop is not None:
         about += f" {words('lab.stops', t=view.stop)}"
     return about
@@ -74,11 +72,6 @@ def _shows(writer: MarkdownWriter, view: LabView) -> Iterator[tuple[str, tuple[s
     texts = writer.page.renderer.words
     if view.readouts and view.recorded is None:
         yield texts("lab.readouts"), view.readouts
-    for plot in view.plots:
-        yield plot.title, plot.traces + plot.marks
+    yield from view.plots
     if view.overlays:
         yield texts("lab.overlays"), view.overlays
-
-
-def _cell(text: str) -> str:
-    return escaped(" ".join(text.split()))

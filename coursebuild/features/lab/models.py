@@ -16,10 +16,8 @@ def model_of_lab(context: TrialContext, lab: Lab) -> Source | None:
     """A lab's model; `None` for one that does not compile, as is told already."""
     if lab.xml is not None:
         return Source("models/.lab.xml", lab.xml.text)
-    compiled = context.models.get(lab.fields.model or "")
-    if compiled is None or compiled.facts is None:
-        return None
-    return model_of_course(context, lab.fields.model or "")
+    compiled = context.models.get(name := lab.fields.model or "")
+    return model_of_course(context, name) if compiled and compiled.facts else None
 
 
 def model_of_course(context: TrialContext, name: str) -> Source | None:

@@ -1,8 +1,8 @@
 """Labs as a page shows them before they run: what they are, what can be changed, what is shown.
 
-Entry points: `draw_lab(page, block)`, `index_lab`; `lab_view`, what its template shows. No control
-is drawn that does nothing: the page's script puts the live instrument into `data-lab` when it
-starts, and reads its configuration there.
+Entry points: `draw_lab(page, block)`, `index_lab`; `page_view` and `lab_view`, what is shown. No
+control is drawn that does nothing: the page's script puts the live instrument into `data-lab` when
+it starts, and reads its configuration there.
 """
 
 from __future__ import annotations
@@ -20,45 +20,24 @@ from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.urls import Place
-from coursebuild.features.lab.files import ShownLab
+from coursebuild.features.lab.files import LabRecord, ShownLab
 from coursebuild.features.lab.model import MJCF, Lab
-from coursebuild.features.lab.schema import Control, Select, Slider
+from coursebuild.features.lab.schema import Control, Plot, Select, Slider
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
 
 
-class ControlView(Struct, frozen=True):
-    """A row of the table of controls."""
-
-    label: str
-    values: str
-    """Range or options, and what it is at first, in words."""
-
-
 class RecordedView(Struct, frozen=True):
-    """What the trial recorded, ready for the template."""
+    """What the trial recorded, and what is said of it."""
 
+    record: LabRecord
     picture: str
-    width: int
-    height: int
     alt: str
-    bar: float
-    """Length of the bar of its scale, pixels, and of what it stands for."""
     length: str
-    readouts: tuple[tuple[str, str], ...]
-    plots: tuple[Markup, ...]
+    """Of the bar that shows the scale of the picture."""
     at: str
     proven: str
-
-
-class PlotView(Struct, frozen=True):
-    """A plot: its axes and the lines in it."""
-
-    title: str
-    traces: tuple[str, ...]
-    marks: tuple[str, ...]
-    """Reference lines."""
 
 
 class LabView(Struct, frozen=True):
@@ -75,25 +54,23 @@ class LabView(Struct, frozen=True):
     model_href: str
     start: str | None
     stop: str | None
-    controls: tuple[ControlView, ...]
+    controls: tuple[tuple[str, str], ...]
+    """Labels; range or options, and what it is at first, in words."""
     readouts: tuple[str, ...]
-    plots: tuple[PlotView, ...]
+    plots: tuple[tuple[str, tuple[str, ...]], ...]
+    """Axes, and the lines with those that are for reference."""
     overlays: tuple[str, ...]
     recorded: RecordedView | None
 
 
 def draw_lab(page: PageContext, block: Lab) -> Markup:
     """A lab in its static form."""
-    live, model, words = shown_lab(page, block), block.fields.model, page.renderer.words
-    view = lab_view(words, page.place, block, live, page.shown.engine)
-    if model is not None:
-        view = replace(view, model_href=page.href(ModelTarget(model)))
-    address = ""  # from paper to the lab, where it is known where the site will stand
-    if live is not None and page.shown.address:
-        address = f"{page.shown.address}#{quote(live.name)}"
+    view, words, address = page_view(page, block), page.renderer.words, ""
+    if view.key and page.shown.address:  # from paper to the lab, where its place is known
+        address = f"{page.shown.address}#{quote(view.key)}"
     return page.template(
         "lab/lab.html",
-        lab=replace(view, start=start_name(page, block)),
+        lab=view,
         docked=block.fields.dock,
         opens_page=page.document.blocks[:1] == (block,),
         address=address,
@@ -105,14 +82,24 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
     )
 
 
+def page_view(page: PageContext, block: Lab) -> LabView:
+    """A lab of a document on its page."""
+    found, model = page.shown.trials.get(block.span.start), block.fields.model
+    live = found if isinstance(found, ShownLab) else None
+    view = lab_view(page.renderer.words, page.place, block, live, page.shown.engine)
+    href = "" if model is None else page.href(ModelTarget(model))
+    return replace(view, model_href=href, start=_start(page, block))
+
+
 def lab_view(
     words: Strings, place: Place, block: Lab, live: ShownLab | None, engine: str
 ) -> LabView:
     """A lab as seen from a place; `live` is what is shown of its trial."""
     fields = block.fields
+    title = fields.title or words("lab.untitled")
     return LabView(
         kind=block.kind,
-        title=title_of(words, block),
+        title=title,
         key=live.name if live is not None else "",
         config=place.href(live.config) if live is not None else "",
         script=place.href(live.script) if live is not None else "",
@@ -120,11 +107,11 @@ def lab_view(
         model_href="",
         start=None,
         stop=number(fields.stopAt) if fields.stopAt is not None else None,
-        controls=tuple(control_view(words, control) for control in fields.controls),
+        controls=tuple((control.label, _values(words, control)) for control in fields.controls),
         readouts=tuple(readout.label for readout in fields.readouts),
-        plots=tuple(plot_view(words, block, index) for index in range(len(fields.plots))),
+        plots=tuple(_plot(words, plot) for plot in fields.plots),
         overlays=tuple(words(f"overlay.{name}") for name in fields.toggles),
-        recorded=_recorded(words, place, block, live, engine),
+        recorded=_recorded(words, place, title, live, engine),
     )
 
 
@@ -134,12 +121,6 @@ def _source(page: PageContext, block: Lab) -> Markup:
         return Markup("")
     html = page.highlight("xml", block.xml.text.rstrip("\n"))
     return page.template("blocks/code.html", language="xml", html=html)
-
-
-def shown_lab(page: PageContext, block: Lab) -> ShownLab | None:
-    """What the page has of the lab's trial; `None` where it was not tried."""
-    found = page.shown.trials.get(block.span.start)
-    return found if isinstance(found, ShownLab) else None
 
 
 def lab_picture(block: Lab, shown: Struct | None) -> Picture | None:
@@ -165,37 +146,23 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
 
 
 def _recorded(
-    words: Strings, place: Place, block: Lab, live: ShownLab | None, engine: str
+    words: Strings, place: Place, title: str, live: ShownLab | None, engine: str
 ) -> RecordedView | None:
     """What the trial recorded; `None` where it did not come to its end."""
     record = live.record if live is not None else None
     if live is None or record is None:
         return None
     return RecordedView(
+        record,
         place.href(live.picture),
-        record.size[0],
-        record.size[1],
-        words("lab.picture", title=title_of(words, block), t=number(record.time, 4)),
-        round(record.scale[1], 1),
+        words("lab.picture", title=title, t=number(record.time, 4)),
         f"{number(record.scale[0])} m",
-        record.readouts,
-        tuple(Markup(svg) for svg in record.plots),
-        words("lab.at", t=seconds(record.end)),
+        words("lab.at", t=number(round(record.end, 3))),
         words("lab.proven", engine=engine, tried=str(live.tried), parity=live.parity),
     )
 
 
-def seconds(value: float) -> str:
-    """A time, to the millisecond."""
-    return number(round(value, 3))
-
-
-def title_of(words: Strings, block: Lab) -> str:
-    """The title, or what a lab without one is called."""
-    return block.fields.title or words("lab.untitled")
-
-
-def start_name(page: PageContext, block: Lab) -> str | None:
+def _start(page: PageContext, block: Lab) -> str | None:
     """The name of the keyframe that the lab starts from."""
     key = block.fields.key
     if key is None or isinstance(key, str):
@@ -204,8 +171,8 @@ def start_name(page: PageContext, block: Lab) -> str | None:
     return (names[key] if 0 <= key < len(names) else "") or str(key)
 
 
-def control_view(words: Strings, control: Control) -> ControlView:
-    """A control as a row of words."""
+def _values(words: Strings, control: Control) -> str:
+    """What a control can be set to, and what it is at first."""
     match control:
         case Slider():
             values = _range(words, control)
@@ -214,8 +181,8 @@ def control_view(words: Strings, control: Control) -> ControlView:
             values = ", ".join(label for label, _ in control.options)
             initial = next(label for label, value in control.options if value == control.start)
         case _:
-            return ControlView(control.label, words("lab.button"))
-    return ControlView(control.label, words("lab.initial", values=values, initial=initial))
+            return words("lab.button")
+    return words("lab.initial", values=values, initial=initial)
 
 
 def _range(words: Strings, slider: Slider) -> str:
@@ -224,14 +191,13 @@ def _range(words: Strings, slider: Slider) -> str:
     return words("lab.step", range=ends, step=number(slider.step)) if slider.step else ends
 
 
-def plot_view(words: Strings, block: Lab, index: int) -> PlotView:
+def _plot(words: Strings, plot: Plot) -> tuple[str, tuple[str, ...]]:
     """A plot in words."""
-    plot = block.fields.plots[index]
     title = words(
         "lab.plot",
         ylabel=plot.ylabel or words("lab.value"),
         xlabel=plot.xlabel or words("lab.time"),
     )
     lines = ((line.label, number(line.y)) for line in plot.refLines)
-    marks = tuple(f"{label} ({y})" if label else y for label, y in lines)
-    return PlotView(title, tuple(trace.label for trace in plot.traces), marks)
+    marks = (f"{label} ({y})" if label else y for label, y in lines)
+    return title, (*(trace.label for trace in plot.traces), *marks)

@@ -13,7 +13,7 @@ from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.marks import escaped, link
+from coursebuild.core.pages.marks import escaped_line, link
 
 PATH = "llms.txt"
 
@@ -21,15 +21,15 @@ PATH = "llms.txt"
 def llms(library: Library) -> bytes:
     """The file."""
     course, words = library.course, library.words
-    parts = [f"# {_line(course.title)}"]
+    parts = [f"# {escaped_line(course.title)}"]
     if course.summary:
-        parts.append(f"> {_line(course.summary)}")
+        parts.append(f"> {escaped_line(course.summary)}")
     parts.append(words("exports.llms"))
     for level in course.levels:
         label = f"{words('level.label', id=level.id)}: {level.title}"
         rows = [_lesson(library, one) for one in level.lessons if one.document is not None]
         if rows:
-            parts.append("\n".join((f"## {_line(label)}", "", *rows)))
+            parts.append("\n".join((f"## {escaped_line(label)}", "", *rows)))
     parts += _others(library)
     return visible("\n\n".join(parts) + "\n").encode()
 
@@ -57,8 +57,4 @@ def _others(library: Library) -> list[str]:
 def _row(library: Library, path: str, title: str, text: str) -> str:
     copy = urls.copy_path(path, ".md")
     address = urls.absolute(library.course, copy) or urls.encode(copy)
-    return f"- {link(_line(title), address)}" + (f": {_line(text)}" if text else "")
-
-
-def _line(text: str) -> str:
-    return escaped(" ".join(text.split()))
+    return f"- {link(escaped_line(title), address)}" + (f": {escaped_line(text)}" if text else "")

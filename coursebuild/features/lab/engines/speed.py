@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.run.v8 import StoppedError
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.compile import compile_lab
 from coursebuild.features.lab.engines.browser import LabEngine
@@ -49,6 +48,6 @@ def real_time_factor(
                 if reply["main"] is None:
                     break
                 best = max(best, reply.get("stepsPerSecond") or 0)
-    except (NativeError, EffectError, StoppedError):
+    except (NativeError, EffectError):
         return None
     return best * timestep if best else None

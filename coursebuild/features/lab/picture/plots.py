@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
+from typing import TypeGuard
 
 from msgspec import Struct
 
@@ -48,21 +49,19 @@ def plot_svg(
     if not shown:
         return ""
     low_t, high_t = shown[0][0], shown[-1][0]
-    values = [
-        v for line in traces for _, i in shown if (v := line[i]) is not None and math.isfinite(v)
-    ]
+    drawn = [[(t, line[i]) for t, i in shown] for line in traces]
+    values = [v for points in drawn for _, v in points if _is_finite(v)]
     values += [line.y for line in plot.refLines]
     low, high = _range(values, plot.ymin, plot.ymax)
     labels = [trace.label for trace in plot.traces]
     frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
     lines: list[str] = []
     ends: list[tuple[float, str, int]] = []
-    for n, (trace, line) in enumerate(zip(plot.traces, traces, strict=True)):
-        points = [(t, line[i]) for t, i in shown]
+    for n, (trace, points) in enumerate(zip(plot.traces, drawn, strict=True)):
         lines.append(_line(frame, points, n, _dash(trace, n)))
-        last = next((v for _, v in reversed(points) if v is not None and math.isfinite(v)), None)
+        last = next((v for _, v in reversed(points) if _is_finite(v)), None)
         if last is not None:
-            ends.append((frame.y(min(max(last, low), high)), trace.label, n))
+            ends.append((frame.y(last), trace.label, n))
     references = [
         _reference(frame, line.y, line.label) for line in plot.refLines if low <= line.y <= high
     ]
@@ -163,15 +162,13 @@ def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, d
 
 def _runs(points: Sequence[tuple[float, float | None]]) -> Iterator[list[tuple[float, float]]]:
     """The stretches between values that are no finite numbers."""
-    run: list[tuple[float, float]] = []
-    for t, v in points:
-        if v is not None and math.isfinite(v):
-            run.append((t, min(max(v, -_LARGEST), _LARGEST)))
-        elif run:
-            yield run
-            run = []
-    if run:
-        yield run
+    for finite, run in groupby(points, key=lambda point: _is_finite(point[1])):
+        if finite:
+            yield [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in run if v is not None]
+
+
+def _is_finite(value: float | None) -> TypeGuard[float]:
+    return value is not None and math.isfinite(value)
 
 
 def _drawn(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
@@ -198,7 +195,7 @@ def _between(
 ) -> str:
     """A point of a segment, which is inside the frame but for rounding."""
     t, v = (a + part * (b - a) if part < 1 else b for a, b in zip(first, second, strict=True))
-    return f"{frame.x(t):.1f} {frame.y(min(max(v, frame.y.low), frame.y.high)):.1f}"
+    return f"{frame.x(t):.1f} {frame.y(v):.1f}"
 
 
 def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:

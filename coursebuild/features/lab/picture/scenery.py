@@ -9,12 +9,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.features.lab.picture.draw import Solid
 from coursebuild.features.lab.picture.light import Material, material_of
-from coursebuild.features.lab.picture.marks import coil, pin
 from coursebuild.features.lab.picture.shapes import (
     Array,
     Kind,
@@ -27,8 +25,9 @@ from coursebuild.features.lab.picture.shapes import (
     sharpen,
     smooth_surface,
     surface,
+    unit,
 )
-from coursebuild.features.lab.picture.textures import SKY, Texture, TextureMapping, texture_of
+from coursebuild.features.lab.picture.textures import SKY, TextureMapping, texture_of
 
 RGBA = tuple[float, float, float, float]
 
@@ -49,13 +48,10 @@ _ENDLESS = 40.0
 """Extents of the model to which a plane without a size reaches, as in the live view."""
 _UNSET = (0.5, 0.5, 0.5, 1.0)
 """A flex or skin of this colour has its material's."""
-
-
-class _Looks(Struct, frozen=True):
-    material: Material
-    texture: Texture | None = None
-    repeat: tuple[float, float] = (1.0, 1.0)
-    uniform: bool = False
+_TURNS, _ROUND, _STRAIGHT, _WIRE = 9, 14, 0.08, 0.16
+_STEEL, _IRON = (0.56, 0.58, 0.62, 1.0), (0.4, 0.41, 0.44, 1.0)
+_PIN = 0.011
+"""Of springs and of the pins of hinges, as in `marks.js` of the live view."""
 
 
 def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
@@ -79,8 +75,9 @@ class _Scene:
             for i, item in enumerate(self.scene[part]):
                 if item["group"] in _VISIBLE:
                     row = self._row(self.layout[part] + _GEOM * i, _GEOM)
-                    looks = self._looks(item["material"])
-                    solid = self._solid(item["type"], item.get("data", -1), row, looks)
+                    material = material_of(self.scene, item["material"])
+                    data, index = item.get("data", -1), item["material"]
+                    solid = self._solid(item["type"], data, row, material, index)
                     if solid is not None and part == "geoms" and not solid.plane:
                         solid = replace(solid, body=True)
                     found.append(solid)
@@ -97,40 +94,49 @@ class _Scene:
             starts = (self.layout["geoms"] + _GEOM * spring[end] for end in ("from", "to"))
             a, b = (self._row(start, 3) for start in starts)
             if np.isfinite((a, b)).all() and np.any(a != b):
-                yield coil(a, b, spring["radius"])
+                yield _coil(a, b, spring["radius"])
         for hinge in self.scene["pins"]:
             distance = self.scene["camera"]["distance"]
-            yield pin(np.array(hinge["position"]), np.array(hinge["axis"]), distance)
+            yield _pin(np.array(hinge["position"]), np.array(hinge["axis"]), distance)
 
     def _row(self, start: int, floats: int) -> Array:
         return self.frame[start : start + floats]
 
-    def _looks(self, index: int) -> _Looks:
-        """A material with its texture; -1 is none."""
-        material = material_of(self.scene, index)
-        given: dict[str, Any] = {"texture": -1}
-        if index >= 0:
-            given = self.scene["materials"][index]
-        texture = self.textures[given["texture"]] if given["texture"] >= 0 else None
+    def _texture(
+        self,
+        index: int,
+        kind: Kind,
+        size: tuple[float, float, float],
+        *,
+        endless: bool = False,
+        given: bool = False,
+    ) -> TextureMapping | None:
+        """How the texture of a material lies on a geom; -1 is no material."""
+        material = self.scene["materials"][index] if index >= 0 else {"texture": -1}
+        texture = self.textures[material["texture"]] if material["texture"] >= 0 else None
         if texture is None or texture.role == SKY:
-            return _Looks(material)
-        u, v = given["texrepeat"]
-        return _Looks(material, texture, (u, v), given["texuniform"])
+            return None
+        if kind == "sphere":
+            size = (size[0],) * 3
+        elif kind in ("capsule", "cylinder"):
+            size = (size[0], size[0], size[1])
+        u, v = material["texrepeat"]
+        return TextureMapping(texture, kind, size, (u, v), material["texuniform"], endless, given)
 
     def _decoration(self, row: Array) -> Solid | None:
         kind, data, size = int(row[0]), int(row[1]), row[4:7]
         name = _KINDS[kind] if kind < len(_KINDS) else ""
         if name in ("capsule", "cylinder"):  # the visualizer's have their half-length last
             size = size[[0, 2, 2]]
-        if name in (
-            "mesh",
-            "sdf",
-        ):  # it counts a mesh and its hull: both have the mesh's shape here
+        if name in ("mesh", "sdf"):  # it counts a mesh and its hull, which have the same shape here
             data //= 2
         row = np.concatenate((row[7:19], size, row[19:24]))
-        return self._solid(kind, data, row, _Looks(Material(emission=float(row[-1]))))
+        return self._solid(kind, data, row, Material(emission=float(row[-1])))
 
-    def _solid(self, kind: int, data: int, row: Array, looks: _Looks) -> Solid | None:
+    def _solid(
+        self, kind: int, data: int, row: Array, material: Material, index: int = -1
+    ) -> Solid | None:
+        """A geom; `index` is that of its material, which may have a texture."""
         if not np.isfinite(row[:15]).all():
             return None  # the simulation blew up
         position, rotation = row[:3], row[3:12].reshape(3, 3)
@@ -140,7 +146,7 @@ class _Scene:
             head = 1.0 if kind == _ARROWS[1] else _HEAD_WIDTH
             pointer = arrow(size[0], size[2] / 2, head=head, both=kind == _ARROWS[2])
             front = data == _IN_FRONT
-            return Solid(pointer, position, rotation, rgba, looks.material, front=front)
+            return Solid(pointer, position, rotation, rgba, material, front=front)
         if kind >= len(_KINDS):
             return None
         name = _KINDS[kind]
@@ -150,10 +156,11 @@ class _Scene:
         shape = self._endless_plane(row) if endless else surface(name, size, given)
         if shape is None:
             return None
-        texture = _mapping(name, size, looks, endless=endless, given=shape.uv is not None)
+        given_uv = shape.uv is not None
+        texture = self._texture(index, name, size, endless=endless, given=given_uv)
         mirror = {"plane": 0.0, "box": size[2]}.get(name)
         plane = name == "plane"
-        return Solid(shape, position, rotation, rgba, looks.material, texture, plane, mirror)
+        return Solid(shape, position, rotation, rgba, material, texture, plane, mirror)
 
     def _endless_plane(self, row: Array) -> Surface:
         """A plane without a size, around what the camera looks at."""
@@ -175,32 +182,15 @@ class _Scene:
                 if item["group"] not in _VISIBLE or not np.isfinite(rows).all():
                     continue
                 shape = _flex(item, rows) if part == "flexes" else _skin(item, rows)
-                looks = self._looks(item["material"])
-                texture = None
+                index, texture = item["material"], None
                 if shape.uv is not None:
-                    texture = _mapping("mesh", (1.0, 1.0, 1.0), looks, given=True)
+                    texture = self._texture(index, "mesh", (1.0, 1.0, 1.0), given=True)
                 where = np.zeros(3), np.eye(3)
                 rgba = item["rgba"]
-                if item["material"] >= 0 and tuple(rgba) == _UNSET:
-                    rgba = self.scene["materials"][item["material"]]["rgba"]
-                yield Solid(shape, *where, _rgba(rgba), looks.material, texture, open=True)
-
-
-def _mapping(
-    kind: Kind,
-    size: tuple[float, float, float],
-    looks: _Looks,
-    *,
-    endless: bool = False,
-    given: bool = False,
-) -> TextureMapping | None:
-    if looks.texture is None:
-        return None
-    if kind == "sphere":
-        size = (size[0],) * 3
-    elif kind in ("capsule", "cylinder"):
-        size = (size[0], size[0], size[1])
-    return TextureMapping(looks.texture, kind, size, looks.repeat, looks.uniform, endless, given)
+                if index >= 0 and tuple(rgba) == _UNSET:
+                    rgba = self.scene["materials"][index]["rgba"]
+                material = material_of(self.scene, index)
+                yield Solid(shape, *where, _rgba(rgba), material, texture, open=True)
 
 
 def _rgba(values: Any) -> RGBA:
@@ -253,3 +243,25 @@ def _height_field(field: dict[str, Any]) -> Surface:
         lower = np.column_stack((upper[:, :2], np.full(len(edge), -base)))
         parts.append(flat_surface(np.concatenate((upper, lower)), grid_faces(2, len(edge))))
     return join_surfaces(parts)
+
+
+def _coil(a: Array, b: Array, radius: float) -> Solid:
+    """A spring between two points."""
+    z = unit(b - a)
+    x = unit(np.array((-z[1], z[0], 0.0)) if abs(z[2]) < 0.9 else np.array((0.0, -z[2], z[1])))
+    t = np.linspace(0.0, 1.0, _TURNS * _ROUND + 1)[:, None]
+    wide = radius * np.clip((np.minimum(t, 1 - t) - _STRAIGHT) / _STRAIGHT, 0.0, 1.0)
+    angle = 2 * np.pi * _TURNS * t
+    points = a + t * (b - a) + wide * (np.cos(angle) * x + np.sin(angle) * np.cross(z, x))
+    steps = np.arange(len(points))
+    ends = np.column_stack((steps[:-1], steps[1:]))
+    return Solid(ropes(points, ends, _WIRE * radius), np.zeros(3), np.eye(3), _STEEL)
+
+
+def _pin(position: Array, axis: Array, distance: float) -> Solid:
+    """The pin of a hinge, for a camera at a distance."""
+    half = 2.2 * _PIN * distance * axis
+    surface = ropes(
+        np.stack((position - half, position + half)), np.array([[0, 1]]), _PIN * distance
+    )
+    return Solid(surface, np.zeros(3), np.eye(3), _IRON)

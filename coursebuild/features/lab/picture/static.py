@@ -11,6 +11,7 @@ import zlib
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.files import LabRecord
@@ -95,7 +96,7 @@ def lab_record(lab: Lab, main: MainRun) -> LabRecord:
     first, last = main["pictures"][0], main["pictures"][-1]
     recorded = main["plots"]
     plots = tuple(
-        plot_svg(plot, recorded["times"], traces, narrow=lab.fields.dock)
+        Markup(plot_svg(plot, recorded["times"], traces, narrow=lab.fields.dock))
         for plot, traces in zip(lab.fields.plots, recorded["plots"], strict=True)
     )
     readouts = tuple(
