@@ -17,9 +17,9 @@ from coursebuild.core.files.errors import UsageError
 from coursebuild.features.importer.values import (
     TEXTS,
     Files,
-    SourceCourse,
-    SourceLesson,
-    SourceLevel,
+    ImportedCourse,
+    ImportedLevel,
+    ImportedText,
     name_of,
     read_text,
     read_yaml,
@@ -36,7 +36,7 @@ _TOP = {"toc", "root", "site-url", "author", "authors", "version"}
 """What only the whole course has, whose title is no level's."""
 
 
-def read_contents(files: Files, folder: str) -> SourceCourse:
+def read_contents(files: Files, folder: str) -> ImportedCourse:
     """The course in a folder of notebooks or Markdown, of this name.
 
     Raises:
@@ -58,9 +58,9 @@ def read_contents(files: Files, folder: str) -> SourceCourse:
         raise UsageError(
             "there is nothing to import: no course.json, no notebook and no Markdown file"
         )
-    pages = [one for one in found if isinstance(one, SourceLesson) and _base(one.path) in _FIRST]
+    pages = [one for one in found if isinstance(one, ImportedText) and _base(one.file) in _FIRST]
     parts = [one for one in found if one not in pages]
-    return SourceCourse(
+    return ImportedCourse(
         title=title or name_of(folder), levels=tuple(_levels(parts, title)), pages=tuple(pages)
     )
 
@@ -82,11 +82,11 @@ def _at(settings: object, *path: str) -> object:
     return settings
 
 
-def _parts(value: object, files: Files) -> Iterator[SourceLesson | SourceLevel]:
+def _parts(value: object, files: Files) -> Iterator[ImportedText | ImportedLevel]:
     """The lessons and groups of lessons of a table of contents, whichever tool's."""
     if isinstance(value, str):
         if path := _file(value, files):
-            yield SourceLesson(path=path)
+            yield ImportedText(file=path)
     elif isinstance(value, list):
         for item in value:
             yield from _parts(item, files)
@@ -96,28 +96,28 @@ def _parts(value: object, files: Files) -> Iterator[SourceLesson | SourceLevel]:
         path = next((path for key in _FILES if (path := _file(value.get(key), files))), "")
         titled = next((str(value[key]) for key in _TITLES if value.get(key)), "")
         title = "" if _file(titled, files) else titled
-        own = [SourceLesson(path=path, title=title)] if path else []
+        own = [ImportedText(file=path, title=title)] if path else []
         if inside and (path or (title and not _TOP & value.keys())):
             lessons = tuple(_lessons([*own, *inside]))
-            yield SourceLevel(title=title or name_of(path), lessons=lessons)
+            yield ImportedLevel(title=title or name_of(path), lessons=lessons)
         else:
             yield from (*own, *inside)
 
 
-def _lessons(parts: Iterable[SourceLesson | SourceLevel]) -> Iterator[SourceLesson]:
+def _lessons(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
     for part in parts:
-        yield from (part,) if isinstance(part, SourceLesson) else part.lessons
+        yield from (part,) if isinstance(part, ImportedText) else part.lessons
 
 
-def _nav(lines: object, folder: str, files: Files) -> Iterator[SourceLesson | SourceLevel]:
+def _nav(lines: object, folder: str, files: Files) -> Iterator[ImportedText | ImportedLevel]:
     """The lines of MkDocs' `nav`: a file, or a title with a file or with further lines."""
     for line in lines if isinstance(lines, list) else ():
         for title, value in line.items() if isinstance(line, Mapping) else [("", line)]:
             if isinstance(value, list):
                 if inside := tuple(_lessons(_nav(value, folder, files))):
-                    yield SourceLevel(title=str(title), lessons=inside)
+                    yield ImportedLevel(title=str(title), lessons=inside)
             elif path := _file(posixpath.join(folder, str(value)), files):
-                yield SourceLesson(path=path, title=str(title))
+                yield ImportedText(file=path, title=str(title))
 
 
 def _file(name: object, files: Files) -> str:
@@ -136,12 +136,12 @@ def _natural(path: str) -> list[tuple[int, int | str]]:
     return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
 
 
-def _by_folder(files: Files) -> Iterator[SourceLesson | SourceLevel]:
+def _by_folder(files: Files) -> Iterator[ImportedText | ImportedLevel]:
     texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural)
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
-        lessons = [SourceLesson(path=path) for path in paths if _base(path) not in _NOT_LESSONS]
+        lessons = [ImportedText(file=path) for path in paths if _base(path) not in _NOT_LESSONS]
         if folder and lessons:
-            yield SourceLevel(title=name_of(folder), lessons=tuple(lessons))
+            yield ImportedLevel(title=name_of(folder), lessons=tuple(lessons))
         else:
             yield from lessons
 
@@ -150,10 +150,10 @@ def _base(path: str) -> str:
     return posixpath.basename(path).split(".")[0].lower()
 
 
-def _levels(parts: Iterable[SourceLesson | SourceLevel], title: str) -> Iterator[SourceLevel]:
+def _levels(parts: Iterable[ImportedText | ImportedLevel], title: str) -> Iterator[ImportedLevel]:
     """A level for each group; lessons that stand in none are one as well."""
     for kind, run in itertools.groupby(parts, type):
-        if kind is SourceLesson:
-            yield SourceLevel(title=title or "Lessons", lessons=tuple(_lessons(run)))
+        if kind is ImportedText:
+            yield ImportedLevel(title=title or "Lessons", lessons=tuple(_lessons(run)))
         else:
-            yield from (part for part in run if isinstance(part, SourceLevel))
+            yield from (part for part in run if isinstance(part, ImportedLevel))

@@ -47,7 +47,10 @@ class LessonContext(Struct):
         """Where a link leads now."""
         route = re.fullmatch(r"#?/lessons?/([^#?/]+)/?(#.*)?", address)
         if route is not None:
-            return self._lesson(route[1], route[2] or "", address, place)
+            known = self.ids.get(unquote(route[1]))
+            if known is None:
+                self.leave(place, f"a link to `{address}`, a lesson that the map does not have")
+            return "" if known is None else f"lesson:{known}{route[2] or ''}"
         parts = urlsplit(address)
         if parts.scheme or parts.netloc or not parts.path:
             return address
@@ -60,13 +63,6 @@ class LessonContext(Struct):
             return self.file(path)
         self.leave(place, f"a link to `{address}`, which is not in the folder")
         return ""
-
-    def _lesson(self, name: str, anchor: str, address: str, place: str) -> str:
-        known = self.ids.get(unquote(name))
-        if known is None:
-            self.leave(place, f"a link to `{address}`, a lesson that the map does not have")
-            return ""
-        return f"lesson:{known}{anchor}"
 
     def labelled(self, anchor: str) -> str:
         """The address of an anchor that a text of the course sets; empty where none does."""

@@ -17,14 +17,15 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_json import read_course_json
-from coursebuild.features.importer.course_map import ImportedText, map_lines, texts_of
+from coursebuild.features.importer.course_map import map_lines, with_texts
 from coursebuild.features.importer.lesson import lesson_text
 from coursebuild.features.importer.prose import labels
 from coursebuild.features.importer.values import (
     TEXTS,
     Files,
+    ImportedCourse,
+    ImportedText,
     Leftover,
-    SourceCourse,
     files_of,
     stem_of,
 )
@@ -52,22 +53,23 @@ def convert(folder: Path) -> Converted:
         course = read_contents(files, folder.resolve().name)
     else:
         course = read_course_json(described, files)
-    texts = texts_of(course, files)
-    out, left, callouts = _lessons(course, texts, files)
-    ids = _ids(texts)
+    course = with_texts(course, files)
+    lessons = [lesson for level in course.levels for lesson in level.lessons]
+    texts, ids = (*lessons, *course.pages), _ids(lessons)
+    out, left, callouts = _texts(course, texts, ids, files)
     if described is not None:
-        read = {text.source.path for text in texts}
+        read = {text.file for text in texts}
         lost = (path for path in files if path.endswith(TEXTS) and path not in read)
         left += [Leftover(path, "", "a text that the map does not name") for path in lost]
         left += [
             Leftover(described, "", f"the prerequisite {name} of {text.id}, which is no lesson")
             for text in texts
-            for name in text.source.prerequisites
+            for name in text.prerequisites
             if name not in ids
         ]
     packages = dict(_packages(files, texts))
     out |= {**packages, **dict(_models(files))}
-    lines = map_lines(course, texts, ids, callouts, ("src",) if packages else ())
+    lines = map_lines(course, ids, callouts, ("src",) if packages else ())
     out["content/course.toml"] = "".join(f"{line}\n" for line in lines).encode()
     out[".gitignore"] = _IGNORED
     return Converted(dict(sorted(out.items())), (*course.left, *left))
@@ -91,20 +93,19 @@ def write_course(course: Converted, folder: Path, source: Path) -> None:
         write_atomic(target, path, data, expected=None)
 
 
-def _ids(texts: Sequence[ImportedText]) -> dict[str, str]:
+def _ids(lessons: Sequence[ImportedText]) -> dict[str, str]:
     """Ids of lessons, by those that they had and by those that they have."""
-    lessons = [text for text in texts if text.link.startswith("lesson:")]
-    slugs = {text.source.slug: text.id for text in lessons if text.source.slug}
-    named = {text.source.id: text.id for text in lessons if text.source.id}
-    return slugs | {text.id: text.id for text in lessons} | named
+    named = {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
+    slugs = {lesson.slug: lesson.id for lesson in lessons}
+    return slugs | {lesson.id: lesson.id for lesson in lessons} | named
 
 
-def _lessons(
-    course: SourceCourse, texts: Sequence[ImportedText], files: Files
+def _texts(
+    course: ImportedCourse, texts: Sequence[ImportedText], ids: Mapping[str, str], files: Files
 ) -> tuple[dict[str, bytes], list[Leftover], dict[str, str]]:
     """The files of lessons and pages, what was left, and kinds of callouts of the course's own."""
     written = [text for text in texts if text.path]
-    targets = {stem_of(text.source.path): text.link for text in written}
+    targets = {stem_of(text.file): text.link for text in written}
     anchors = {
         anchor: text.link
         for text in reversed(written)
@@ -116,17 +117,16 @@ def _lessons(
     callouts: dict[str, str] = {}
     for text in written:
         context = LessonContext(
-            text.source.path,
+            text.file,
             targets,
-            _ids(texts),
+            ids,
             anchors,
             frozenset(files),
             posixpath.dirname(text.path),
             camera_is_position=course.camera_is_position,
         )
-        out[text.path] = lesson_text(
-            text.segments, text.title, _script_path(text), context
-        ).encode()
+        script = _script_path(text)
+        out[text.path] = lesson_text(text.segments, text.title, script, context).encode()
         out |= {place: files[path].read_bytes() for path, place in context.copied.items()}
         out |= {place: text.pictures[name] for name, place in context.pictures.items()}
         left += context.left

@@ -15,10 +15,10 @@ from typing import Any
 from coursebuild.core.files.errors import UsageError
 from coursebuild.features.importer.values import (
     Files,
+    ImportedCourse,
+    ImportedLevel,
+    ImportedText,
     Leftover,
-    SourceCourse,
-    SourceLesson,
-    SourceLevel,
     read_text,
     stem_of,
 )
@@ -46,7 +46,7 @@ _LESSON = (
 )
 
 
-def read_course_json(path: str, files: Files) -> SourceCourse:
+def read_course_json(path: str, files: Files) -> ImportedCourse:
     """The course that a file describes.
 
     Raises:
@@ -68,7 +68,7 @@ def read_course_json(path: str, files: Files) -> SourceCourse:
     levels = tuple(reader.level(item, apart) for item in _items(course, "levels"))
     if not levels:
         raise UsageError(f"{path} has no `levels`")
-    return SourceCourse(
+    return ImportedCourse(
         title=_text(course, "title") or "Course",
         summary=_text(course, "summary"),
         language=_text(course, "language"),
@@ -99,24 +99,24 @@ class _Reader:
         self.unknown.update(key for key in value if _name(key) not in known)
         return {_name(key): item for key, item in value.items()}
 
-    def level(self, value: object, apart: list[dict[str, Any]]) -> SourceLevel:
+    def level(self, value: object, apart: list[dict[str, Any]]) -> ImportedLevel:
         """A level, with those of the lessons that stand apart that name it."""
         level = self.fields(value, _LEVEL)
         lessons = [self.fields(item, _LESSON) for item in _items(level, "lessons")]
         lessons += [lesson for lesson in apart if _text(lesson, "level") == _text(level, "id")]
-        return SourceLevel(
+        return ImportedLevel(
             id=_text(level, "id"),
             title=_text(level, "title"),
             summary=_summary(level),
             lessons=tuple(map(self.lesson, lessons)),
         )
 
-    def lesson(self, lesson: dict[str, Any]) -> SourceLesson:
+    def lesson(self, lesson: dict[str, Any]) -> ImportedText:
         """A lesson, or a page."""
         minutes = re.search(r"\d+", _text(lesson, "minutes"))
-        return SourceLesson(
-            id=_text(lesson, "id"),
-            path=self.file(lesson),
+        return ImportedText(
+            old_id=_text(lesson, "id"),
+            file=self.file(lesson),
             title=_text(lesson, "title"),
             slug=_text(lesson, "slug"),
             summary=_summary(lesson),

@@ -1,92 +1,62 @@
 """The map of the new course.
 
-Entry points: `ImportedText`, a lesson or page on its way; `texts_of`, `map_lines`.
+Entry points: `with_texts`, what its texts are and where they go; `map_lines`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
-from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.toml_text import quoted
 from coursebuild.features.importer.lesson import read_segments
-from coursebuild.features.importer.values import (
-    Files,
-    Segment,
-    SourceCourse,
-    SourceLesson,
-    SourceLevel,
-    name_of,
-)
+from coursebuild.features.importer.values import Files, ImportedCourse, ImportedText, name_of
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
 """Words for the status of a lesson that is written; with any other one it is a draft."""
 
 
-class ImportedText(Struct, frozen=True):
-    """A lesson or page on its way into the new course."""
-
-    source: SourceLesson
-    id: str
-    slug: str
-    title: str
-    path: str
-    """Of its new file; empty where it is only planned."""
-    segments: tuple[Segment, ...]
-    pictures: Mapping[str, bytes]
-    """What its file holds itself."""
-
-    @property
-    def link(self) -> str:
-        """What leads to it."""
-        kind = "page" if self.path.startswith("content/pages/") else "lesson"
-        return f"{kind}:{self.id}"
-
-
-def level_id(level: SourceLevel, number: int) -> str:
-    """The id of a level, its own one if it can be."""
-    return level.id if re.fullmatch("[A-Za-z0-9]+", level.id) else str(number)
-
-
-def texts_of(course: SourceCourse, files: Files) -> tuple[ImportedText, ...]:
-    """All lessons in the order of the course, then its pages.
+def with_texts(course: ImportedCourse, files: Files) -> ImportedCourse:
+    """The course with its texts read, and with the ids and paths that they get.
 
     Raises:
         UsageError: a file cannot be read.
     """
-    found = []
+    levels = []
     for number, level in enumerate(course.levels, 1):
-        first = level_id(level, number)
+        id = level.id if re.fullmatch("[A-Za-z0-9]+", level.id) else str(number)
+        lessons = []
         for place, lesson in enumerate(level.lessons, 1):
-            own = re.fullmatch(rf"{re.escape(first)}(\.[A-Za-z0-9]+)+", lesson.id)
-            found.append(_text(lesson, lesson.id if own else f"{first}.{place}", files))
-    for page in course.pages:
-        if page.path:
-            found.append(_text(page, slug_of(page.id), files, page=True))
-    return tuple(found)
+            own = re.fullmatch(rf"{re.escape(id)}(\.[A-Za-z0-9]+)+", lesson.old_id)
+            lessons.append(_read(lesson, lesson.old_id if own else f"{id}.{place}", files))
+        title = level.title or f"Level {id}"
+        levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
+    pages = (_read(page, "", files) for page in course.pages if page.file)
+    return replace(course, levels=tuple(levels), pages=tuple(pages))
 
 
-def _text(source: SourceLesson, id: str, files: Files, *, page: bool = False) -> ImportedText:
-    title, slug = source.title, source.slug
-    if not source.path:
-        return ImportedText(source, id, slug_of(slug or title or id), title or id, "", (), {})
-    found, segments, pictures = read_segments(files[source.path], source.path)
-    title = " ".join((title or found or name_of(source.path)).split())
-    slug = slug_of(slug or name_of(source.path))
+def _read(text: ImportedText, id: str, files: Files) -> ImportedText:
+    """A lesson of this id, or a page, which has none yet."""
+    title, slug = text.title, text.slug
+    if not text.file:
+        title = title or id
+        return replace(text, id=id, slug=slug_of(slug or title), title=title)
+    found, segments, pictures = read_segments(files[text.file], text.file)
+    title = " ".join((title or found or name_of(text.file)).split())
+    slug = slug_of(slug or name_of(text.file))
     if not re.search("[a-z]", slug):
         slug = slug_of(title)
-    if page and not source.id:
-        id = slug_of(title)
-    path = f"content/pages/{id}.md" if page else f"content/lessons/{id}-{slug}.md"
-    return ImportedText(source, id, slug, title, path, tuple(segments), pictures)
+    page = slug_of(text.old_id or title)
+    path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
+    read = replace(text, segments=tuple(segments), pictures=pictures)
+    return replace(read, id=id or page, slug=slug, title=title, path=path)
 
 
 def map_lines(
-    course: SourceCourse,
-    texts: Sequence[ImportedText],
+    course: ImportedCourse,
     ids: Mapping[str, str],
     callouts: Mapping[str, str],
     packages: tuple[str, ...],
@@ -100,29 +70,29 @@ def map_lines(
     if callouts:
         yield from ("", "[callouts]")
         yield from (f"{quoted(kind)} = {quoted(label)}" for kind, label in callouts.items())
-    rest = iter(texts)
-    for number, level in enumerate(course.levels, 1):
+    for level in course.levels:
         yield from ("", "[[level]]")
-        title = level.title or f"Level {level_id(level, number)}"
-        yield from _fields(id=level_id(level, number), title=title, summary=level.summary)
-        for lesson, text in zip(level.lessons, rest, strict=False):
+        yield from _fields(id=level.id, title=level.title, summary=level.summary)
+        for lesson in level.lessons:
             yield from ("", "[[level.lesson]]")
             yield from _fields(
-                id=text.id,
-                slug=text.slug,
-                title=text.title,
-                status=_status(lesson) if text.path else "planned",
+                id=lesson.id,
+                slug=lesson.slug,
+                title=lesson.title,
+                status=_status(lesson),
                 summary=lesson.summary,
                 objectives=lesson.objectives,
                 prerequisites=tuple(ids[p] for p in lesson.prerequisites if p in ids),
                 minutes=lesson.minutes,
             )
-    for text in rest:
+    for page in course.pages:
         yield from ("", "[[page]]")
-        yield from _fields(id=text.id, title=text.title, file=text.path)
+        yield from _fields(id=page.id, title=page.title, file=page.path)
 
 
-def _status(lesson: SourceLesson) -> str:
+def _status(lesson: ImportedText) -> str:
+    if not lesson.path:
+        return "planned"
     return "complete" if lesson.status.lower() in _COMPLETE else "draft"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -45,13 +46,13 @@ class Segment(Struct, frozen=True, kw_only=True):
     known, since nothing is recorded."""
 
 
-class SourceLesson(Struct, frozen=True, kw_only=True):
-    """A lesson as the map of its course names it."""
+class ImportedText(Struct, frozen=True, kw_only=True):
+    """A lesson or page, as the map of its course has it; what is last, once it is read."""
 
-    id: str = ""
+    old_id: str = ""
     """As its own course calls it; empty where that has no ids."""
-    path: str = ""
-    """Its file, relative to the folder; empty where it is only planned."""
+    file: str = ""
+    """Relative to the folder that is imported; empty where it is only planned."""
     title: str = ""
     slug: str = ""
     summary: str = ""
@@ -59,25 +60,37 @@ class SourceLesson(Struct, frozen=True, kw_only=True):
     objectives: tuple[str, ...] = ()
     prerequisites: tuple[str, ...] = ()
     minutes: int | None = None
+    id: str = ""
+    path: str = ""
+    """Of its new file; empty where it is only planned."""
+    segments: tuple[Segment, ...] = ()
+    pictures: Mapping[str, bytes] = {}
+    """What its file holds itself."""
+
+    @property
+    def link(self) -> str:
+        """What leads to it."""
+        kind = "page" if self.path.startswith("content/pages/") else "lesson"
+        return f"{kind}:{self.id}"
 
 
-class SourceLevel(Struct, frozen=True, kw_only=True):
+class ImportedLevel(Struct, frozen=True, kw_only=True):
     """A group of lessons."""
 
     id: str = ""
     title: str
     summary: str = ""
-    lessons: tuple[SourceLesson, ...]
+    lessons: tuple[ImportedText, ...]
 
 
-class SourceCourse(Struct, frozen=True, kw_only=True):
+class ImportedCourse(Struct, frozen=True, kw_only=True):
     """The map of a course."""
 
     title: str
     summary: str = ""
     language: str = ""
-    levels: tuple[SourceLevel, ...]
-    pages: tuple[SourceLesson, ...] = ()
+    levels: tuple[ImportedLevel, ...]
+    pages: tuple[ImportedText, ...] = ()
     camera_is_position: bool = False
     """Whether the camera of a lab says where the camera is, seen from its target."""
     left: tuple[Leftover, ...] = ()
