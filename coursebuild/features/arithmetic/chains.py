@@ -22,7 +22,7 @@ from typing import Any, Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.features.arithmetic.evaluate import EXACT, WrongDimensions, evaluate, say
+from coursebuild.features.arithmetic.evaluate import WrongDimensions, evaluate, say
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import FormulaSide, Statement, read_statements
 
@@ -106,7 +106,7 @@ def _mistake(
     """Where two numbers do not stand in a relation, why, and what mends it; `None` if they do."""
     if relation == "?":
         raise right.not_understood("the relation says too little")
-    values = evaluate(left, EXACT), evaluate(right, EXACT)
+    values = evaluate(left), evaluate(right)
     if values[0].dimension != values[1].dimension:
         message = " is held against ".join(say(value.dimension) for value in values)
         return right.start, right.end, message, ""
@@ -167,13 +167,13 @@ def _shown(one: Expression) -> ShownNumber | None:
             found = _shown(inner)
             return found and replace(found, value=-found.value)
         case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
-            size = evaluate(one, EXACT).value
+            size = evaluate(one).value
             return ShownNumber(size, size, True, 1, Fraction(1))
         case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
             found, power = _shown(inner), _shown(factor)
             if found is None or (factor.kind == "^" and (power is None or found.digits == 0)):
                 return None
-            size = evaluate(factor, EXACT).value
+            size = evaluate(factor).value
             scaled = replace(found, value=found.value * size, step=found.step * size)
             if factor.kind == "^":
                 return replace(scaled, whole=False)

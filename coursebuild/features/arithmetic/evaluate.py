@@ -1,6 +1,6 @@
 """Expressions → quantities: the value, in base units, and the dimension.
 
-Entry points: `evaluate(expression, arithmetic, symbols)`; `EXACT`, the arithmetic of fractions,
+Entry points: `evaluate(expression, symbols, arithmetic)`; `EXACT`, the arithmetic of fractions,
 which become floating-point numbers where they must.
 
 What would be too large, or is no number, is not understood. Sums of different dimensions, and
@@ -39,8 +39,8 @@ class Arithmetic(Struct, frozen=True):
 
     number: Callable[[str], Any]
     power: Callable[[Any, Any], Any]
-    functions: Mapping[str, Callable[[Any], Any]]
-    constants: Mapping[str, Any]
+    library: Any
+    """What has the functions and constants: `math`, or a context of mpmath."""
     calculus: Callable[..., Any] | None = None
     """The derivative of a function at a place, or its integral between two."""
 
@@ -56,23 +56,17 @@ def _exact_power(base: Any, exponent: Any) -> Any:
     return float(base) ** float(exponent)
 
 
-EXACT = Arithmetic(
-    Fraction,
-    _exact_power,
-    {
-        **{n: getattr(math, n) for n in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp")},
-        **{"ln": math.log, "arcsin": math.asin, "arccos": math.acos, "arctan": math.atan},
-        **{"cot": lambda x: 1 / math.tan(x), "sec": lambda x: 1 / math.cos(x)},
-        "csc": lambda x: 1 / math.sin(x),
-    },
-    {r"\pi": math.pi, r"\mathrm{e}": math.e},
-)
+EXACT = Arithmetic(Fraction, _exact_power, math)
+_CALLED = {"ln": "log", "arcsin": "asin", "arccos": "acos", "arctan": "atan"}
+"""Functions that libraries call otherwise."""
+_RECIPROCALS = {"cot": "tan", "sec": "cos", "csc": "sin"}
+_CONSTANTS = {r"\pi": "pi", r"\mathrm{e}": "e", r"\infty": "inf"}
 
 
 def evaluate(
     expression: Expression,
-    arithmetic: Arithmetic,
-    symbols: Mapping[str, PhysicalQuantity] | None = None,
+    symbols: Mapping[str, PhysicalQuantity] = {},
+    arithmetic: Arithmetic = EXACT,
 ) -> PhysicalQuantity:
     """What an expression comes to.
 
@@ -80,7 +74,7 @@ def evaluate(
         NotUnderstood: it cannot be computed.
     """
     try:
-        return _Evaluator(arithmetic, symbols or {}).of(expression)
+        return _Evaluator(arithmetic, symbols).of(expression)
     except (OverflowError, MemoryError):
         raise expression.not_understood("the numbers become too large") from None
 
@@ -130,22 +124,24 @@ class _Evaluator:
                 if inner.dimension:
                     reason = f"`\\{name}` is of {say(inner.dimension)}, and not of a number"
                     raise WrongDimensions(reason, one.start, one.end)
-                return PhysicalQuantity(self.arithmetic.functions[name](inner.value))
+                called = _RECIPROCALS.get(name) or _CALLED.get(name, name)
+                value = getattr(self.arithmetic.library, called)(inner.value)
+                return PhysicalQuantity(1 / value if name in _RECIPROCALS else value)
 
     def _symbol(self, one: Expression) -> PhysicalQuantity:
         known = self.symbols.get(one.text)
         if known is not None:
             return known
-        if one.text not in self.arithmetic.constants:
+        if one.text not in _CONSTANTS:
             reason = f"no lesson says what `{one.text}` is, or several differ in its unit"
             raise one.not_understood(reason)
-        return PhysicalQuantity(self.arithmetic.constants[one.text])
+        return PhysicalQuantity(getattr(self.arithmetic.library, _CONSTANTS[one.text]))
 
     def _unit(self, one: Expression) -> PhysicalQuantity:
         if one.text == "%":
             return PhysicalQuantity(self.arithmetic.number("0.01"))
         if one.text == "deg":
-            return PhysicalQuantity(self.arithmetic.constants[r"\pi"] / 180)
+            return PhysicalQuantity(self.arithmetic.library.pi / 180)
         unit = find_unit(one.text)
         if unit is None:
             raise one.not_understood(f"`{one.text}` is no unit that is known")

@@ -64,7 +64,7 @@ def _compare(
         for _ in range(_POINTS):
             point = {name: mpmath.mpf(round(draw.uniform(0.5, 2), 3)) for name in names}
             values = {name: PhysicalQuantity(value, symbols[name]) for name, value in point.items()}
-            one, other = (evaluate(side, arithmetic, values) for side in (left, right))
+            one, other = (evaluate(side, values, arithmetic) for side in (left, right))
             if one.dimension != other.dimension and 0 not in (one.value, other.value):
                 message = f"{say(one.dimension)} is held against {say(other.dimension)}"
                 yield FormulaFinding("wrong", right.start, right.end, message)
@@ -103,8 +103,4 @@ def _precise(mp: Any) -> Arithmetic:
             raise ValueError
         return value
 
-    names = ("sin", "cos", "tan", "cot", "sec", "csc", "sinh", "cosh", "tanh", "exp")
-    functions = {name: getattr(mp, name) for name in names}
-    functions |= {"ln": mp.log, "arcsin": mp.asin, "arccos": mp.acos, "arctan": mp.atan}
-    constants = {r"\pi": mp.pi, r"\mathrm{e}": mp.e, r"\infty": mp.inf}
-    return Arithmetic(mp.mpf, power, functions, constants, calculus)
+    return Arithmetic(mp.mpf, power, mp, calculus)

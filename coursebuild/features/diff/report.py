@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Recording, document_blocks
 from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.pages.marks import fence, table
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import text_diff
@@ -93,26 +94,19 @@ def section(title: str, meaning: str, header: Row, rows: Sequence[Row]) -> str:
     """A heading, what the numbers mean, and a table; one line where nothing changed."""
     if not rows:
         return f"### {title}\n\nNo change.\n"
-    table = (header, ["---"] * len(header), *rows[:_ROWS])
-    lines = [
-        " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in row) for row in table
-    ]
-    lines += [f"and {len(rows) - _ROWS} more"] if len(rows) > _ROWS else []
-    return f"### {title}\n\n{meaning}\n\n" + "".join(f"| {line} |\n" for line in lines)
-
-
-def _edited(before: object, now: object) -> str:
-    return "edited" if before != now else ""
+    shown = [[" ".join(cell.replace("|", "\\|").split()) for cell in row] for row in rows[:_ROWS]]
+    shown += [[f"and {len(rows) - _ROWS} more"]] if len(rows) > _ROWS else []
+    return f"### {title}\n\n{meaning}\n\n{table(header, shown)}\n"
 
 
 def _changes(
-    before: Mapping[K, V], now: Mapping[K, V], how: Callable[[V, V], str] = _edited
+    before: Mapping[K, V], now: Mapping[K, V], how: Callable[[V, V], str] = lambda a, b: "edited"
 ) -> Iterator[tuple[K, str]]:
     """What became of each thing that is not as it was; `how` says it, of one that both have."""
     for key in dict.fromkeys((*before, *now)):
         if key not in before or key not in now:
             yield key, "new" if key in now else "removed"
-        elif said := how(before[key], now[key]):
+        elif before[key] != now[key] and (said := how(before[key], now[key])):
             yield key, said
 
 
@@ -144,9 +138,8 @@ def _outputs(before: Mapping[str, ScriptState], now: Mapping[str, ScriptState]) 
         pairs = zip_longest(before[path].outputs, now[path].outputs)
         lines = "\n".join(filter(None, (text_diff(_text(one), _text(two)) for one, two in pairs)))
         if lines:
-            fence = "`" * (3 + lines.count("`"))
             summary = f"<summary><code>{path}</code></summary>"
-            parts.append(f"<details>{summary}\n\n{fence}diff\n{lines}\n{fence}\n\n</details>\n")
+            parts.append(f"<details>{summary}\n\n{fence('diff', lines)}\n\n</details>\n")
     return "\n".join(parts)
 
 
@@ -181,8 +174,6 @@ def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
 
 
 def _redrawn(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
-    if before == now:
-        return ""
     return difference(*before, now[1]) or "less than can be seen"
 
 
@@ -235,7 +226,9 @@ def _truth(old: Course, new: Course) -> str:
     nothing = Claims(0, 0, 0, ())
     pairs = {id: (before.get(id, nothing), now.get(id, nothing)) for id in {**before, **now}}
     pairs["all"] = total(before.values()), total(now.values())
-    counted = {id: (_counts(one), _counts(two)) for id, (one, two) in pairs.items()}
+    counted = {
+        id: [(*claims.counts, claims.share) for claims in pair] for id, pair in pairs.items()
+    }
     return section(
         "Truth",
         "Numbers in the text, and those that a script prints, a formula computes, or the author"
@@ -247,8 +240,3 @@ def _truth(old: Course, new: Course) -> str:
             if one != two
         ],
     )
-
-
-def _counts(claims: Claims) -> Row:
-    counts = (claims.all, claims.bound, claims.computed, claims.given, len(claims.open))
-    return (*map(str, counts), f"{claims.share} %" if claims.all else "–")

@@ -24,7 +24,8 @@ def weight_section(old: Path, new: Path) -> str:
     before, now = _weights(old), _weights(new)
     sizes = {name: (before.get(name, 0), now.get(name, 0)) for name in {**before, **now}}
     rows = []
-    for name, (a, b) in sorted(sizes.items(), key=lambda one: _rank(*one)):
+    changed = sorted(sizes.items(), key=lambda one: -abs(one[1][1] - one[1][0]))
+    for name, (a, b) in sorted(changed, key=lambda one: one[0] != _WHOLE):
         if abs(b - a) >= _SHARE * max(a, b) or (name == _WHOLE and a != b):
             change = f"{b / a - 1:+.1%}" if a and b else "new" if b else "removed"
             rows.append((name, f"{a / 1000:.1f} kB", f"{b / 1000:.1f} kB", change))
@@ -35,11 +36,6 @@ def weight_section(old: Path, new: Path) -> str:
         ("page", "before", "now", "change"),
         rows,
     )
-
-
-def _rank(name: str, sizes: tuple[int, int]) -> tuple[bool, int]:
-    """The site first, then what changed most."""
-    return name != _WHOLE, -abs(sizes[1] - sizes[0])
 
 
 def _weights(site: Path) -> dict[str, int]:

@@ -35,7 +35,7 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
     found = total(claims_of(document) for _, document in documents_of(course))
     if found.proven < course.truth * found.all:
         wanted = f"{100 * course.truth:g} %"
-        message = f"{found.share} % of the numbers are proven, and {wanted} are asked for"
+        message = f"{found.share} of the numbers are proven, and {wanted} are asked for"
         help = f"`coursebuild check --truth` lists the other {len(found.open)}"
         yield diagnose("truth-share", course.truth_span, message, help=help)
 
@@ -47,7 +47,7 @@ def unproven(course: Course) -> Iterator[Diagnostic | str]:
     for name, claims in (*rows, ("all", total(one for _, one in known))):
         if claims.all:
             yield (
-                f"{name}: {claims.share} % of {claims.all} numbers proven: {claims.bound} bound,"
+                f"{name}: {claims.share} of {claims.all} numbers proven: {claims.bound} bound,"
                 f" {claims.computed} computed, {claims.given} given"
             )
     for _, claims in known:

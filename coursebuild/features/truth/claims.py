@@ -63,8 +63,14 @@ class Claims(Struct, frozen=True):
 
     @property
     def share(self) -> str:
-        """The share of those that are proven, in per cent, rounded down; empty of none."""
-        return f"{1000 * self.proven // self.all / 10:.1f}" if self.all else ""
+        """The share of those that are proven, rounded down."""
+        return f"{1000 * self.proven // self.all / 10:.1f} %" if self.all else "–"
+
+    @property
+    def counts(self) -> tuple[str, ...]:
+        """How many there are, are proven in each way, and are not."""
+        counts = (self.all, self.bound, self.computed, self.given, len(self.open))
+        return tuple(map(str, counts))
 
 
 def claims_of(document: model.Document) -> Claims:

@@ -18,7 +18,7 @@ from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt
-from coursebuild.features.truth.claims import KINDS, Claims, claims_of, documents_of, total
+from coursebuild.features.truth.claims import KINDS, claims_of, documents_of, total
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
@@ -60,14 +60,9 @@ def values(library: Library, place: urls.Place, block: TruthTable) -> TruthRows:
         known.append(claims_of(document))
         name = f"{owner.id} {owner.title}" if isinstance(owner, Lesson) else owner.title
         link = Markup('<a href="{}">{}</a>').format(place.href(urls.owner_path(owner)), name)
-        rows.append((str(link), *_figures(known[-1])))
-    return TruthRows((*rows, (str(escape(words("truth.all"))), *_figures(total(known)))))
-
-
-def _figures(claims: Claims) -> tuple[str, ...]:
-    counts = (claims.all, claims.bound, claims.computed, claims.given, len(claims.open))
-    share = f"{claims.share} %" if claims.all else "–"
-    return (share, *map(str, counts))
+        rows.append((str(link), known[-1].share, *known[-1].counts))
+    whole = total(known)
+    return TruthRows((*rows, (str(escape(words("truth.all"))), whole.share, *whole.counts)))
 
 
 def _table(page: PageContext, block: TruthTable) -> Table:
