@@ -1,7 +1,6 @@
 """Blocks and inlines as Markdown that needs no course: CommonMark with tables, footnotes and `$`.
 
-Entry points: `write_blocks`, `write_inlines`, `write_footnotes`; `MarkdownContext`, which says
-where links lead and what our own blocks become.
+Entry point: `BlockWriter`, of which each kind says where links lead and what our own blocks become.
 
 1. A text that stands in the source as it reads is written as it stands there: it was read as text
    once, between the same neighbours. Any other (with escapes or entities in it, or out of JSON) has
@@ -14,7 +13,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Protocol, assert_never
+from typing import assert_never
+
+from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.pages.html_context import OwnBlock
@@ -30,60 +31,6 @@ from coursebuild.core.pages.marks import (
     table,
 )
 from coursebuild.core.pages.markup import escape, is_tight, raw_html
-from coursebuild.features.markdown.texts import (
-    delimiter,
-    formula,
-    no_empty_lines,
-    number_text,
-    piped,
-    text_source,
-)
-
-
-class MarkdownContext(Protocol):
-    """What depends on where the Markdown goes."""
-
-    def href(self, target: model.Target) -> str:
-        """The address of a link."""
-        ...
-
-    def url(self, url: str) -> str:
-        """The address of a picture that is written as `url`."""
-        ...
-
-    def reference(self, note: int) -> str:
-        """A reference to a footnote."""
-        ...
-
-    def named(self, target: model.Target) -> str:
-        """What a link without a text says: the number of a formula; empty for none."""
-        ...
-
-    def number(self, start: int) -> str:
-        """The number that is to stand beside the formula at an offset; empty for none."""
-        ...
-
-    def own(self, block: OwnBlock) -> str:
-        """A block of ours, without its last line end; empty for none."""
-        ...
-
-
-def write_blocks(blocks: Iterable[model.Block], context: MarkdownContext) -> str:
-    """Blocks one after the other, an empty line between two, without the last line end."""
-    return _Writer(context).blocks(blocks)
-
-
-def write_inlines(inlines: tuple[model.Inline, ...], context: MarkdownContext) -> str:
-    """Inlines in one line, such as a title."""
-    return _Writer(context).line(inlines)
-
-
-def write_footnotes(footnotes: Iterable[model.Footnote], context: MarkdownContext) -> str:
-    """The definitions of footnotes, which are referred to as `[^1]`."""
-    return "\n\n".join(
-        hang(f"[^{note.number}]: ", write_blocks(note.blocks, context), 4) for note in footnotes
-    )
-
 
 _APART = (
     *(model.Callout, model.PlainCode, model.Script, model.Recording, model.Mjcf),
@@ -92,21 +39,57 @@ _APART = (
 """Blocks that an empty line parts from others, even in a tight list."""
 
 _LAST_MARKS = re.compile(r"(^|\s)(#+)$")
+_ALWAYS = re.compile(r"[$`]")
+"""What is escaped wherever it is text: another reader may see more in it than ours did."""
+_PIPE = re.compile(r"(?<!\\)\|")
+_COMMENT = re.compile(r"(?<!\\)%")
+_MINUS = re.compile(r"(?<!\w)-(?=\d)")
 
 
-class _Writer:
-    def __init__(self, context: MarkdownContext) -> None:
-        self.context = context
+class BlockWriter(Struct, frozen=True):
+    """Writes blocks; a kind of its own says what depends on where the Markdown goes."""
 
-    def line(self, inlines: Iterable[model.Inline]) -> str:
-        return " ".join(self.inlines(inlines, line=True).split("\n")).strip()
+    def href(self, target: model.Target) -> str:
+        """The address of a link."""
+        raise NotImplementedError
+
+    def url(self, url: str) -> str:
+        """The address of a picture that is written as `url`."""
+        raise NotImplementedError
+
+    def reference(self, note: int) -> str:
+        """A reference to a footnote."""
+        raise NotImplementedError
+
+    def named(self, target: model.Target) -> str:
+        """What a link without a text says: the number of a formula; empty for none."""
+        raise NotImplementedError
+
+    def number(self, start: int) -> str:
+        """The number that is to stand beside the formula at an offset; empty for none."""
+        raise NotImplementedError
+
+    def own(self, block: OwnBlock) -> str:
+        """A block of ours, without its last line end; empty for none."""
+        raise NotImplementedError
+
+    def inlines(self, inlines: Iterable[model.Inline]) -> str:
+        """Inlines in one line, such as a title."""
+        return " ".join(self._inlines(inlines, line=True).split("\n")).strip()
+
+    def footnotes(self, footnotes: Iterable[model.Footnote]) -> str:
+        """The definitions of footnotes, which are referred to as `[^1]`."""
+        return "\n\n".join(
+            hang(f"[^{note.number}]: ", self.blocks(note.blocks), 4) for note in footnotes
+        )
 
     # --- blocks
 
     def blocks(self, blocks: Iterable[model.Block], *, tight: bool = False) -> str:
+        """Blocks one after the other, without the last line end."""
         written, before = "", None
         for block in blocks:
-            text = self.block(block, before)
+            text = self._block(block, before)
             if text and written:
                 apart = not tight or isinstance(before, _APART) or isinstance(block, _APART)
                 written += "\n\n" if apart else "\n"
@@ -115,12 +98,12 @@ class _Writer:
                 before = block
         return written
 
-    def block(self, block: model.Block, after: model.Block | None = None) -> str:
+    def _block(self, block: model.Block, after: model.Block | None = None) -> str:
         match block:
             case model.Heading():
                 return self._heading(block)
             case model.Paragraph():
-                return self.inlines(block.children)
+                return self._inlines(block.children)
             case model.HtmlFlow():
                 return "".join(map(self._in_html, block.children))
             case model.ListBlock():
@@ -130,16 +113,16 @@ class _Writer:
             case model.CodeBlock():
                 return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
             case model.HtmlBlock():
-                return raw_html(block, self.context.url).rstrip("\n")
+                return raw_html(block, self.url).rstrip("\n")
             case model.ThematicBreak():
                 return "___"
             case model.MathBlock():
-                tex, tag = no_empty_lines(block.tex.text), self._tag(block.span.start)
+                tex, tag = _no_empty_lines(block.tex.text), self._tag(block.span.start)
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case model.Table():
                 return self._table(block)
             case _:
-                return self.context.own(block)
+                return self.own(block)
 
     def _in_html(self, inline: model.Inline) -> str:
         """An inline in HTML, where text is no Markdown."""
@@ -148,7 +131,7 @@ class _Writer:
         return self._inline(inline, line=False, cell=False)
 
     def _heading(self, heading: model.Heading) -> str:
-        text = _LAST_MARKS.sub(r"\1\\\2", self.line(heading.children))
+        text = _LAST_MARKS.sub(r"\1\\\2", self.inlines(heading.children))
         return f"{'#' * heading.level} {text}".rstrip()
 
     def _list(self, block: model.ListBlock, *, other: bool) -> str:
@@ -180,11 +163,11 @@ class _Writer:
         return table(map(self._cell, block.header), rows, (one or "" for one in block.align))
 
     def _cell(self, cell: model.Cell) -> str:
-        return self.inlines(cell.children, line=True, cell=True).replace("\n", " ")
+        return self._inlines(cell.children, line=True, cell=True).replace("\n", " ")
 
     # --- inlines
 
-    def inlines(
+    def _inlines(
         self, inlines: Iterable[model.Inline], *, line: bool = False, cell: bool = False
     ) -> str:
         text = self._joined(inlines, line=line, cell=cell)
@@ -196,7 +179,7 @@ class _Writer:
     def _inline(self, inline: model.Inline, *, line: bool, cell: bool) -> str:
         match inline:
             case model.Text():
-                return text_source(inline, cell=cell)
+                return _text(inline, cell=cell)
             case model.SoftBreak():
                 return " " if line else "\n"
             case model.HardBreak():
@@ -206,43 +189,80 @@ class _Writer:
             case model.CodeSpan():
                 source = inline.span.text
                 ticks = source[: len(source) - len(source.lstrip("`"))]
-                return piped(code_span(inline.text, ticks), cell=cell)
+                return _piped(code_span(inline.text, ticks), cell=cell)
             case model.NumberBinding():
-                return escaped(number_text(inline))
+                return escaped(_MINUS.sub("\u2212", inline.text))
             case model.Math():
                 tag = self._tag(inline.span.start) if inline.display else ""
-                return formula(inline, tag, cell=cell)
-            case model.Emphasis():
-                mark = delimiter(inline.span.text, "*")
+                return _formula(inline, tag, cell=cell)
+            case model.Emphasis() | model.Strong() | model.Term() | model.Strikethrough():
+                mark = _delimiter(inline)
                 return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
-            case model.Strong():
-                mark = delimiter(inline.span.text, "*") * 2
-                return f"{mark}{self._joined(inline.children, line=line, cell=cell)}{mark}"
-            case model.Term():
-                return f"*{self._joined(inline.children, line=line, cell=cell)}*"
-            case model.Strikethrough():
-                return f"~~{self._joined(inline.children, line=line, cell=cell)}~~"
             case model.Link():
                 text = self._joined(inline.children, line=line, cell=cell)
                 return self._link(inline, text, cell=cell)
             case model.Image():
-                url = self.context.url(inline.url)
-                return piped(picture(inline.alt, url, inline.title), cell=cell)
+                url = self.url(inline.url)
+                return _piped(picture(inline.alt, url, inline.title), cell=cell)
             case model.RawInline():
-                return piped(raw_html(inline, self.context.url), cell=cell)
+                return _piped(raw_html(inline, self.url), cell=cell)
             case model.FootnoteRef():
-                return self.context.reference(inline.number)
+                return self.reference(inline.number)
             case _:
                 assert_never(inline)
 
     def _tag(self, start: int) -> str:
-        number = self.context.number(start)
+        number = self.number(start)
         return f"\\tag{{{number}}}" if number else ""
 
     def _link(self, node: model.Link, text: str, *, cell: bool) -> str:
         source = node.span.text
         if source == f"<{model.plain_text(node.children)}>" and not cell:
             return source
-        href = self.context.href(node.target)
-        text = text or escaped(self.context.named(node.target))
+        href = self.href(node.target)
+        text = text or escaped(self.named(node.target))
         return link(text, href.replace("|", "%7C") if cell else href, node.title)
+
+
+def _text(node: model.Text, *, cell: bool) -> str:
+    """A text as it stands in its source, where it reads there as it does here."""
+    source = node.span.text
+    if source != node.text:
+        text = escaped(node.text)
+        if text[:1].isspace() and not source[:1].isspace():
+            text = f"&#{ord(text[0])};{text[1:]}"
+        if text[-1:].isspace() and not source[-1:].isspace():
+            text = f"{text[:-1]}&#{ord(text[-1])};"
+        return text.replace("\n", "&#10;")
+    source = _ALWAYS.sub(lambda match: f"\\{match[0]}", source)
+    return _piped(source, cell=cell)
+
+
+def _piped(text: str, *, cell: bool) -> str:
+    """Marks, whose pipes are escaped in a cell of a table."""
+    return _PIPE.sub(r"\\|", text) if cell else text
+
+
+def _delimiter(node: model.Emphasis | model.Strong | model.Term | model.Strikethrough) -> str:
+    """The marks around a text, for emphasis those of its source."""
+    if isinstance(node, model.Strikethrough):
+        return "~~"
+    mark = "_" if node.span.text[:1] == "_" else "*"
+    return mark * 2 if isinstance(node, model.Strong) else mark
+
+
+def _formula(node: model.Math, tag: str, *, cell: bool) -> str:
+    """A formula between its dollars, with its number, if it has one."""
+    tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it may end with a comment
+    if cell:  # a pipe would end the cell, and an escaped one is another sign
+        tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
+    if _COMMENT.search(tex):  # a line's end ends a comment
+        tex = _no_empty_lines(tex)
+    elif "\n" in tex:
+        tex = " ".join(part.strip() for part in tex.split("\n"))
+    return f"$${tex}$$" if node.display else f"${tex}$"
+
+
+def _no_empty_lines(tex: str) -> str:
+    """TeX without empty lines, at which a formula would end."""
+    return "\n".join(line for line in tex.split("\n") if line.strip())

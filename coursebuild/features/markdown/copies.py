@@ -21,10 +21,9 @@ from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.lesson import LessonLink, LevelView
-from coursebuild.core.pages.marks import code_span, escaped, guarded, link
+from coursebuild.core.pages.marks import code_span, escaped_line, guarded, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.markdown.blocks import write_blocks, write_footnotes
 from coursebuild.features.markdown.from_html import markdown_of
 from coursebuild.features.markdown.llms import PATH as LLMS
 from coursebuild.features.markdown.llms import llms
@@ -74,12 +73,12 @@ def markdown_href(place: urls.Place, href: str) -> str:
 def _document_copy(inputs: PageInputs, page: PageContext) -> str:
     place, words, document = page.place, page.renderer.words, page.document
     here = place.href(place.path)
-    context = DocumentWriter(page, lambda href: markdown_href(place, href), here)
+    writer = DocumentWriter(page, lambda href: markdown_href(place, href), here)
     parts = (
-        *head(inputs, words, context.locate),
-        write_blocks(document.blocks, context),
-        write_footnotes(document.footnotes, context),
-        *_foot(inputs, words, context.locate),
+        *head(inputs, words, writer.locate),
+        writer.blocks(document.blocks),
+        writer.footnotes(document.footnotes),
+        *_foot(inputs, words, writer.locate),
     )
     return "\n\n".join(filter(None, parts))
 
@@ -88,14 +87,14 @@ def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     """Title, summary, facts and objectives; of a page that is no lesson, its title."""
     lesson = inputs.values.get("lesson")
     if not isinstance(lesson, LessonLink):
-        return [f"# {_line(inputs.head.title)}"]
-    parts = [f"# {_line(f'{lesson.id} {lesson.title}')}"]
+        return [f"# {escaped_line(inputs.head.title)}"]
+    parts = [f"# {escaped_line(f'{lesson.id} {lesson.title}')}"]
     if lesson.summary:
-        parts.append(guarded(_line(lesson.summary)))
+        parts.append(guarded(escaped_line(lesson.summary)))
     parts.append(" · ".join(_facts(inputs, lesson, words, locate)))
     if lesson.objectives:
-        items = "\n".join(f"- {guarded(_line(one))}" for one in lesson.objectives)
-        parts.append(f"{_line(words('lesson.objectives'))}\n\n{items}")
+        items = "\n".join(f"- {guarded(escaped_line(one))}" for one in lesson.objectives)
+        parts.append(f"{escaped_line(words('lesson.objectives'))}\n\n{items}")
     return parts
 
 
@@ -104,15 +103,15 @@ def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locat
     level = inputs.values.get("level")
     if isinstance(level, LevelView):
         name = f"{words('level.label', id=level.id)}: {level.title}"
-        facts.append(link(_line(name), locate(level.href)))
-    facts.append(_line(words(f"status.{lesson.status}")))
+        facts.append(link(escaped_line(name), locate(level.href)))
+    facts.append(escaped_line(words(f"status.{lesson.status}")))
     if lesson.minutes:
-        facts.append(_line(words("lesson.minutes", n=lesson.minutes)))
+        facts.append(escaped_line(words("lesson.minutes", n=lesson.minutes)))
     if lesson.further:
-        facts.append(_line(words("lesson.more_minutes", n=lesson.further)))
+        facts.append(escaped_line(words("lesson.more_minutes", n=lesson.further)))
     needs = lesson_links(lesson.needs, locate)
     if needs:
-        facts.append(f"{_line(words('lesson.needs'))} {', '.join(needs)}")
+        facts.append(f"{escaped_line(words('lesson.needs'))} {', '.join(needs)}")
     return facts
 
 
@@ -120,7 +119,7 @@ def lesson_links(found: object, locate: Locate) -> list[str]:
     """Links to the lessons that a value of a page's inputs is, or holds."""
     lessons = found if isinstance(found, tuple) else (found,)
     return [
-        link(_line(f"{one.id} {one.title}"), locate(one.href))
+        link(escaped_line(f"{one.id} {one.title}"), locate(one.href))
         for one in lessons
         if isinstance(one, LessonLink)
     ]
@@ -132,7 +131,7 @@ def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     scripts = inputs.values.get("scripts")
     if isinstance(scripts, tuple) and scripts:
         named = (link(code_span(path), href) for path, href in scripts)
-        rows.append(f"{_line(words('lesson.scripts'))}: {', '.join(named)}")
+        rows.append(f"{escaped_line(words('lesson.scripts'))}: {', '.join(named)}")
     for name, key in (
         ("leads", "lesson.leads"),
         ("previous", "lesson.previous"),
@@ -140,9 +139,5 @@ def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     ):
         links = lesson_links(inputs.values.get(name), locate)
         if links:
-            rows.append(f"{_line(words(key))}: {', '.join(links)}")
+            rows.append(f"{escaped_line(words(key))}: {', '.join(links)}")
     return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []
-
-
-def _line(text: str) -> str:
-    return escaped(" ".join(text.split()))

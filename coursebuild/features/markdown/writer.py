@@ -13,36 +13,18 @@ from collections.abc import Callable
 from typing import assert_never
 
 from markupsafe import Markup
-from msgspec import Struct
 
-from coursebuild.core.model import (
-    Block,
-    Callout,
-    FeatureBlock,
-    Inline,
-    Mjcf,
-    PlainCode,
-    Recording,
-    Script,
-    Table,
-    Target,
-)
+from coursebuild.core import model
 from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.html_context import OwnBlock
-from coursebuild.core.pages.marks import (
-    code_span,
-    escaped,
-    fence,
-    link,
-    quoted,
-)
+from coursebuild.core.pages.marks import code_span, escaped, fence, link, quoted
 from coursebuild.core.registry import kind_of_block
-from coursebuild.features.markdown.blocks import write_blocks, write_inlines
+from coursebuild.features.markdown.blocks import BlockWriter
 from coursebuild.features.markdown.from_html import markdown_of
 
 
-class DocumentWriter(Struct, frozen=True):
+class DocumentWriter(BlockWriter, frozen=True):
     """A document as plain Markdown."""
 
     page: PageContext
@@ -53,9 +35,7 @@ class DocumentWriter(Struct, frozen=True):
     notebook: bool = False
     """Whether scripts stand in cells of their own, answers are folded, and footnotes are a list."""
 
-    # what the writer asks
-
-    def href(self, target: Target) -> str:
+    def href(self, target: model.Target) -> str:
         """The address of a link."""
         return self.locate(self.page.href(target))
 
@@ -67,7 +47,7 @@ class DocumentWriter(Struct, frozen=True):
         """A reference to a footnote."""
         return f"<sup>{note}</sup>" if self.notebook else f"[^{note}]"
 
-    def named(self, target: Target) -> str:
+    def named(self, target: model.Target) -> str:
         """What a link without a text says."""
         return self.page.reference(target)
 
@@ -79,29 +59,21 @@ class DocumentWriter(Struct, frozen=True):
     def own(self, block: OwnBlock) -> str:
         """A block of ours."""
         match block:
-            case Callout():
+            case model.Callout():
                 return self._callout(block)
-            case PlainCode():
+            case model.PlainCode():
                 return fence("python", block.code.text)
-            case Script():
+            case model.Script():
                 return self._script(block)
-            case Recording():
+            case model.Recording():
                 joined = any(block in some for some in self.page.joined.values())
                 return "" if joined else self.recording(block)
-            case Mjcf():
+            case model.Mjcf():
                 return self._mjcf(block)
-            case FeatureBlock():
+            case model.FeatureBlock():
                 return kind_of_block(block).markdown(self, block)
             case _:
                 assert_never(block)
-
-    def blocks(self, blocks: tuple[Block, ...]) -> str:
-        """Blocks as Markdown."""
-        return write_blocks(blocks, self)
-
-    def inlines(self, inlines: tuple[Inline, ...]) -> str:
-        """Inlines as Markdown in one line."""
-        return write_inlines(inlines, self)
 
     def html(self, html: Markup) -> str:
         """HTML of a template as Markdown."""
@@ -113,14 +85,14 @@ class DocumentWriter(Struct, frozen=True):
 
     # --- callouts, io, MJCF
 
-    def _callout(self, block: Callout) -> str:
+    def _callout(self, block: model.Callout) -> str:
         label = f"**{escaped(self.page.shown.callouts[block.kind].label)}**"
         title = self.inlines(block.title)
         head = f"{label} {title}" if title else label
         inner = self.blocks(block.blocks)
         return quoted(f"{head}\n\n{inner}" if inner else head)
 
-    def _mjcf(self, block: Mjcf) -> str:
+    def _mjcf(self, block: model.Mjcf) -> str:
         shown = self.page.shown
         label = (
             self.words("mjcf.fragment", element=block.fragment)
@@ -134,7 +106,7 @@ class DocumentWriter(Struct, frozen=True):
 
     # --- scripts and outputs
 
-    def _script(self, block: Script) -> str:
+    def _script(self, block: model.Script) -> str:
         href = self.locate(self.page.place.href(block.path))
         name = link(code_span(block.path), href)
         if self.notebook:
@@ -151,15 +123,15 @@ class DocumentWriter(Struct, frozen=True):
             parts.append(f"*{escaped(receipt.text)}*")
         return "\n\n".join(parts)
 
-    def recording(self, block: Recording) -> str:
+    def recording(self, block: model.Recording) -> str:
         """An output with its caption and what can be said for it."""
-        if isinstance(block.body, Table):
+        if isinstance(block.body, model.Table):
             body = self.blocks((block.body,))
         else:
             body = fence("text", block.body.text)
         return f"{self.inlines(block.caption)}\n\n{body}\n\n{self.receipt(block)}"
 
-    def receipt(self, block: Recording) -> str:
+    def receipt(self, block: model.Recording) -> str:
         """What can be said for an output."""
         return f"*{escaped(output_receipt(self.page, block).text)}*"
 
@@ -167,8 +139,5 @@ class DocumentWriter(Struct, frozen=True):
         """A text behind its label, which a notebook shows on demand."""
         if self.notebook:
             return f"<details>\n<summary>{label}</summary>\n\n{text}\n\n</details>"
-        return f"**{label}:** {text}" if _begins_as_text(text) else f"**{label}:**\n\n{text}"
-
-
-def _begins_as_text(text: str) -> bool:
-    return not text.startswith(("```", "- ", "1. ", "$$", "> ", "| ", "<"))
+        begins_block = text.startswith(("```", "- ", "1. ", "$$", "> ", "| ", "<"))
+        return f"**{label}:**\n\n{text}" if begins_block else f"**{label}:** {text}"

@@ -37,7 +37,6 @@ from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.marks import hang, link
 from coursebuild.core.pages.page_inputs import PageInputs
-from coursebuild.features.markdown.blocks import write_blocks
 from coursebuild.features.markdown.copies import head
 from coursebuild.features.markdown.writer import DocumentWriter
 
@@ -104,7 +103,7 @@ def _cells(writer: DocumentWriter, blocks: Iterable[Block]) -> Iterator[Cell]:
     done = {id(one) for some in joined.values() for one in some}
 
     def written() -> Iterator[Cell]:
-        text = write_blocks(waiting, writer)
+        text = writer.blocks(waiting)
         if text:
             yield _text(section, text)
         waiting.clear()

@@ -21,7 +21,7 @@ from coursebuild.core.pages.marks import (
 )
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from coursebuild.features.markdown.blocks import write_blocks, write_footnotes, write_inlines
+from coursebuild.features.markdown.blocks import BlockWriter
 from support.plain_html import PlainContext, plain_html
 
 ROOT = Path(__file__).parents[3]
@@ -30,7 +30,7 @@ EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | r
 DIFFERENT = {39: "a line's end that is written as a character reference becomes one"}
 
 
-class Context:
+class Context(BlockWriter, frozen=True):
     """Addresses stay as they are written."""
 
     def href(self, target: Target) -> str:
@@ -50,8 +50,8 @@ class Context:
 
     def own(self, block: OwnBlock) -> str:
         if isinstance(block, Callout):
-            title = guarded(write_inlines(block.title, self))
-            return quoted("\n\n".join(filter(None, (title, write_blocks(block.blocks, self)))))
+            title = guarded(self.inlines(block.title))
+            return quoted("\n\n".join(filter(None, (title, self.blocks(block.blocks)))))
         assert isinstance(block, PlainCode), f"no test has a {type(block).__name__}"
         return fence("python", block.code.text)
 
@@ -62,8 +62,8 @@ def read(markdown: str) -> Document:
 
 def written(markdown: str) -> str:
     document = read(markdown)
-    blocks = write_blocks(document.blocks, Context())
-    notes = write_footnotes(document.footnotes, Context())
+    blocks = Context().blocks(document.blocks)
+    notes = Context().footnotes(document.footnotes)
     return "\n\n".join(filter(None, (blocks, notes))) + "\n"
 
 
@@ -155,7 +155,7 @@ def test_files_that_raw_html_shows_have_the_address_of_the_copy() -> None:
             return f"../files/{url}"
 
     text = "<video src='a.mp4'>\n</video>\n\nA <img src=b.png> and <a href=c.png>c</a>.\n"
-    assert write_blocks(read(text).blocks, Moved()) == (
+    assert Moved().blocks(read(text).blocks) == (
         "<video src='../files/a.mp4'>\n</video>\n\n"
         "A <img src=../files/b.png> and <a href=c.png>c</a>."
     )
