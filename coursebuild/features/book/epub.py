@@ -18,6 +18,8 @@ from __future__ import annotations
 import hashlib
 import posixpath
 import re
+import textwrap
+import unicodedata
 import uuid
 from collections.abc import Iterator
 
@@ -33,7 +35,6 @@ from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.fonts import COURSE
 from coursebuild.core.pages.html_tree import to_xml
 from coursebuild.core.pages.theme import accents
-from coursebuild.features.book.cover import cover
 from coursebuild.features.book.lessons import (
     PICTURES,
     ending,
@@ -68,6 +69,8 @@ _SET_IN = {
     "code": "pre,code,samp{{font-family:{},monospace}}",
 }
 """What is set in a font of the course's own, by its use."""
+_COVER_SIZES, _COVER_LINES, _COVER_WIDTH = (120, 100, 84, 68, 54), 6, 1020
+"""Of type on the cover; the largest is taken in which the title has few lines of so many pixels."""
 
 
 class EpubItem(Struct, frozen=True):
@@ -120,9 +123,7 @@ class _Epub:
             name = f"fonts/licence-{number}.txt"
             items.append(EpubItem(f"f-{xml_id(name)}", name, "text/plain"))
             yield OutputFile(f"EPUB/{name}", family.licence.data)
-        light, _ = accents(self._course.theme)
-        text = cover(self._course.title, direction(self._language), light)
-        yield OutputFile("EPUB/cover.svg", visible(text).encode())
+        yield OutputFile("EPUB/cover.svg", self._cover())
         yield OutputFile("EPUB/title.xhtml", self._title())
         yield OutputFile("EPUB/nav.xhtml", self._nav())
         for level, lessons in self._levels:
@@ -172,6 +173,17 @@ class _Epub:
     def _level(self, level: Level) -> bytes:
         body = self._library.render("book/epub-level.html", level=level)
         return self._page(f"{level.id} {level.title}", body, "bodymatter")
+
+    def _cover(self) -> bytes:
+        """The title of the course as a picture, with a bar in the accent."""
+        title = " ".join(self._course.title.split())
+        for size in _COVER_SIZES:
+            lines = textwrap.wrap(title, int(_COVER_WIDTH / size / _mean_width(title))) or [""]
+            if len(lines) <= _COVER_LINES:
+                break
+        accent, _ = accents(self._course.theme)
+        lines = lines[: 2 * _COVER_LINES]
+        return self._drawn("cover.svg", title=title, lines=lines, size=size, accent=accent)
 
     def _title(self) -> bytes:
         body = self._library.render(
@@ -232,6 +244,15 @@ class _Epub:
 def _chapter_item(name: str, chapter: bytes) -> EpubItem:
     properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
     return EpubItem(f"x-{xml_id(name)}", name, _XHTML, " ".join(properties), linear=True)
+
+
+def _mean_width(title: str) -> float:
+    """The width of a character of the title, in ems, so far as it is known without a font."""
+    widths = [
+        1.0 if unicodedata.east_asian_width(c) in "WF" else 0.7 if c.isupper() else 0.52
+        for c in title
+    ]
+    return sum(widths) / max(len(widths), 1) or 1.0
 
 
 def xml_id(id: str) -> str:

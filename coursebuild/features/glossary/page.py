@@ -1,6 +1,6 @@
 """The glossary: every term of the course, what the text says of it, and where it is used.
 
-Entry points: `course_terms`; `glossary_values`, what the page shows.
+Entry point: `glossary_values`, what the page shows.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import unicodedata
 from collections.abc import Iterator
 from itertools import groupby
 
-from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.model import TermTarget
@@ -25,18 +24,29 @@ from coursebuild.core.pages.owner_links import (
 from coursebuild.features.glossary.terms import DefinedTerm
 
 
-class GlossaryTerm(Struct, frozen=True):
-    """A term of the course."""
+class TermEntry(Struct, frozen=True):
+    """An entry of the glossary."""
 
     term: DefinedTerm
-    owner: Owner
+    place: OwnerLink
     """Where it is defined."""
-    used: tuple[Owner, ...]
+    used: OwnerLinks
     """Where else it is linked to, in the order of the course."""
 
 
-def course_terms(library: Library) -> Iterator[GlossaryTerm]:
-    """The terms of a course; of two definitions of one the first."""
+def glossary_values(library: Library) -> dict[str, object]:
+    """What the glossary shows: the entries by their letters."""
+    place = urls.Place("glossary/index.html")
+    entries = sorted(_entries(library, place), key=lambda entry: sort_key(entry.term.name))
+    groups = groupby(entries, key=lambda entry: initial(entry.term.name))
+    return {
+        "letters": tuple((letter, tuple(group)) for letter, group in groups),
+        "symbols": added_page(library, place, "symbols"),
+    }
+
+
+def _entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
+    """An entry for each term of the course; of two definitions of one for the first."""
     users: dict[str, list[Owner]] = {}
     for owner, document in documents(library.course):
         targets = links(library.course, document)
@@ -47,58 +57,9 @@ def course_terms(library: Library) -> Iterator[GlossaryTerm]:
         for term in found.terms:
             if term.id not in done:
                 done.add(term.id)
-                used = tuple(user for user in users.get(term.id, ()) if user is not owner)
-                yield GlossaryTerm(term, owner, used)
-
-
-class PieceView(Struct, frozen=True):
-    """A part of a definition; `display`: a formula on a line of its own."""
-
-    html: Markup
-    display: bool
-
-
-class TermView(Struct, frozen=True):
-    """An entry."""
-
-    id: str
-    title: Markup
-    pieces: tuple[PieceView, ...]
-    place: OwnerLink
-    used: OwnerLinks
-
-
-class LetterView(Struct, frozen=True):
-    """The entries under a letter."""
-
-    letter: str
-    terms: tuple[TermView, ...]
-
-
-def glossary_values(library: Library) -> dict[str, object]:
-    """What the glossary shows."""
-    place = urls.Place("glossary/index.html")
-    terms = sorted(course_terms(library), key=lambda t: sort_key(t.term.name))
-    groups = groupby(terms, key=lambda t: initial(t.term.name))
-    letters = tuple(
-        LetterView(letter, tuple(_view(library, place, term) for term in group))
-        for letter, group in groups
-    )
-    return {
-        "letters": letters,
-        "symbols": added_page(library, place, "symbols"),
-    }
-
-
-def _view(library: Library, place: urls.Place, found: GlossaryTerm) -> TermView:
-    term = found.term
-    return TermView(
-        term.id,
-        Markup(term.title),
-        tuple(PieceView(Markup(piece.html), piece.display) for piece in term.definition),
-        owner_link(place, found.owner, f"term:{term.id}"),
-        owner_links(library, place, found.used),
-    )
+                used = [user for user in users.get(term.id, ()) if user is not owner]
+                link = owner_link(place, owner, f"term:{term.id}")
+                yield TermEntry(term, link, owner_links(library, place, used))
 
 
 def sort_key(name: str) -> tuple[object, ...]:

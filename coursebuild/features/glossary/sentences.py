@@ -12,18 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from coursebuild.core.model import (
-    CodeSpan,
-    FootnoteRef,
-    HardBreak,
-    Inline,
-    NumberBinding,
-    RawInline,
-    SoftBreak,
-    Term,
-    Text,
-    walk_inlines,
-)
+from coursebuild.core import model
 
 _END = re.compile(r"[.!?…؟।]+[\"'”’»)\]]*\s+|[。！？]+[」』）”’]*\s*")
 _CLOSED = re.compile(r"[.!?…؟।。！？][\"'”’»」』）)\]]*\s*$")
@@ -36,10 +25,10 @@ _OBJECT = "\ufffc"
 """Stands for what is no text."""
 
 
-def definition_of(inlines: tuple[Inline, ...], term: Term) -> tuple[Inline, ...]:
+def definition_of(inlines: tuple[model.Inline, ...], term: model.Term) -> tuple[model.Inline, ...]:
     """The sentence in which a term stands and the next one, unless that defines another term."""
     texts = [_shown(inline) for inline in inlines]
-    at = next(n for n, inline in enumerate(inlines) if term in walk_inlines((inline,)))
+    at = next(n for n, inline in enumerate(inlines) if term in model.walk_inlines((inline,)))
     place = sum(map(len, texts[:at]))
     whole = "".join(texts)
     ends = [0, *_ends(whole), len(whole)]
@@ -47,28 +36,30 @@ def definition_of(inlines: tuple[Inline, ...], term: Term) -> tuple[Inline, ...]
     stop, *later = (end for end in ends if end > place)
     sentence = tuple(_cut(inlines, texts, start, stop))
     following = tuple(_cut(inlines, texts, stop, later[0])) if later else ()
-    defines = any(isinstance(inline, Term) for inline in walk_inlines(following))
+    defines = any(isinstance(inline, model.Term) for inline in model.walk_inlines(following))
     return sentence if defines else sentence + following
 
 
-def runs_on(definition: tuple[Inline, ...]) -> bool:
+def runs_on(definition: tuple[model.Inline, ...]) -> bool:
     """Whether a definition goes on in what follows its paragraph."""
     return _CLOSED.search("".join(map(_shown, definition))) is None
 
 
-def _shown(inline: Inline) -> str:
+def _shown(inline: model.Inline) -> str:
     """What counts of an inline for where sentences end; a character at least for a formula."""
     match inline:
-        case Text():
+        case model.Text():
             return inline.text
-        case SoftBreak() | HardBreak():
+        case model.SoftBreak() | model.HardBreak():
             return " "
-        case FootnoteRef() | RawInline():
+        case model.FootnoteRef() | model.RawInline():
             return ""
-        case CodeSpan() | NumberBinding():
+        case model.CodeSpan() | model.NumberBinding():
             return _OBJECT
         case _:
-            texts = [one.text for one in walk_inlines((inline,)) if isinstance(one, Text)]
+            texts = [
+                one.text for one in model.walk_inlines((inline,)) if isinstance(one, model.Text)
+            ]
             return _OBJECT + (texts[-1][-1:] if texts else "")
 
 
@@ -89,13 +80,15 @@ def _abbreviates(text: str) -> bool:
     return word[0].lower() in _ABBREVIATIONS or (len(word[0]) == 2 and word[0][0].isalpha())
 
 
-def _cut(inlines: tuple[Inline, ...], texts: list[str], start: int, stop: int) -> Iterator[Inline]:
+def _cut(
+    inlines: tuple[model.Inline, ...], texts: list[str], start: int, stop: int
+) -> Iterator[model.Inline]:
     at = 0
     for inline, text in zip(inlines, texts, strict=True):
         first, last = max(start - at, 0), min(stop - at, len(text))
-        if isinstance(inline, Text):
+        if isinstance(inline, model.Text):
             if first < last:
-                yield Text(inline.span, inline.text[first:last])
+                yield model.Text(inline.span, inline.text[first:last])
         elif first < last or (not text and start < at < stop):
             yield inline
         at += len(text)

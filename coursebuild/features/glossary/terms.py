@@ -35,7 +35,7 @@ from coursebuild.features.glossary.sentences import definition_of, runs_on
 class DefinitionPart(Struct, frozen=True):
     """A part of a definition, as HTML; `display`: a formula on a line of its own."""
 
-    html: str
+    html: Markup
     display: bool = False
 
 
@@ -44,7 +44,7 @@ class DefinedTerm(Struct, frozen=True):
 
     id: str
     name: str
-    title: str
+    title: Markup
     """The name as HTML."""
     definition: tuple[DefinitionPart, ...]
 
@@ -78,8 +78,8 @@ class _Excerpt(Context):
 def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     context = _Excerpt(mathml)
 
-    def html(inlines: tuple[Inline, ...]) -> str:
-        return str(render_inlines(without_links(inlines), context))
+    def html(inlines: tuple[Inline, ...]) -> Markup:
+        return render_inlines(without_links(inlines), context)
 
     for siblings in sibling_groups(document):
         for number, block in enumerate(siblings):
@@ -92,13 +92,13 @@ def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
                 title = Markup.escape(term.name) if term.renamed else html(term.children)
                 definition = definition_of(block.children, term)
                 pieces = tuple(_pieces(definition, following, html, context))
-                yield DefinedTerm(term.id, term.name, str(title), pieces)
+                yield DefinedTerm(term.id, term.name, title, pieces)
 
 
 def _pieces(
     definition: tuple[Inline, ...],
     following: Block | None,
-    html: Callable[[tuple[Inline, ...]], str],
+    html: Callable[[tuple[Inline, ...]], Markup],
     context: _Excerpt,
 ) -> Iterator[DefinitionPart]:
     """A definition, cut at its displayed formulas."""
@@ -106,11 +106,11 @@ def _pieces(
     for inline in definition:
         if isinstance(inline, Math) and inline.display:
             yield DefinitionPart(html(tuple(line)).strip())
-            yield DefinitionPart(str(context.display(inline.tex.text, 0)), display=True)
+            yield DefinitionPart(context.display(inline.tex.text, 0), display=True)
             line = []
         else:
             line.append(inline)
     if line:
         yield DefinitionPart(html(tuple(line)).strip())
     if isinstance(following, MathBlock) and following.tex.text and runs_on(definition):
-        yield DefinitionPart(str(context.display(following.tex.text, 0)), display=True)
+        yield DefinitionPart(context.display(following.tex.text, 0), display=True)
