@@ -16,20 +16,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    CodeSpan,
-    Document,
-    HardBreak,
-    Image,
-    Math,
-    NumberBinding,
-    Paragraph,
-    RawInline,
-    SoftBreak,
-    Text,
-    document_blocks,
-    walk_inlines,
-)
+from coursebuild.core import model
 from coursebuild.core.registry import fence_names
 from coursebuild.core.scripts.edit import apply_edits, whole_lines
 from coursebuild.core.syntax.document import parse_document
@@ -69,7 +56,7 @@ def format_document(
     return Parsed(apply_edits(source.text, _choose(edits, [], harmless)))
 
 
-def _errors(parsed: Parsed[Document]) -> tuple[Diagnostic, ...]:
+def _errors(parsed: Parsed[model.Document]) -> tuple[Diagnostic, ...]:
     return tuple(d for d in parsed.diagnostics if d.severity is Severity.ERROR)
 
 
@@ -85,7 +72,7 @@ def _choose(
     return _choose(edits[half:], _choose(edits[:half], kept, harmless), harmless)
 
 
-def _meaning(document: Document) -> str:
+def _meaning(document: model.Document) -> str:
     """A hash of what a document says, whatever its places and line breaks."""
     return fingerprint((document.blocks, document.footnotes), _SHOWN)
 
@@ -94,12 +81,12 @@ def _join_text(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """Inlines with neighbouring texts joined, and each run of white space as one blank."""
     out: list[Any] = []
     for value in values:
-        if isinstance(value, SoftBreak):
-            value = Text(value.span, " ")
-        if isinstance(value, Text) and out and isinstance(out[-1], Text):
-            value = Text(value.span, out.pop().text + value.text)
-        if isinstance(value, Text):
-            value = Text(value.span, re.sub("[ \t\n]+", " ", value.text))
+        if isinstance(value, model.SoftBreak):
+            value = model.Text(value.span, " ")
+        if isinstance(value, model.Text) and out and isinstance(out[-1], model.Text):
+            value = model.Text(value.span, out.pop().text + value.text)
+        if isinstance(value, model.Text):
+            value = model.Text(value.span, re.sub("[ \t\n]+", " ", value.text))
         out.append(value)
     return tuple(out)
 
@@ -109,11 +96,11 @@ _SHOWN: dict[type, Callable[[Any], object]] = {
     Excerpt: lambda excerpt: excerpt.text,
     Source: lambda source: source.path,
     tuple: _join_text,
-    Math: lambda math: replace(math, tex=" ".join(math.tex.text.split())),
+    model.Math: lambda math: replace(math, tex=" ".join(math.tex.text.split())),
 }
 
 _VERBATIM = ("fence", "code_block", "html_block", "math_block")
-_SOLID = (CodeSpan, Image, RawInline)
+_SOLID = (model.CodeSpan, model.Image, model.RawInline)
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _DELIMITERS = re.compile(r"[-:|][-:| \t]*$")
 _PARENTS = ("", "blockquote_open", "footnote_reference_open")
@@ -141,11 +128,11 @@ class _Layout:
         found = _LINE_END.match(self.source.text, start)
         return found[0] if found else self._line_end(line - 1) if line else "\n"
 
-    def edits(self, document: Document) -> Iterator[Edit]:
+    def edits(self, document: model.Document) -> Iterator[Edit]:
         """All of them; none overlap."""
         if self.width:
-            for block in document_blocks(document):
-                if isinstance(block, Paragraph) and block.span.line - 1 not in self.done:
+            for block in model.document_blocks(document):
+                if isinstance(block, model.Paragraph) and block.span.line - 1 not in self.done:
                     yield from self._wrap(block)
         for at, token in enumerate(self.tokens):
             if token.type == "fence":
@@ -155,14 +142,14 @@ class _Layout:
         yield from self._white_space()
         yield from self._separate()
 
-    def _wrap(self, paragraph: Paragraph) -> Iterator[Edit]:
+    def _wrap(self, paragraph: model.Paragraph) -> Iterator[Edit]:
         """A paragraph in lines that are as full as can be; not one with forced line breaks."""
-        span, inlines = paragraph.span, list(walk_inlines(paragraph.children))
-        if any(isinstance(inline, HardBreak) for inline in inlines):
+        span, inlines = paragraph.span, list(model.walk_inlines(paragraph.children))
+        if any(isinstance(inline, model.HardBreak) for inline in inlines):
             return
         solid = [inline.span for inline in inlines if isinstance(inline, _SOLID)]
-        solid += [inline.tex.span() for inline in inlines if isinstance(inline, Math)]
-        solid += [inline.text_span for inline in inlines if isinstance(inline, NumberBinding)]
+        solid += [inline.tex.span() for inline in inlines if isinstance(inline, model.Math)]
+        solid += [inline.text_span for inline in inlines if isinstance(inline, model.NumberBinding)]
         prefix = next((gap[1] for gap in GAP.finditer(span.text) if gap[1] is not None), None)
         prefix = line_prefix(span) if prefix is None else prefix
         lines = fill(split_words(span, solid), self.width, span.column - 1, prefix)

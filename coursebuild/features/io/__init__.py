@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
-from coursebuild.features.io.model import Io
-from coursebuild.features.io.parse import parse_io
+from coursebuild.features.io.parse import Io, parse_io
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext

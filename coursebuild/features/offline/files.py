@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import functools
 import json
+import textwrap
 from collections.abc import Iterable, Iterator
 
 from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
@@ -104,15 +105,10 @@ def _png(path: str, size: str) -> dict[str, str]:
 
 def short_name(title: str) -> str:
     """As many words of a title as have room below an icon, but at least the first."""
-    words = title.split()
-    found = " ".join(words[:1])
-    for count in range(2, len(words) + 1):
-        longer = " ".join(words[:count])
-        if len(longer) > _SHORT:
-            break
-        found = longer
+    line = " ".join(title.split())
+    lines = textwrap.wrap(line, _SHORT, break_long_words=False, break_on_hyphens=False)
     # A word that ends what was cut off joins nothing.
-    return found.rstrip(" ,;:–—-") or title
+    return "".join(lines[:1]).rstrip(" ,;:–—-") or title
 
 
 def _icon(assets: Assets, name: str) -> OutputFile:

@@ -11,26 +11,8 @@ from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
+from coursebuild.core import model
 from coursebuild.core.features import Feature
-from coursebuild.core.model import (
-    Block,
-    CodeBlock,
-    Course,
-    Document,
-    FeatureBlock,
-    Lesson,
-    MathBlock,
-    Mjcf,
-    Pace,
-    PlainCode,
-    Recording,
-    Script,
-    Table,
-    block_inlines,
-    main_and_further,
-    plain_text,
-    walk_blocks,
-)
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 
@@ -47,7 +29,7 @@ class Effort(Struct, frozen=True):
     """Of code and output, to five; a formula is a line."""
     tasks: int
 
-    def minutes(self, pace: Pace) -> int:
+    def minutes(self, pace: model.Pace) -> int:
         """How long it takes, to five minutes."""
         exact = self.words / pace.words + self.lines / pace.lines + self.tasks * pace.task
         return _rounded(exact, 5)
@@ -60,17 +42,17 @@ class Efforts(Struct, frozen=True):
     further: Effort
 
 
-def efforts(document: Document) -> Efforts:
+def efforts(document: model.Document) -> Efforts:
     """What a document asks of its reader. Footnotes are read by few, and count nothing."""
-    parts: dict[bool, list[Block]] = {False: [], True: []}
-    for further, blocks in main_and_further(document.blocks):
-        parts[further] += walk_blocks(blocks)
+    parts: dict[bool, list[model.Block]] = {False: [], True: []}
+    for further, blocks in model.main_and_further(document.blocks):
+        parts[further] += model.walk_blocks(blocks)
     return Efforts(_effort(parts[False]), _effort(parts[True]))
 
 
-def _effort(blocks: list[Block]) -> Effort:
-    words = sum(len(plain_text(block_inlines(block)).split()) for block in blocks)
-    tasks = sum(block.tasks() for block in blocks if isinstance(block, FeatureBlock))
+def _effort(blocks: list[model.Block]) -> Effort:
+    words = sum(len(model.plain_text(model.block_inlines(block)).split()) for block in blocks)
+    tasks = sum(block.tasks() for block in blocks if isinstance(block, model.FeatureBlock))
     return Effort(_rounded(words, 50), _rounded(sum(map(_lines, blocks)), 5), tasks)
 
 
@@ -78,20 +60,20 @@ def _rounded(number: float, unit: int) -> int:
     return unit * round(number / unit)
 
 
-def _lines(block: Block) -> int:
+def _lines(block: model.Block) -> int:
     match block:
-        case Script() | PlainCode() | CodeBlock() | Mjcf():
+        case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
             return len(block.code.text.splitlines())
-        case Recording():
+        case model.Recording():
             body = block.body
-            return len(body.rows if isinstance(body, Table) else body.text.splitlines())
-        case MathBlock():
+            return len(body.rows if isinstance(body, model.Table) else body.text.splitlines())
+        case model.MathBlock():
             return 1
         case _:
             return 0
 
 
-def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator[Diagnostic]:
     """Where a lesson takes longer than the map says, or is done sooner."""
     if course.pace is None:
         return
@@ -101,12 +83,12 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
             yield from _compare(lesson, _known(read[lesson.path]), course.pace)
 
 
-def _known(document: Document) -> Efforts:
+def _known(document: model.Document) -> Efforts:
     kept = (document.summaries or {}).get("pace")
     return kept if isinstance(kept, Efforts) else efforts(document)
 
 
-def _compare(lesson: Lesson, found: Efforts, pace: Pace) -> Iterator[Diagnostic]:
+def _compare(lesson: model.Lesson, found: Efforts, pace: model.Pace) -> Iterator[Diagnostic]:
     for field, part, stated, effort in (
         ("minutes", f"the main path of lesson {lesson.id} takes", lesson.minutes, found.main),
         (

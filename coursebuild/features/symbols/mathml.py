@@ -95,7 +95,7 @@ def _symbol(element: Element, *, declared: bool = False) -> str | None:
     """The symbol that an element is, if it is one; a declared one may be any letter."""
     bare = _bare(element)
     if bare.tag == "mi":
-        return _letter(bare, declared=declared)
+        return _letter(bare.text or "", bare.get("mathvariant") == "normal", declared)
     if bare.tag in _MARKED:
         return _accented(bare, declared=declared)
     if bare.tag not in _SCRIPTS:
@@ -107,19 +107,14 @@ def _symbol(element: Element, *, declared: bool = False) -> str | None:
     above = _mark(bare[-1]) if bare.tag != "msub" else None
     if declared and bare.tag != "msub" and above is None:
         return None
-    if below is not None and above is not None:
-        return f"<msubsup>{base}{below}{above}</msubsup>"
-    if below is not None:
-        return f"<msub>{base}{below}</msub>"
-    return f"<msup>{base}{above}</msup>" if above is not None else base
-
-
-def _letter(element: Element, *, declared: bool) -> str | None:
-    return _letter_of(element.text or "", element.get("mathvariant") == "normal", declared)
+    if below is None and above is None:
+        return base
+    name = f"m{'' if below is None else 'sub'}{'' if above is None else 'sup'}"
+    return f"<{name}>{base}{below or ''}{above or ''}</{name}>"
 
 
 @functools.lru_cache(maxsize=1024)
-def _letter_of(text: str, upright: bool, declared: bool) -> str | None:
+def _letter(text: str, upright: bool, declared: bool) -> str | None:
     if not any(map(str.isalpha, text)) or (text in _NO_SYMBOLS and not declared):
         return None
     if not declared and _is_latin(text) and (upright or (text.isascii() and len(text) > 1)):

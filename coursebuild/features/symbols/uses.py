@@ -9,19 +9,8 @@ from collections.abc import Iterator
 
 from msgspec import Struct
 
+from coursebuild.core import model
 from coursebuild.core.features import Mathml
-from coursebuild.core.model import (
-    Block,
-    Document,
-    Heading,
-    Math,
-    MathBlock,
-    block_inlines,
-    document_blocks,
-    plain_text,
-    walk_blocks,
-    walk_inlines,
-)
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.features.symbols.mathml import only_symbol, symbols
 
@@ -44,7 +33,7 @@ class DocumentSymbols(Struct, frozen=True):
     uses: tuple[SymbolUse, ...]
 
 
-def document_symbols(document: Document, mathml: Mathml) -> Parsed[DocumentSymbols | None]:
+def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[DocumentSymbols | None]:
     """The symbols of a document, and what is wrong in its declarations."""
     if "$" not in document.source.text:
         return Parsed(None)
@@ -53,18 +42,18 @@ def document_symbols(document: Document, mathml: Mathml) -> Parsed[DocumentSymbo
     return Parsed(DocumentSymbols(uses) if uses else None, wrong)
 
 
-def _uses(document: Document, mathml: Mathml) -> tuple[SymbolUse, ...]:
+def _uses(document: model.Document, mathml: Mathml) -> tuple[SymbolUse, ...]:
     found: dict[str, SymbolUse] = {}
     section = "", ""
     for block in _blocks(document):
         if block is None:
             section = "", ""
             continue
-        if isinstance(block, Heading) and block.level <= 3:
-            section = block.anchor, " ".join(plain_text(block.children).split())
+        if isinstance(block, model.Heading) and block.level <= 3:
+            section = block.anchor, " ".join(model.plain_text(block.children).split())
         for formula in _formulas_in(block):
-            html = mathml(formula.tex.text, not isinstance(formula, Math) or formula.display)
-            meaning = formula.meaning if isinstance(formula, Math) else None
+            html = mathml(formula.tex.text, not isinstance(formula, model.Math) or formula.display)
+            meaning = formula.meaning if isinstance(formula, model.Math) else None
             only = only_symbol(html) if meaning is not None else None
             for symbol in (only,) if only is not None else symbols(html):
                 known = found.setdefault(symbol, SymbolUse(symbol, section))
@@ -74,34 +63,36 @@ def _uses(document: Document, mathml: Mathml) -> tuple[SymbolUse, ...]:
     return tuple(found.values())
 
 
-def _blocks(document: Document) -> Iterator[Block | None]:
+def _blocks(document: model.Document) -> Iterator[model.Block | None]:
     """All blocks; `None` before the footnotes, which stand under no heading."""
-    yield from walk_blocks(document.blocks)
+    yield from model.walk_blocks(document.blocks)
     yield None
     for footnote in document.footnotes:
-        yield from walk_blocks(footnote.blocks)
+        yield from model.walk_blocks(footnote.blocks)
 
 
-def _formulas_in(block: Block) -> Iterator[Math | MathBlock]:
-    if isinstance(block, MathBlock):
+def _formulas_in(block: model.Block) -> Iterator[model.Math | model.MathBlock]:
+    if isinstance(block, model.MathBlock):
         yield block
-    for inline in walk_inlines(block_inlines(block)):
-        if isinstance(inline, Math):
+    for inline in model.walk_inlines(model.block_inlines(block)):
+        if isinstance(inline, model.Math):
             yield inline
 
 
-def _misdeclared(document: Document, mathml: Mathml) -> Iterator[Diagnostic]:
+def _misdeclared(document: model.Document, mathml: Mathml) -> Iterator[Diagnostic]:
     """Declarations of what is no symbol, and those of one symbol with two meanings."""
-    first: dict[str, Math] = {}
-    for block in document_blocks(document):
+    first: dict[str, model.Math] = {}
+    for block in model.document_blocks(document):
         for formula in _formulas_in(block):
-            if isinstance(formula, Math) and formula.meaning is not None:
+            if isinstance(formula, model.Math) and formula.meaning is not None:
                 html = mathml(formula.tex.text, False)
                 if html:
                     yield from _declaration(formula, html, first)
 
 
-def _declaration(formula: Math, html: str, first: dict[str, Math]) -> Iterator[Diagnostic]:
+def _declaration(
+    formula: model.Math, html: str, first: dict[str, model.Math]
+) -> Iterator[Diagnostic]:
     symbol = only_symbol(html)
     if symbol is None:
         message = f"`${formula.tex.text}$` is not a single symbol, and is said to mean something"

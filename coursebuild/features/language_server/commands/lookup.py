@@ -31,6 +31,7 @@ from coursebuild.features.language_server.commands.engine import described_name
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.symbols.mathml import only_symbol, symbols
+from coursebuild.pipeline.reading import kept_formulas
 
 _QUOTED = re.compile(r"""(["'])([^"'\s]+)\1""")
 
@@ -213,7 +214,7 @@ class _Lookup:
 
     def formula(self, formula: model.Math | model.MathBlock, offset: int) -> Referent | None:
         """The symbols in a formula whose meaning the text declares."""
-        known = self.texts.formulas(self.document.source.path)
+        known = kept_formulas(self.texts.store, self.document.source.path)
 
         def mathml(one: model.Math | model.MathBlock) -> str:
             display = isinstance(one, model.MathBlock) or one.display

@@ -12,12 +12,10 @@ from msgspec import Struct
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.model import Document, Lesson
-from coursebuild.core.model.results import Formula
 from coursebuild.core.pages.library import Library, Owner, owners
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.language_server.commands.places import Places
-from coursebuild.pipeline.reading import kept_formulas
 from coursebuild.preview.session import Session
 
 
@@ -46,10 +44,6 @@ class OpenTexts(Struct, frozen=True):
         course = self.library.course
         known = owners(course) if len(source.text) <= course.limits.text else ()
         return next((owner for owner in known if owner.path == source.path), None)
-
-    def formulas(self, path: str) -> dict[Formula, str]:
-        """MathML of the formulas that a text had when it was last read."""
-        return kept_formulas(self.store, path)
 
 
 @lru_cache(maxsize=16)
