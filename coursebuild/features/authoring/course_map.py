@@ -54,7 +54,7 @@ def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[E
         return _checked(course, text, new)
     ids = [one.id for one in renamed.lessons if one.level == lesson.level]
     before = [old.id if id == new else id for id in ids]
-    in_order = ids == sorted(ids, key=_order) or before != sorted(before, key=_order)
+    in_order = ids == sorted(ids, key=id_order) or before != sorted(before, key=id_order)
     if lesson.level != _level_id(new) or not in_order:
         start, end = _entry(text, lesson)
         entry = re.split(r"\r?\n", text[start:end])
@@ -111,7 +111,7 @@ def _inserted(course: Course, id: str, lines: Sequence[str]) -> str:
     """The map with the lines of an entry behind the last lesson of the level that is to precede."""
     text = course.map.text
     level = next(level for level in course.levels if level.id == _level_id(id))
-    above = [lesson for lesson in level.lessons if _order(lesson.id) < _order(id)]
+    above = [lesson for lesson in level.lessons if id_order(lesson.id) < id_order(id)]
     line_end = _line_end(text)
     if above or not level.lessons:
         last = above[-1].span if above else level.span
@@ -146,7 +146,7 @@ def _level_id(id: str) -> str:
     return id.partition(".")[0]
 
 
-def _order(id: str) -> list[tuple[bool, int, str]]:
+def id_order(id: str) -> list[tuple[bool, int, str]]:
     """Of ids, numbers by their size and before words: 1.9, 1.10, 1.A."""
     parts = id.split(".")
     return [(not part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts]

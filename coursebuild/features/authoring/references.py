@@ -23,7 +23,8 @@ from coursebuild.core.model import (
 from coursebuild.core.syntax.nodes import ObjectNode, StringNode
 from coursebuild.core.syntax.toml_text import parse_toml, quoted
 from coursebuild.core.text.diagnostics import Edit
-from coursebuild.core.text.source import Source, Span
+from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.features.authoring.course_map import id_order
 
 _NUMBER = r"(?>[0-9]+(?:\.[0-9]+)+)"
 _RANGE = re.compile(rf"(?i)\blessons\s+({_NUMBER})\s?(?:–|-|to\b)\s?({_NUMBER})")
@@ -42,7 +43,7 @@ def references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
                 span = inline.target_span
                 written = span.text.partition("#")[0]
                 for match in list(name.finditer(written))[-1:]:
-                    place = _part(span, match.span())
+                    place = Excerpt.of_span(span).span(*match.span())
                     found[place.path, place.start] = Edit(place, new)
     return list(found.values())
 
@@ -84,7 +85,7 @@ def doubtful_places(
         found += [
             source.span(*match.span())
             for match in _RANGE.finditer(source.text)
-            if _order(match[1]) <= _order(lesson.id) <= _order(match[2])
+            if id_order(match[1]) <= id_order(lesson.id) <= id_order(match[2])
         ]
     return [*found, *_globs(course, lesson, new)]
 
@@ -108,11 +109,3 @@ def _map(course: Course) -> ObjectNode:
     root = parse_toml(course.map).value
     assert root is not None  # a course was made of it
     return root
-
-
-def _part(span: Span, part: tuple[int, int]) -> Span:
-    return Span(span.source, span.start + part[0], span.start + part[1])
-
-
-def _order(id: str) -> list[int]:
-    return [int(part) for part in id.split(".") if part.isdecimal()]
