@@ -112,7 +112,7 @@ class _Scene:
         given: bool = False,
     ) -> TextureMapping | None:
         """How the texture of a material lies on a geom; -1 is no material."""
-        material = self.scene["materials"][index] if index >= 0 else {"texture": -1}
+        material: dict[str, Any] = self.scene["materials"][index] if index >= 0 else {"texture": -1}
         texture = self.textures[material["texture"]] if material["texture"] >= 0 else None
         if texture is None or texture.role == SKY:
             return None
