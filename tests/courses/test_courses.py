@@ -35,7 +35,7 @@ def test_there_are_cases() -> None:
 def test_course_becomes_what_is_expected(
     case: str, built_courses: BuiltCourses, request: pytest.FixtureRequest
 ) -> None:
-    root = built_courses.of_case(case).root
+    root = built_courses[case].root
     made = outputs(root)
     assert authored(root) == authored(HERE / case / "course")
     expected = HERE / case / "expected"

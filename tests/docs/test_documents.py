@@ -138,7 +138,7 @@ def test_the_picture_is_there_and_small() -> None:
 @pytest.mark.slow
 @pytest.mark.browser
 def test_the_picture_can_be_taken_again(built_courses: BuiltCourses, tmp_path: Path) -> None:
-    site = built_courses.real().root / "public"
+    site = built_courses["real"].root / "public"
     script = [sys.executable, DOCS / "screenshots.py", "--site", site, "--images", tmp_path]
     done = subprocess.run(script, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

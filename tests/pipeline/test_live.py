@@ -28,7 +28,7 @@ def test_course_of_every_construct_after_edits_is_what_a_clean_build_gives(
     builds: Builds,
 ) -> None:
     """What takes long in it is known from a build, but for what was edited."""
-    before = built_courses.of_case("full").root
+    before = built_courses["full"].root
     for name in TRIALS:
         shutil.copytree(before / ".coursebuild" / name, builds.trials / name)
     folder = Folder(tmp_path / "course")

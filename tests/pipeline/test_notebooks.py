@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +17,12 @@ from coursebuild.core.scripts.compare import compare
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from support.scratch_course import ROOT, Folder, Make, block
+from support.built_sites import BuiltCourses
+from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.slow
 
-COURSES = {
-    "every construct": ROOT / "tests" / "courses" / "full" / "course",
-    "other letters": ROOT / "tests" / "courses" / "unicode" / "course",
-    "this course": ROOT,
-}
+COURSES = ("full", "unicode", "real")
 
 
 def notebook_client(notebook: Any, **options: Any) -> Any:
@@ -34,31 +31,13 @@ def notebook_client(notebook: Any, **options: Any) -> Any:
     return NotebookClient(notebook, **options)
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Callable[[str], Folder]:
-    """Courses of this repository, each built once."""
-    made: dict[str, Folder] = {}
-
-    def build(name: str) -> Folder:
-        if name not in made:
-            folder = Folder(tmp_path_factory.mktemp("exports") / "course")
-            folder.copy(COURSES[name])
-            folder.borrow(stores)
-            done = folder.main("build", "--quiet")
-            assert done.status == 0, done.out
-            made[name] = folder
-        return made[name]
-
-    return build
-
-
 def notebooks(folder: Folder) -> Iterator[Path]:
     return iter(sorted((folder.root / "public" / "lessons").glob("*.ipynb")))
 
 
 @pytest.mark.parametrize("name", COURSES)
-def test_notebooks_of_course_are_valid(built: Callable[[str], Folder], name: str) -> None:
-    paths = list(notebooks(built(name)))
+def test_notebooks_of_course_are_valid(built_courses: BuiltCourses, name: str) -> None:
+    paths = list(notebooks(built_courses[name]))
     assert paths
     for path in paths:
         nbformat.validate(nbformat.read(path, as_version=4))
@@ -69,9 +48,9 @@ def test_notebooks_of_course_are_valid(built: Callable[[str], Folder], name: str
 @pytest.mark.parametrize("name", COURSES)
 @pytest.mark.filterwarnings("ignore")
 def test_notebooks_of_course_run_in_an_empty_folder(
-    built: Callable[[str], Folder], name: str, tmp_path: Path
+    built_courses: BuiltCourses, name: str, tmp_path: Path
 ) -> None:
-    folder = built(name)
+    folder = built_courses[name]
     course = parse_course_map(
         Source("content/course.toml", folder.text("content/course.toml"))
     ).value
@@ -88,7 +67,7 @@ def test_notebooks_of_course_run_in_an_empty_folder(
                 verdict = compare(recording, how, course.filters, printed[recording.script])
                 assert verdict.status in ("verified", "volatile"), verdict.changes
                 compared += 1
-    assert compared >= (2 if name != "other letters" else 1)
+    assert compared >= (2 if name != "unicode" else 1)
 
 
 def executed(path: Path, folder: Path) -> dict[str, str]:

@@ -21,7 +21,7 @@ FULL = ROOT / "tests/courses/full/course"
 @pytest.fixture(scope="module")
 def original(built_courses: BuiltCourses) -> Folder:
     """The course that uses everything, built in a process of the tests."""
-    return built_courses.of_case("full")
+    return built_courses["full"]
 
 
 def test_build_elsewhere_in_another_environment_gives_the_same_bytes(

@@ -69,22 +69,17 @@ class BuiltCourses:
     shared: Path
     stores: Path
 
-    def of_case(self, name: str) -> Folder:
-        """The course of a folder in tests/courses."""
-        folder = Folder(self.shared / name / "a course")
+    def __getitem__(self, name: str) -> Folder:
+        """The course of a folder in tests/courses, or the `real` one, of this repository."""
+        folder = Folder(ROOT if name == "real" else self.shared / name / "a course")
         done = self.shared / name / "done"
         with _locked(self.shared / name):
             if not done.exists():
-                shutil.rmtree(folder.root, ignore_errors=True)
-                _build(course_copy(name, folder.root, self.stores))
+                if name != "real":
+                    shutil.rmtree(folder.root, ignore_errors=True)
+                    course_copy(name, folder.root, self.stores)
+                _build(folder)
                 done.touch()
-        return folder
-
-    def real(self) -> Folder:
-        """The course of this repository: where `make site` has been run, nothing is to do."""
-        folder = Folder(ROOT)
-        with _locked(self.shared / "real"):
-            _build(folder)
         return folder
 
 
@@ -96,7 +91,7 @@ class Sites(dict[str, Site]):
         self._courses = courses
 
     def __missing__(self, name: str) -> Site:
-        folder = self._courses.real() if name == "real" else self._courses.of_case(name)
+        folder = self._courses[name]
         self[name] = Site(folder.root, Host(folder.root / "public", _BASES.get(name, "/")))
         return self[name]
 

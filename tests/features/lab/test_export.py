@@ -177,7 +177,7 @@ def run(path: Path, *values: object) -> str:
 def test_scripts_that_the_site_offers_print_what_lesson_4_2_says(
     built_courses: BuiltCourses, tmp_path: Path
 ) -> None:
-    found = (built_courses.real().root / "public/assets/labs").glob("*-lab-*.json")
+    found = (built_courses["real"].root / "public/assets/labs").glob("*-lab-*.json")
     offers = {path.name: json.loads(path.read_text()).get("exportPython", {}) for path in found}
     assert None not in offers.values() and {} in offers.values()
     ours = [offers[name] for name in sorted(offers) if name.startswith("4.2-lab-")]
