@@ -42,6 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         said = said_before(directory, words)
         if said is not None:
             return _end(write(said, CLEAN), alone=arguments is None)
+        _occupy_streams()
         from coursebuild.cli.running import run
     except KeyboardInterrupt:
         return say(INTERRUPTED, "interrupted")
@@ -68,6 +69,13 @@ def _end(status: int, *, alone: bool) -> int:
             except (OSError, ValueError):
                 continue
     os._exit(status)
+
+
+def _occupy_streams() -> None:
+    """Keep 0, 1 and 2, where they are closed, from the pipes to processes."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(number)
 
 
 def _utf8_streams() -> None:
