@@ -34,7 +34,7 @@ COURSE = {"text": "Course Text", "interface": "Course Interface", "code": "Cours
 _OWN = {TEXT: COURSE["text"], CODE: COURSE["code"]}
 """Those that come before families of the bundle."""
 
-BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·½×éöü–—‘’“”…•−")
+BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·¹½×éöü–—‘’“”…•−")
 """Characters that are always kept, so that few edits change a font."""
 
 _VERSION = 6
