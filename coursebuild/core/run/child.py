@@ -19,6 +19,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
@@ -46,7 +47,6 @@ class JsonChild:
         self._python = python or sys.executable
         self._script = script
         self._seconds = seconds
-
         self._life = contextlib.ExitStack()
         self._folder = ""
         self._process: subprocess.Popen[bytes] | None = None
@@ -132,9 +132,17 @@ class JsonChild:
         return process
 
     def _read_line(self, seconds: float) -> bytes | None:
-        """The next line of the child; `None` if it died, or said nothing for so long."""
+        """The next line of the child; `None` if it died, or did not end one for so long."""
         assert self._process is not None and self._process.stdout is not None
+        until = time.monotonic() + seconds
+        line = bytearray()
         with selectors.DefaultSelector() as selector:
             selector.register(self._process.stdout, selectors.EVENT_READ)
-            line = self._process.stdout.readline() if selector.select(seconds) else b""
-        return line[:-1] if line.endswith(b"\n") else None
+            while not line.endswith(b"\n"):
+                if not selector.select(max(0.0, until - time.monotonic())):
+                    return None
+                data = os.read(self._process.stdout.fileno(), 1 << 20)
+                if not data:
+                    return None
+                line += data
+        return bytes(line[:-1])

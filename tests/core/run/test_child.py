@@ -38,10 +38,10 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def make(tmp_path: Path) -> JsonChild:
+def make(tmp_path: Path, seconds: float = 120.0) -> JsonChild:
     script = tmp_path / "worker.py"
     script.write_text(SERVE)
-    return JsonChild(str(script), 120.0)
+    return JsonChild(str(script), seconds)
 
 
 def test_questions_and_answers(tmp_path: Path, temporary: Path) -> None:
@@ -73,6 +73,13 @@ def test_an_interrupt_from_another_thread(tmp_path: Path, temporary: Path) -> No
         with pytest.raises(EffectError, match="interrupted"):
             one.ask(2)
     assert list(temporary.iterdir()) == []
+
+
+def test_half_an_answer_is_waited_for_no_longer_than_a_whole_one(tmp_path: Path) -> None:
+    with make(tmp_path, 0.1) as one:
+        assert one.ask({"do": "sys.stdout.write('{'); sys.stdout.flush(); signal.pause()"}) is None
+        assert one.death() == "took longer than 0.1 s"
+        assert one.ask(1)["got"] == 1, "another child"
 
 
 def test_it_ends_with_its_parent(tmp_path: Path) -> None:
