@@ -12,10 +12,9 @@ Entry point: `BlockWriter`, of which each kind says where links lead and what ou
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from typing import assert_never
-
-from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.pages.html_context import OwnBlock
@@ -46,32 +45,32 @@ _COMMENT = re.compile(r"(?<!\\)%")
 _MINUS = re.compile(r"(?<!\w)-(?=\d)")
 
 
-class BlockWriter(Struct, frozen=True):
+class BlockWriter(ABC):
     """Writes blocks; a kind of its own says what depends on where the Markdown goes."""
 
+    @abstractmethod
     def href(self, target: model.Target) -> str:
         """The address of a link."""
-        raise NotImplementedError
 
+    @abstractmethod
     def url(self, url: str) -> str:
         """The address of a picture that is written as `url`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def reference(self, note: int) -> str:
         """A reference to a footnote."""
-        raise NotImplementedError
 
+    @abstractmethod
     def named(self, target: model.Target) -> str:
         """What a link without a text says: the number of a formula; empty for none."""
-        raise NotImplementedError
 
+    @abstractmethod
     def number(self, start: int) -> str:
         """The number that is to stand beside the formula at an offset; empty for none."""
-        raise NotImplementedError
 
+    @abstractmethod
     def own(self, block: OwnBlock) -> str:
         """A block of ours, without its last line end; empty for none."""
-        raise NotImplementedError
 
     def inlines(self, inlines: Iterable[model.Inline]) -> str:
         """Inlines in one line, such as a title."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import assert_never
 
 from markupsafe import Markup
@@ -24,7 +25,8 @@ from coursebuild.features.markdown.blocks import BlockWriter
 from coursebuild.features.markdown.from_html import markdown_of
 
 
-class DocumentWriter(BlockWriter, frozen=True):
+@dataclass(frozen=True)
+class DocumentWriter(BlockWriter):
     """A document as plain Markdown."""
 
     page: PageContext

@@ -30,7 +30,7 @@ EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | r
 DIFFERENT = {39: "a line's end that is written as a character reference becomes one"}
 
 
-class Context(BlockWriter, frozen=True):
+class Context(BlockWriter):
     """Addresses stay as they are written."""
 
     def href(self, target: Target) -> str:
