@@ -40,6 +40,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+@pytest.fixture
+def rewriting(request: pytest.FixtureRequest) -> bool:
+    """Whether what is expected is written anew."""
+    return bool(request.config.getoption("--rewrite-fixtures"))
+
+
 NOBODY = 65534
 STORES = ("fonts", "compressed")
 

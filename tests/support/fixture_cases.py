@@ -1,16 +1,18 @@
 """Fixture files: cases of `title / . / input / . / expected / .`, with empty lines between them.
 
-Entry point: `read_cases(path)`; `rewrite(path, cases)` writes them again. Lines before a title that
-are empty or begin with `#` are for readers of the file.
+Entry points: `check_cases(path, made)`; `read_cases(path)`, and `rewrite(path, cases)`, which
+writes them again. Lines before a title that are empty or begin with `#` are for readers of the
+file.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 _LINE = re.compile(r"[^\n]*\n|[^\n]+")
 
@@ -31,6 +33,17 @@ class Case(Struct, frozen=True):
         """The case as it stands in the file."""
         parts = (f"{self.title}\n", self.input, self.expected)
         return self.remarks + "".join(f"{part}.\n" for part in parts)
+
+
+def check_cases(path: Path, made: Callable[[Case], str], *, rewriting: bool) -> None:
+    """Compare what is made of each case with what is expected, or write that anew."""
+    cases = read_cases(path)
+    found = [replace(case, expected=made(case)) for case in cases]
+    if rewriting:
+        rewrite(path, found)
+        return
+    for case, now in zip(cases, found, strict=True):
+        assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
 
 
 def read_cases(path: Path) -> list[Case]:

@@ -9,10 +9,8 @@ import ast
 from collections.abc import Callable
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from coursebuild.core.text.diagnostics import Diagnostic
-from support.fixture_cases import read_cases, rewrite
+from support.fixture_cases import check_cases
 from support.positioned_nodes import shown
 
 FOLDER = Path(__file__).parents[1] / "fixtures" / "texts"
@@ -22,14 +20,7 @@ Reader = Callable[[str], tuple[object, tuple[Diagnostic, ...]]]
 
 
 def check_texts(name: str, read: Reader, *, rewriting: bool) -> None:
-    path = FOLDER / f"{name}.md"
-    cases = read_cases(path)
-    found = [replace(case, expected=_told(case.input, read)) for case in cases]
-    if rewriting:
-        rewrite(path, found)
-        return
-    for case, now in zip(cases, found, strict=True):
-        assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
+    check_cases(FOLDER / f"{name}.md", lambda case: _told(case.input, read), rewriting=rewriting)
 
 
 def _told(texts: str, read: Reader) -> str:

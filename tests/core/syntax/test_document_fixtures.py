@@ -9,12 +9,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from support.fixture_cases import Case, read_cases, rewrite
+from support.fixture_cases import Case, check_cases
 from support.tree_dump import dump
 
 FOLDER = Path(__file__).parents[2] / "fixtures" / "syntax"
@@ -33,11 +32,5 @@ def test_every_file_of_the_folder_is_read() -> None:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_documents_are_as_their_fixtures_say(path: Path, request: pytest.FixtureRequest) -> None:
-    cases = read_cases(path)
-    found = [replace(case, expected=dumped(path, case)) for case in cases]
-    if request.config.getoption("--rewrite-fixtures"):
-        rewrite(path, found)
-        return
-    for case, now in zip(cases, found, strict=True):
-        assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
+def test_documents_are_as_their_fixtures_say(path: Path, rewriting: bool) -> None:
+    check_cases(path, lambda case: dumped(path, case), rewriting=rewriting)

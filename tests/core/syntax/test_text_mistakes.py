@@ -1,4 +1,4 @@
-"""What an author is told of wrong JSON, TOML, course maps, files beside models, and quizzes.
+"""What an author is told of wrong JSON, TOML, course maps, files beside models, labs and quizzes.
 
 The cases are `tests/fixtures/texts/`; `pytest tests/core/syntax --rewrite-fixtures` writes what is
 expected anew.
@@ -13,7 +13,7 @@ from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
-from support import quiz_fences
+from support import lab_fences, quiz_fences
 from support.json_texts import parse
 from support.text_cases import FOLDER, Reader, check_texts
 
@@ -34,18 +34,24 @@ def read_model(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
     return parsed.value, parsed.diagnostics
 
 
+def read_lab(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
+    parsed = lab_fences.parse(text)
+    return parsed.value, parsed.diagnostics
+
+
 READERS: dict[str, Reader] = {
     "json": lambda text: (None, parse(text).diagnostics),
     "toml": read_toml,
     "map": read_map,
     "model": read_model,
+    "lab": read_lab,
     "quiz": lambda text: (None, quiz_fences.parse(text).diagnostics),
 }
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_what_an_author_is_told(name: str, request: pytest.FixtureRequest) -> None:
-    check_texts(name, READERS[name], rewriting=request.config.getoption("--rewrite-fixtures"))
+def test_what_an_author_is_told(name: str, rewriting: bool) -> None:
+    check_texts(name, READERS[name], rewriting=rewriting)
 
 
 def test_every_file_of_texts_is_read() -> None:
