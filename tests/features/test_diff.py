@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import check_text
 from support.scratch_course import Folder, block
 from support.workflows import commit, git
 
@@ -47,70 +48,7 @@ NEW = (
     .replace(block("gone.py", "print('gone')", "gone"), block("added.py", "print(1)", "1"))
     .replace(LAB % ("Throw", "1"), LAB % ("Spin", "0") + LAB % ("Throw", "2"))
 )
-REPORT = """\
-## What this change does
-
-Compared with {base}. Lessons and pages: 1.1 edited, 1.2 new.
-
-### Outputs
-
-What scripts print, as it is recorded. Whether they print it is what `check` says.
-
-| script | in | change |
-| --- | --- | --- |
-| `examples/value.py` | 1.1 | code edited; numeric: 1, extra lines: 1 (relative, up to 8.0e-02); \
-**compared in another way** (digits → volatile) |
-| `examples/table.py` | 1.1 | numeric: 1 (relative, up to 2.0e-01) |
-| `examples/gone.py` | 1.1 | removed |
-| `examples/added.py` | 1.1 | new |
-
-<details><summary><code>examples/value.py</code></summary>
-
-```diff
--value 1.25 of 7
-+value 1.35 of 7
-+and more
-```
-
-</details>
-
-<details><summary><code>examples/table.py</code></summary>
-
-```diff
--| 2 | 0.25 |
-+| 2 | 0.20 |
-```
-
-</details>
-
-### Figures
-
-What scripts draw, as it is recorded.
-
-| figure | change |
-| --- | --- |
-| `content/lessons/flip.svg` | 1 of its parts moved, by up to 10.0% of its size |
-
-### Labs
-
-What readers run. Whether each does what it promises is what `check` says.
-
-| in | lab | change |
-| --- | --- | --- |
-| 1.1 | Drop | model `ball` edited |
-| 1.1 | Throw | `setup` `"data.qvel[2] = 1"` → `"data.qvel[2] = 2"`, model `ball` edited |
-| 1.1 | Spin | new |
-
-### Truth
-
-Numbers in the text, and those that a script prints, a formula computes, or the author gives as \
-known. Whether they hold is what `check` says.
-
-| in | numbers | printed | computed | given | unproven | proven |
-| --- | --- | --- | --- | --- | --- | --- |
-| 1.1 | 2 → 3 | 1 | 0 | 0 | 1 → 2 | 50.0 % → 33.3 % |
-| all | 2 → 3 | 1 | 0 | 0 | 1 → 2 | 50.0 % → 33.3 % |
-"""
+HERE = Path(__file__).parent
 
 
 @pytest.fixture
@@ -135,15 +73,17 @@ def change(course: Folder) -> None:
     course.write("content/lessons/flip.svg", SVG % 60)
 
 
-def test_everything_that_a_change_does_is_told(course: Folder, tmp_path: Path) -> None:
+def test_everything_that_a_change_does_is_told(
+    course: Folder, tmp_path: Path, rewriting: bool
+) -> None:
     shutil.copytree(course.root, tmp_path / "before")
     base = git(course.root, "rev-parse", "--short=7", "HEAD")
     git(course.root, "checkout", "-q", "-b", "change")
     change(course)
-    wanted = REPORT.format(base=f"`main` ({base})")
     done = course.main("diff", "main")
     assert (done.status, done.err) == (0, "")
-    assert done.out == wanted
+    told = done.out.replace(f"`main` ({base})", "BASE")
+    check_text(HERE / "diff.md", told, rewriting=rewriting)
     git(course.root, "checkout", "-q", "--detach", "main")  # main goes on, which is no change here
     git(course.root, "stash", "-q", "-u")
     course.write("models/other.xml", MODEL % "0.3")
@@ -151,8 +91,8 @@ def test_everything_that_a_change_does_is_told(course: Folder, tmp_path: Path) -
     git(course.root, "branch", "-q", "-f", "main", "HEAD")
     git(course.root, "checkout", "-q", "change")
     git(course.root, "stash", "pop", "-q")
-    assert course.main("diff", "main").out == wanted
-    assert course.main("diff", "../../before").out == REPORT.format(base="`../../before`")
+    assert course.main("diff", "main").out == done.out
+    assert course.main("diff", "../../before").out == told.replace("BASE", "`../../before`")
     assert not (course.root / "examples").exists(), "nothing was run"
 
 

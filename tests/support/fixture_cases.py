@@ -2,7 +2,7 @@
 
 Entry points: `check_cases(path, made)`; `read_cases(path)`, and `rewrite(path, cases)`, which
 writes them again. Lines before a title that are empty or begin with `#` are for readers of the
-file.
+file. `check_text(path, made)` is for a file that only holds what is expected.
 """
 
 from __future__ import annotations
@@ -79,6 +79,13 @@ def rewrite(path: Path, cases: Iterable[Case]) -> None:
     """Write a fixture file anew."""
     text = "".join(case.text for case in cases)
     path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def check_text(path: Path, made: str, *, rewriting: bool) -> None:
+    """Compare a text with that of a file, or write the file anew."""
+    if rewriting:
+        path.write_text(made, encoding="utf-8", newline="\n")
+    assert made == path.read_text(encoding="utf-8"), path.name
 
 
 def text_lines(text: str) -> list[str]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -14,58 +17,52 @@ from support.bench_reports import awkward, swing
 from support.model_reports import box, case, diet, reports, row, run, scenario, scene
 from support.rendered_course import Make
 
+TEXTS: dict[Callable[[Any], str], dict[Any, str]] = {
+    power: {
+        0.0: "0",
+        1.0: "1.00",
+        -0.0604: "−0.0604",
+        0.001234: "0.00123",
+        12345.0: "12345",
+        123456.0: "1.23 × 10<sup>5</sup>",
+        -4.1e-10: "−4.10 × 10<sup>−10</sup>",
+        9.999e-4: "0.00100",
+        9.9e-4: "9.90 × 10<sup>−4</sup>",
+        math.nan: "nan",
+        None: "",
+    },
+    percent: {
+        0.0: "0 %",
+        -0.0604: "−6.040 %",
+        1e-5: "+0.001 %",
+        99.0: "+9900.000 %",
+        100.0: "+10000 %",
+        2.5e-13: "+2.5 × 10<sup>−11</sup> %",
+    },
+    factor: {None: "", 0.123456: "0.123", 99.9: "99.9", 1359.4: "1 359"},
+    size: {
+        0: "0 B",
+        9999: "9 999 B",
+        10_000: "10 kB",
+        81_212: "81 kB",
+        9_999_000: "9 999 kB",
+        10**7: "10 MB",
+        98_765_432: "99 MB",
+    },
+    sentence: {"": "", "it is": "It is.", "Is it?": "Is it?"},
+}
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0, "0"),
-        (1.0, "1.00"),
-        (-0.0604, "−0.0604"),
-        (0.001234, "0.00123"),
-        (12345.0, "12345"),
-        (123456.0, "1.23 × 10<sup>5</sup>"),
-        (-4.1e-10, "−4.10 × 10<sup>−10</sup>"),
-        (9.999e-4, "0.00100"),
-        (9.9e-4, "9.90 × 10<sup>−4</sup>"),
-        (float("nan"), "nan"),
-        (None, ""),
-    ],
-)
-def test_a_number_has_three_digits_and_a_power_of_ten_where_it_needs_one(
-    value: float | None, text: str
-) -> None:
-    assert power(value).replace("\u2009", " ") == text
 
-
-def test_errors_percentages_factors_and_sizes_as_text() -> None:
+def test_numbers_and_sentences_as_text() -> None:
+    """Three digits, and a power of ten where a number needs one; a thin space before a unit."""
+    made = {
+        write: {value: write(value).replace("\u2009", " ") for value in texts}
+        for write, texts in TEXTS.items()
+    }
+    assert made == TEXTS
     assert bounded(1e-11, 1e-11) == "&lt; 1.0\u2009×\u200910<sup>−11</sup>"
     assert [bounded(v, 0.0) for v in (None, 0.0, 0.5)] == ["", "0", "0.500"]
     assert bounded(0.002, 1e-3) == "0.00200"
-    assert percent(-0.0604) == "−6.040\u2009%"
-    assert percent(2.5e-13) == "+2.5\u2009×\u200910<sup>−11</sup>\u2009%"
-    assert percent(0.0) == "0\u2009%"
-    assert [percent(v) for v in (1e-5, 99.0, 100.0)] == [
-        "+0.001\u2009%",
-        "+9900.000\u2009%",
-        "+10000\u2009%",
-    ]
-    assert [factor(v) for v in (None, 0.123456, 99.9, 1359.4)] == [
-        "",
-        "0.123",
-        "99.9",
-        "1\u2009359",
-    ]
-    assert [size(n) for n in (0, 1396, 9999, 10_000, 81_212, 9_999_000, 10**7, 98_765_432)] == [
-        "0 B",
-        "1\u2009396 B",
-        "9\u2009999 B",
-        "10 kB",
-        "81 kB",
-        "9\u2009999 kB",
-        "10 MB",
-        "99 MB",
-    ]
-    assert [sentence(t) for t in ("", "it is", "Is it?")] == ["", "It is.", "Is it?"]
 
 
 def pages(make: Make, found: Reports) -> dict[str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -14,12 +13,6 @@ from coursebuild.features.lab.compile import LabCode, compile_lab
 from support.lab_values import Bench, make_lab
 
 Form: TypeAlias = Literal["statements", "setter", "expression", "target"]
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Bench(tmp_path_factory.mktemp("course")) as bench:
-        yield bench
 
 
 def mistakes(bench: Bench, given: list[tuple[Form, str]]) -> list[str | None]:

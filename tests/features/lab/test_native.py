@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import math
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +30,6 @@ HEAP = """<mujoco><option timestep="0.002" integrator="{}"/>
 </worldbody><actuator><motor joint="slide"/></actuator></mujoco>"""
 SLIDING = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .3">
 <joint name="j" {}/><geom size=".1"/></body></worldbody><actuator>{}</actuator></mujoco>"""
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Bench(tmp_path_factory.mktemp("course")) as bench:
-        yield bench
 
 
 @pytest.fixture(scope="module")

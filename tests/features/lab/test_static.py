@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -47,12 +46,6 @@ EVERYTHING = """
   <tendon><spatial width="0.01" rgba="0 1 0 1"><site site="s"/><site site="t"/></spatial></tendon>
 </mujoco>
 """  # noqa: E501
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with Bench(tmp_path_factory.mktemp("course")) as bench:
-        yield bench
 
 
 def main_of(bench: Bench, **fields: Any) -> tuple[Any, dict[str, Any]]:
