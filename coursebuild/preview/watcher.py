@@ -16,11 +16,13 @@ import threading
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from coursebuild.core.files.course_root import FOLDERS, is_dropping
 from coursebuild.core.files.errors import EffectError, reason
 
-FOLDERS = ("content", "features", "models", "mjcourse", "theme")
 LOOK = 0.200
 """Seconds between two looks for new and removed folders, and at files elsewhere."""
+_PROBE = "4913"
+"""A file that vim makes for a moment, to see whether it can."""
 _STEP = 2
 """Milliseconds between two looks for events: a save is noticed within two of them."""
 
@@ -158,9 +160,5 @@ class FolderWatcher:
         """Whether a path is one of the course, and none of an editor's or of Python's."""
         file = Path(path)
         return file.is_relative_to(self._root) and not any(
-            map(_is_dropping, file.relative_to(self._root).parts)
+            name == _PROBE or is_dropping(name) for name in file.relative_to(self._root).parts
         )
-
-
-def _is_dropping(name: str) -> bool:
-    return name.startswith((".", "#")) or name.endswith("~") or name in ("4913", "__pycache__")

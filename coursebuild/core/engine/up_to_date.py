@@ -20,12 +20,12 @@ import stat
 import sys
 import time
 
+from coursebuild.core.files.course_root import FOLDERS, is_dropping
+
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-FOLDERS = ("content", "features", "models", "mjcourse", "theme")
-"""What a course's author writes, and the library that a course may have of its own."""
 _HEADER = "coursebuild up to date 1"
 _FINE = 50_000_000
 """ns: a file changed longer ago than this has a time that another change would not have."""
@@ -158,7 +158,7 @@ def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
     for folder in folders:
         yield folder, "folder"
         with os.scandir(folder) as entries:
-            found = sorted((entry.name, entry) for entry in entries if _counts(entry.name))
+            found = sorted((entry.name, entry) for entry in entries if not is_dropping(entry.name))
         for name, entry in found:
             if entry.is_dir(follow_symlinks=False):
                 folders.append(entry.path)
@@ -177,11 +177,6 @@ def _numbers(status: os.stat_result, began: int | None) -> tuple[int, ...]:
         raise _UnclearError
     # The time of the last change of any kind: who edits a file may put its own time back.
     return status.st_mode, status.st_size, modified, status.st_ctime_ns, status.st_ino
-
-
-def _counts(name: str) -> bool:
-    """Whether what is called so counts: not what is hidden, an editor's copy or compiled."""
-    return name[0] != "." and name[-1] != "~" and name != "__pycache__"
 
 
 def _digest(data: bytes) -> bytes:

@@ -1,6 +1,6 @@
 """Where a course is, by strings and stat alone: a run with nothing to do loads no more than this.
 
-Entry point: `find_course_root`.
+Entry points: `find_course_root`; `is_dropping`, of names that are none of a course's files.
 """
 
 from __future__ import annotations
@@ -9,6 +9,14 @@ import os
 
 MAP = "content/course.toml"
 """By this file a folder is a course."""
+FOLDERS = ("content", "features", "models", "mjcourse", "theme")
+"""What a course's author writes, and the library that a course may have of its own."""
+
+
+def is_dropping(name: str) -> bool:
+    """Whether a file or folder of this name is hidden, an editor's copy or Python's own."""
+    is_copy = name.endswith("~") or (name.startswith("#") and name.endswith("#"))
+    return is_copy or name.startswith(".") or name == "__pycache__"
 
 
 def find_course_root(start: str) -> str | None:

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.files.course_root import MAP, find_course_root
+from coursebuild.core.files.course_root import MAP, find_course_root, is_dropping
 from coursebuild.core.files.errors import EffectError, OutsideProjectError, reason
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
@@ -186,14 +186,8 @@ class _Reader:
         if here in above:  # a link to a folder that it lies in
             return
         for name, is_link in names:
-            if (
-                name.startswith(".")
-                or name.endswith("~")
-                or (name.startswith("#") and name.endswith("#"))
-                or name == "__pycache__"
-            ):
-                continue
-            yield from self._entry(f"{folder}/{name}", is_link, above | {here})
+            if not is_dropping(name):
+                yield from self._entry(f"{folder}/{name}", is_link, above | {here})
 
     def _entry(self, path: str, is_link: bool, above: frozenset[tuple[int, int]]) -> Iterator[str]:
         if not _is_text(path):

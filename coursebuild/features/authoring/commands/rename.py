@@ -10,8 +10,8 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import WRONG, fail
-from coursebuild.core.engine.up_to_date import FOLDERS
 from coursebuild.core.files.changes import FileChange
+from coursebuild.core.files.course_root import FOLDERS
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.model import Course, Lesson
