@@ -33,7 +33,7 @@ class Pages:
 
 def texts(folder: Path) -> dict[str, str]:
     return {
-        p.relative_to(folder).as_posix(): p.read_text()
+        p.relative_to(folder).as_posix(): p.read_text(errors="replace")
         for p in folder.rglob("*")
         if p.is_file() and p.name != MARKER
     }

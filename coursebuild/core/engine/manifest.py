@@ -3,9 +3,9 @@
 Entry points: `Manifest.read(root, place)`, `Manifest.write`; `marker`, the list of its files that a
 site itself has, `holds` and `foreign_files`, by which nobody's files are published over.
 
-The manifest lies in `.coursebuild/`, since a site holds nothing that changes from build to build
-without need. It is only believed of a file that is, by size, time of change and inode, the one
-that was written; where it is missing or damaged everything is made again.
+The manifest is an entry of the course's `Memo`, since a site holds nothing that changes from build
+to build without need. It is only believed of a file that is, by size, time of change and inode, the
+one that was written; where it is missing or damaged everything is made again.
 """
 
 from __future__ import annotations
@@ -17,14 +17,12 @@ import stat
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
-import msgspec
 from msgspec import Struct
 
-from coursebuild.core.engine.memo import TEMPORARY, replace_file
-from coursebuild.core.files.locks import make_private_folder
+from coursebuild.core.engine.memo import Memo
 
-FOLDER = ".coursebuild/published"
-"""Where a course has its manifests."""
+KIND = "published"
+"""The kind of entry that a manifest is."""
 MARKER = ".coursebuild-site"
 """A file in every site: a line that says what it is, then the path of every file of the site."""
 _HEADER = "site built by coursebuild; every file listed here may be replaced"
@@ -69,11 +67,8 @@ class Manifest(Struct, frozen=True):
     @classmethod
     def read(cls, root: Path, place: Path) -> Manifest:
         """What is known of the site at this place: nothing, where there is no sound manifest."""
-        with contextlib.suppress(OSError, ValueError):
-            digest, _, body = _file(root, place).read_bytes().partition(b"\n")
-            if digest.decode() == hashlib.sha256(body).hexdigest():
-                return cls(place, msgspec.json.decode(body, type=dict[str, ManifestEntry]))
-        return cls(place, {})
+        found = Memo(root).get_value(KIND, _key(root, place), dict[str, ManifestEntry])
+        return cls(place, found or {})
 
     def entry(self, path: str, key: str) -> ManifestEntry | None:
         """What was published at a path under a key."""
@@ -90,21 +85,13 @@ class Manifest(Struct, frozen=True):
 
     def write(self, root: Path) -> None:
         """Keep it for the next build; one that cannot be written only costs time."""
-        body = msgspec.json.encode(self.entries)
-        path = _file(root, self.place)
-
-        with contextlib.suppress(OSError):
-            make_private_folder(root / ".coursebuild")
-            path.parent.mkdir(exist_ok=True)
-            for left in path.parent.glob(f"{TEMPORARY}*"):  # by a run that was killed
-                left.unlink(missing_ok=True)
-            replace_file(path, hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
+        Memo(root).put_value(KIND, _key(root, self.place), self.entries)
 
 
-def _file(root: Path, place: Path) -> Path:
-    """One for each place; it is kept when the project is moved with the site in it."""
+def _key(root: Path, place: Path) -> str:
+    """One for each place; it is the same when the project is moved with the site in it."""
     named = place.relative_to(root) if place.is_relative_to(root) else place
-    return root / FOLDER / hashlib.sha256(os.fsencode(named)).hexdigest()
+    return hashlib.sha256(os.fsencode(named)).hexdigest()
 
 
 # --- the files of a site

@@ -20,7 +20,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.engine.manifest import FOLDER, MARKER, Manifest, ManifestEntry, holds, marker
+from coursebuild.core.engine.manifest import KIND, MARKER, Manifest, ManifestEntry, holds, marker
+from coursebuild.core.engine.memo import FOLDER
 from coursebuild.core.engine.workers import Workers, can_fork
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile, SiteFile
 
@@ -182,7 +183,7 @@ def open_slot(root: Path, slot: Path) -> None:
     """Have the folder that the site is filled into: one that is left, or an empty one."""
     if not os.path.lexists(slot):
         with contextlib.suppress(OSError):  # there is none, or it is on another file system
-            (root / FOLDER / "spare").rename(slot)
+            (root / FOLDER / KIND / "spare").rename(slot)
     if not slot.is_dir() or slot.is_symlink():
         with contextlib.suppress(FileNotFoundError):
             slot.unlink()
@@ -195,7 +196,7 @@ def put_away(root: Path, slot: Path) -> None:
     with contextlib.suppress(OSError):
         slot.chmod(0o700)  # one that may not be written cannot be moved elsewhere
         with contextlib.suppress(OSError):
-            slot.rename(root / FOLDER / "spare")
+            slot.rename(root / FOLDER / KIND / "spare")
             return
         remove(slot)
 
