@@ -67,18 +67,14 @@ class _Compiler(JsonChild):
         self.timeout = timeout
 
     def compile(self, path: str, text: str) -> CompileResult:
-        request: mjcf_worker.CompileRequest = {
-            "path": str(self.root / path),
-            "text": text,
-            "limit": self.timeout,
-        }
-        reply: mjcf_worker.CompileReply | None = self.ask(request)
+        reply = self.ask((str(self.root / path), text, self.timeout))
         if reply is None:
             return CompileResult(f"{OWN_FAULT}{self.death()}")
-        if reply["facts"] is not None:
-            facts = reply["facts"] | {"includes": parts(self.root, path, text)}
+        error, facts = reply
+        if facts is not None:
+            facts |= {"includes": parts(self.root, path, text)}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
-        message = self._without_paths(reply["error"].strip())
+        message = self._without_paths(error.strip())
         if _NO_MEMORY.search(message):
             return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
         return CompileResult(message, error_line(message, text))

@@ -2,9 +2,10 @@
 
 Entry point: run as a file by `mjcf`, in a temporary folder, where MuJoCo may leave its log.
 
-The protocol: JSON lines. First this process says that it is ready; then, for each `CompileRequest`
-on standard input, it writes one `CompileReply`. A request that takes more processor time than its
-limit ends this process by SIGPROF.
+The protocol: JSON lines. First this process says that it is ready. A request has a path (where the
+text stands, or would: includes and assets are relative to it), a text, and seconds; one that takes
+more processor time ends this process by SIGPROF. The reply is a message, which is empty where it
+compiles, and then the facts of `results.ModelFacts`.
 """
 
 from __future__ import annotations
@@ -13,28 +14,10 @@ import json
 import os
 import signal
 import sys
-from typing import Any, TypedDict
+from typing import Any
 
 _INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 """In the order of mjtIntegrator, by their names in MJCF."""
-
-
-class CompileRequest(TypedDict):
-    """What to compile."""
-
-    path: str
-    """Where the text stands, or would: includes and assets are relative to it."""
-    text: str
-    limit: float
-    """Seconds."""
-
-
-class CompileReply(TypedDict):
-    """What became of it: a message, or facts."""
-
-    error: str
-    facts: dict[str, Any] | None
-    """Those of `results.ModelFacts`."""
 
 
 def main() -> None:
@@ -47,23 +30,22 @@ def main() -> None:
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
-        request: CompileRequest = json.loads(line)
-        signal.setitimer(signal.ITIMER_PROF, request["limit"])
-        reply = _compile(mujoco, request)
+        path, text, seconds = json.loads(line)
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+        reply = _compile(mujoco, path, text)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps(reply), file=replies, flush=True)
 
 
-def _compile(mujoco: Any, request: CompileRequest) -> CompileReply:
-    path = request["path"]
+def _compile(mujoco: Any, path: str, text: str) -> tuple[str, dict[str, Any] | None]:
     try:
-        model = mujoco.MjModel.from_xml_path(path, assets={path: request["text"].encode()})
+        model = mujoco.MjModel.from_xml_path(path, assets={path: text.encode()})
     except (ValueError, RuntimeError, mujoco.FatalError, MemoryError) as error:
-        return {"error": str(error) or type(error).__name__, "facts": None}
-    return {"error": "", "facts": _facts(mujoco, model)}
+        return str(error) or type(error).__name__, None
+    return "", _facts(model)
 
 
-def _facts(mujoco: Any, model: Any) -> dict[str, Any]:
+def _facts(model: Any) -> dict[str, Any]:
     def names(addresses: Any) -> list[str]:
         blob: bytes = model.names
         return [blob[a : blob.index(b"\0", a)].decode("utf-8", "replace") for a in addresses]

@@ -173,7 +173,6 @@ class ScriptProcess:
         self,
         job: Job,
         environment: Mapping[str, str],
-        notes: str,
         shared: mmap.mmap | None,
         preloaded: Preloaded,
     ) -> None:
@@ -182,7 +181,6 @@ class ScriptProcess:
         self.main = ModuleType("__main__")
         self.names: dict[str, Any] = vars(self.main)
         self._environment = environment
-        self._notes = notes
         self._shared = shared
         self._preloaded = preloaded
 
@@ -235,7 +233,8 @@ class ScriptProcess:
         if "PYTHONPATH" in self._environment and not f"{library}/".startswith(f"{root}/"):
             installed.append(f"{library}/mjcourse")  # unless the project itself holds it
         temporary, writable = self._environment["TMPDIR"], self.job["writes"]
-        return Tracer(root, temporary, installed, self._notes, self._shared, writable)
+        overflow = notes_folder(temporary)
+        return Tracer(root, temporary, installed, overflow, self._shared, writable)
 
 
 def _installed_folders() -> list[str]:
@@ -245,6 +244,11 @@ def _installed_folders() -> list[str]:
     if site.ENABLE_USER_SITE:
         found.add(site.getusersitepackages())
     return sorted({f for folder in found for f in (folder, os.path.realpath(folder))})
+
+
+def notes_folder(temporary: str) -> str:
+    """Where notes go for which there is no shared memory, given the script's temporary folder."""
+    return f"{temporary}.notes"
 
 
 def figure_path(temporary: str, name: str) -> str:

@@ -35,18 +35,22 @@ import signal
 import struct
 import subprocess
 import sys
-import time
 import traceback
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypedDict
 
-from coursebuild.core.run.script_process import Job, Preloaded, ScriptProcess, figure_path
+from coursebuild.core.run.script_process import (
+    Job,
+    Preloaded,
+    ScriptProcess,
+    figure_path,
+    notes_folder,
+)
 from coursebuild.core.run.watching import (
     STDERR_KEPT,
     STDOUT_LIMIT,
     RunningScript,
-    ScriptHandle,
     has_ended,
 )
 
@@ -55,8 +59,6 @@ PROGRAM = str(Path(__file__).with_name("worker_main.py"))
 
 FIGURE_LIMIT = 4 << 20
 """Bytes that a figure may have."""
-_NOTES = ".notes"
-"""What the folder of a script's notes is called, after its temporary folder."""
 _NOTES_BYTES = 1 << 20
 """What a script may note of what it looks at, before the rest goes to files."""
 _OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
@@ -67,20 +69,12 @@ _PR_SET_CHILD_SUBREAPER = 36
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGCHLD)
 
 
-class _Start(TypedDict):
-    """A script that this program is started for."""
-
-    job: Job
-    environment: dict[str, str]
-    notes: str
-
-
 def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
     """Run what the tool asks for until it closes the pipe; only a script's process returns.
 
     The arguments are descriptors: where jobs are read and where reports are written, and whether
-    scripts may be copies of this process; or a `_Start` as JSON. `bare` are the modules that every
-    Python has from its start.
+    scripts may be copies of this process; or a `Job` as JSON, for which this program is started.
+    `bare` are the modules that every Python has from its start.
     """
     if len(arguments) == 1:
         return _alone(json.loads(arguments[0]), bare)
@@ -120,16 +114,16 @@ class ChildReport(TypedDict):
     watched), of each figure of the job; -1 of one that it did not draw."""
 
 
-def _alone(start: _Start, bare: Collection[str]) -> ScriptProcess:
+def _alone(job: Job, bare: Collection[str]) -> ScriptProcess:
     """The script that this process was started for."""
-    job, preloaded = start["job"], Preloaded()
+    preloaded = Preloaded()
     shadowed = _beside(job) & preloaded.names()
     if not shadowed:
         preloaded.load(job["packages"])
     for name in [name for name in sys.modules if name.partition(".")[0] in shadowed]:
         if name not in bare:
             del sys.modules[name]
-    return ScriptProcess(job, start["environment"], start["notes"], None, preloaded)
+    return ScriptProcess(job, os.environ, None, preloaded)
 
 
 class _Supervisor:
@@ -181,8 +175,7 @@ class _Supervisor:
         if self.may_fork:
             self.preloaded.load(job["packages"])
         folder = ""
-        launched: ScriptHandle | ScriptProcess | None = None
-        start = time.monotonic()
+        launched: RunningScript | ScriptProcess | None = None
         try:
             try:
                 for written, place in job["copied"]:
@@ -194,29 +187,27 @@ class _Supervisor:
                 return _unstartable(f"the script cannot be started: {error}\n")
             if isinstance(launched, ScriptProcess):
                 return launched
-            run = RunningScript(launched, start, job["timeout"], self.awake)
             try:
-                run.watch(self.jobs, parent)
+                launched.watch(self.jobs, parent)
             finally:
-                run.end()
-            trace = _notes(launched.shared, folder + _NOTES)
-            return _finished(run, trace, _drawn(folder, job["figures"]))
+                launched.end()
+            trace = _notes(launched.shared, notes_folder(folder))
+            return _finished(launched, trace, _drawn(folder, job["figures"]))
         finally:
             if folder and not isinstance(launched, ScriptProcess):
                 remove_folder(folder)
-                remove_folder(folder + _NOTES)
+                remove_folder(notes_folder(folder))
 
-    def _launch(self, job: Job, environment: dict[str, str]) -> ScriptHandle | ScriptProcess:
+    def _launch(self, job: Job, environment: dict[str, str]) -> RunningScript | ScriptProcess:
         """Start a script; the script itself in the process that is to become it."""
         if any(b"\0" in os.fsencode(argument) for argument in job["args"]):
             raise ValueError("embedded null byte")
-        notes = environment["TMPDIR"] + _NOTES
-        start: _Start = {"job": job, "environment": environment, "notes": notes}
         (out, stdout), (err, stderr) = os.pipe(), os.pipe()
         try:
             prepare = functools.partial(self._prepare_script, job, stdout, stderr, os.getpid())
             if not self._can_fork(job):
-                return ScriptHandle(_spawn(start, prepare), out, err, None)
+                pid = _spawn(job, environment, prepare)
+                return RunningScript(pid, (out, err), None, job["timeout"], self.awake)
             shared = mmap.mmap(-1, _NOTES_BYTES)
             gc.freeze()  # a script's collector shall not look at, and so copy, what is here
             pid = os.fork()
@@ -224,8 +215,8 @@ class _Supervisor:
                 prepare()
                 signal.set_wakeup_fd(-1)
                 os.closerange(3, max(self.awake, stderr, self.reports) + 16)
-                return ScriptProcess(job, environment, notes, shared, self.preloaded)
-            return ScriptHandle(pid, out, err, shared)
+                return ScriptProcess(job, environment, shared, self.preloaded)
+            return RunningScript(pid, (out, err), shared, job["timeout"], self.awake)
         except BaseException:
             os.close(out)
             os.close(err)
@@ -269,11 +260,11 @@ def _beside(job: Job) -> frozenset[str]:
     return frozenset(found)
 
 
-def _spawn(start: _Start, prepare: Callable[[], None]) -> int:
+def _spawn(job: Job, environment: Mapping[str, str], prepare: Callable[[], None]) -> int:
     """Start this program for one script."""
     process = subprocess.Popen(
-        [sys.executable, PROGRAM, json.dumps(start)],
-        env=start["environment"],
+        [sys.executable, PROGRAM, json.dumps(job)],
+        env=environment,
         stdin=subprocess.DEVNULL,
         preexec_fn=prepare,  # safe: there is no other thread
     )

@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 _EXITING = 0x4
 """A flag of a process, see proc_pid_stat(5): `PF_EXITING`."""
@@ -27,16 +27,6 @@ GRACE = 0.5
 """Seconds between asking a script that ran too long where it is, and killing it."""
 
 _CHUNK = 1 << 16
-
-
-class ScriptHandle(NamedTuple):
-    """The process of a script, and the ends of its pipes that are read here."""
-
-    pid: int
-    stdout: int
-    stderr: int
-    shared: mmap.mmap | None
-    """Where it notes what it looks at, if that is shared with this process."""
 
 
 def has_ended(parent: int) -> bool:
@@ -56,21 +46,32 @@ def has_ended(parent: int) -> bool:
 
 
 class RunningScript:
-    """One script, from its start until nothing of it is left."""
+    """One script, from its start until nothing of it is left.
 
-    def __init__(self, launched: ScriptHandle, start: float, timeout: float, awake: int) -> None:
-        self.pid = launched.pid
+    Args:
+        pid: its process.
+        pipes: the ends that are read here, of its output and of its error output.
+        shared: where it notes what it looks at, if that is shared with this process.
+        timeout: seconds that it may take.
+        awake: what can be read from when a child has ended.
+    """
+
+    def __init__(
+        self, pid: int, pipes: tuple[int, int], shared: mmap.mmap | None, timeout: float, awake: int
+    ) -> None:
+        self.pid = pid
+        self.shared = shared
         self.awake = awake
         self.stdout = bytearray()
         self.stderr = bytearray()
         self.limit: Literal["", "timeout", "output-limit"] = ""
         """The limit that it has reached."""
         self.seconds = 0.0
-        self.start = start
-        self.deadline = start + timeout
+        self.start = time.monotonic()
+        self.deadline = self.start + timeout
         self.status: int | None = None
-        self.pipes = {launched.stdout: self.stdout, launched.stderr: self.stderr}
-        self._opened = (launched.stdout, launched.stderr)
+        self.pipes = dict(zip(pipes, (self.stdout, self.stderr), strict=True))
+        self._opened = pipes
         for fd in self.pipes:
             os.set_blocking(fd, False)
 

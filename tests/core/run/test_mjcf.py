@@ -234,11 +234,11 @@ sys.path.insert(0, {str(Path(mjcf.__file__).parents[3])!r})
 import ctypes, os
 from coursebuild.core.run import mjcf_worker
 really = mjcf_worker._compile
-def compile(mujoco, request):
-    if 'crash' in request['text']: ctypes.string_at(0)
-    if 'exit' in request['text']: os._exit(7)
-    if 'noise' in request['text']: print('noise'); os.write(1, b'noise')
-    return really(mujoco, request)
+def compile(mujoco, path, text):
+    if 'crash' in text: ctypes.string_at(0)
+    if 'exit' in text: os._exit(7)
+    if 'noise' in text: print('noise'); os.write(1, b'noise')
+    return really(mujoco, path, text)
 mjcf_worker._compile = compile
 mjcf_worker.main()
 """
