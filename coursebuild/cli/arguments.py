@@ -9,26 +9,19 @@ from __future__ import annotations
 import argparse
 import os
 
-TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
-if TYPE_CHECKING:
-    from coursebuild.pipeline.options import Options
+from coursebuild.core.run.sandbox import find_sandbox
+from coursebuild.pipeline.options import Options, find_course, open_store
 
 
 def options_of(arguments: argparse.Namespace) -> Options:
     """What the arguments say to every command."""
-    from coursebuild.pipeline.options import Options, find_course, open_store
-
     jobs = getattr(arguments, "jobs", None) or available_cores()
     root = find_course(arguments.root)
     store = None
     if hasattr(arguments, "cache"):
         fresh = arguments.no_cache
         store = open_store(root, arguments.cache, arguments.cache_size, fresh=fresh)
-    sandbox = None
-    if getattr(arguments, "sandbox", False):
-        from coursebuild.core.run.sandbox import find_sandbox
-
-        sandbox = find_sandbox(root)
+    sandbox = find_sandbox(root) if getattr(arguments, "sandbox", False) else None
     quiet, long, verbose = (getattr(arguments, n, False) for n in ("quiet", "long", "verbose"))
     return Options(root, jobs, quiet, store, long, verbose, sandbox=sandbox)
 

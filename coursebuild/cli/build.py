@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from coursebuild.cli.arguments import add_running, add_sandbox
 from coursebuild.cli.unchanged import run_unless_unchanged
-
-TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
-if TYPE_CHECKING:
-    from coursebuild.pipeline.options import Options
-    from coursebuild.report import Report
+from coursebuild.pipeline.build import build
 
 EXAMPLES = """\
 examples:
@@ -34,12 +31,5 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Publish the site, or say why not."""
     out: str = arguments.out
-
-    def work(options: Options) -> Report:
-        from pathlib import Path
-
-        from coursebuild.pipeline.build import build
-
-        return build(options, Path(out))
-
-    return run_unless_unchanged(arguments, ("examples", out), work)
+    made = ("examples", out)
+    return run_unless_unchanged(arguments, made, lambda options: build(options, Path(out)))

@@ -15,11 +15,11 @@ from coursebuild.cli.arguments import (
 )
 from coursebuild.cli.output import CLEAN, print_report, style_of, write
 from coursebuild.cli.unchanged import run_unless_unchanged
-
-TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
-if TYPE_CHECKING:
-    from coursebuild.pipeline.options import Options
-    from coursebuild.report import Report
+from coursebuild.core.files.errors import UsageError
+from coursebuild.pipeline.check import check
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.shards import read_shard
+from coursebuild.report import Report
 
 EXAMPLES = """\
 examples:
@@ -77,9 +77,6 @@ def run(arguments: argparse.Namespace) -> int:
         return _against(arguments)
 
     def work(options: Options) -> Report:
-        from coursebuild.pipeline.check import check
-        from coursebuild.pipeline.shards import read_shard
-
         return check(
             options,
             tuple(arguments.lessons),
@@ -100,7 +97,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _against(arguments: argparse.Namespace) -> int:
     """Tell what the scripts do with another version of MuJoCo; no difference is a mistake."""
-    from coursebuild.core.files.errors import UsageError
     from coursebuild.pipeline.against import against
     from coursebuild.report.against import against_json, against_text
 

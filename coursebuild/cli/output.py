@@ -59,26 +59,21 @@ def _forget_stdout() -> None:
 
 def print_report(report: Report, form: str, options: Options) -> int:
     """Write a report in one of its formats; gives the status that says whether all is well."""
-    from coursebuild.report import render_report
-
-    status = CLEAN if report.ok else WRONG
     options.store.close()
-    if form == "text":
-        return write(report_text(report, options), status)
-    return write(render_report(report, form, style_of(sys.stdout)), status)
+    return write(report_text(report, form, options), CLEAN if report.ok else WRONG)
 
 
-def report_text(report: Report, options: Options) -> str:
-    """The report as it is printed: only what is wrong, where the user wants no more."""
+def report_text(report: Report, form: str, options: Options) -> str:
+    """The report as it is printed: as text only what is wrong, where the user wants no more."""
     from msgspec.structs import replace
 
     from coursebuild.report import render_report
 
-    if options.quiet:
+    if options.quiet and form == "text":
         if not report.diagnostics:
             return ""
         report = replace(report, scripts=(), labs=(), remarks=(), sensitivity=None)
-    return render_report(report, "text", style_of(sys.stdout))
+    return render_report(report, form, style_of(sys.stdout))
 
 
 def look(stream: TextIO | None) -> tuple[bool, int]:

@@ -14,7 +14,7 @@ import os
 import sys
 
 from coursebuild.cli.output import look, print_report, report_text
-from coursebuild.core.engine.up_to_date import unchanged
+from coursebuild.core.engine.up_to_date import Watcher, unchanged
 from coursebuild.core.files.course_root import find_course_root
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report
 
-COMMANDS = ("build", "check")
-"""Those that may have nothing to do."""
 _ALL_ANEW = "--no-cache"
 _VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_KEY", "COURSEBUILD_CACHE_SIZE")
 """Of the environment: what says the same as arguments."""
@@ -53,7 +51,7 @@ def split_directory(given: Sequence[str]) -> tuple[str | None, list[str]]:
 def said_before(directory: str | None, words: Sequence[str]) -> str | None:
     """What this command said when all was as it is now; `None` where that is not known."""
     command = _command_of(words)
-    if command is None or _ALL_ANEW in words:
+    if command is None or _ALL_ANEW in words:  # of most commands nothing is ever kept
         return None
     try:
         root = find_course_root(".") if directory is None else directory or "."
@@ -72,7 +70,6 @@ def run_unless_unchanged(
     `made` is what the command leaves behind.
     """
     from coursebuild.cli.arguments import options_of
-    from coursebuild.core.engine.up_to_date import Watcher
 
     options = options_of(arguments)
     command = _command_of(arguments.words)
@@ -84,18 +81,16 @@ def run_unless_unchanged(
         from coursebuild.report import unchanged_report
 
         remark = f"nothing has changed since the last {arguments.words[0]}"
-        said = report_text(unchanged_report(report, remark), options)
+        said = report_text(unchanged_report(report, remark), "text", options)
         watcher.keep(said, (*report.depends, *package_paths()), made)
     return status
 
 
 def _command_of(words: Sequence[str]) -> tuple[str, ...] | None:
-    """The name of a command; `None` where it always works.
+    """The name of a command; `None` where it cannot have one.
 
     Which course is meant is no part of it, since what was said is kept there.
     """
-    if not words or words[0] not in COMMANDS:
-        return None
     own = [word for word in words if word != _ALL_ANEW]
     around = [*look(sys.stdout), *map(os.environ.get, _VARIABLES)]
     if any("/" in w or os.sep in w or os.path.exists(w) for w in own):  # noqa: PTH110

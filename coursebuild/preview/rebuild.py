@@ -21,7 +21,7 @@ import time
 from collections import Counter
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from msgspec.structs import replace
 
@@ -30,7 +30,6 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.runner import Finished, RunAll, RunStoppedError, ScriptServer, Started
-from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.scripts.bindings import HeldLines
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -203,16 +202,15 @@ class BackgroundRebuild:
             root: Path,
             todo: Sequence[ScriptJob],
             *,
-            parallel: int,
             started: Started,
             finished: Finished,
-            place: OtherEnvironment | None,
+            **where: Any,
         ) -> tuple[ScriptRun, ...]:
             def ended(run: ScriptRun) -> None:
                 finished(run)
                 session.take_run(keys[run.path], run)
 
-            there = functools.partial(serve, root, parallel=parallel, place=place)
+            there = functools.partial(serve, root, **where)
             runs = there(todo, started=started, finished=ended)
             # Run again at once: an author who sees a new output can accept it before labs have run.
             drifted = session.drifted(runs)

@@ -199,7 +199,7 @@ class Memo:
         """The keys of a group that the shared cache has."""
         if self.shared is None or self.fresh:
             return []
-        names = self.shared.names(f"{kind}/{key}")
+        names = sorted(self.shared.names(f"{kind}/{key}"))
         return [f"{key}/{name}" for name in names if HASH.fullmatch(name)]
 
     def close(self) -> None:

@@ -64,10 +64,9 @@ class FolderPlace:
     def names(self, folder: str) -> list[str]:
         """The names in a folder; none if there is none."""
         try:
-            found = [path.name for path in (self.folder / folder).iterdir()]
+            return [path.name for path in (self.folder / folder).iterdir()]
         except (FileNotFoundError, NotADirectoryError):
             return []
-        return sorted(name for name in found if not name.startswith("."))
 
 
 class RemotePlace:
@@ -100,8 +99,7 @@ class RemotePlace:
             found = self.files.ls(f"{self.top}/{folder}", detail=False)
         except (FileNotFoundError, NotADirectoryError):
             return []
-        names = (PurePosixPath(str(path)).name for path in found)
-        return sorted(name for name in names if not name.startswith("."))
+        return [PurePosixPath(str(path)).name for path in found]
 
 
 def shared_cache(where: str, key: bytes = b"") -> SharedCache:

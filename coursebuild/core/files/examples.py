@@ -21,7 +21,7 @@ import json
 import os
 import re
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from msgspec import Struct
@@ -76,15 +76,12 @@ class ExamplesReport(Struct, frozen=True):
     blocked: tuple[Blocked, ...]
 
 
-def write_examples(
-    root: Path, extractions: Sequence[tuple[str, bytes]] | Mapping[str, bytes]
-) -> ExamplesReport:
+def write_examples(root: Path, extractions: Mapping[str, bytes]) -> ExamplesReport:
     """Bring `examples/` up to date.
 
     Args:
         root: the course folder; the caller holds its lock.
-        extractions: every script of the course, each path once, POSIX, below `examples/`; a
-            mapping is asked for one after the other.
+        extractions: every script of the course by its path, POSIX, below `examples/`.
 
     Raises:
         EffectError: the folder cannot be written, or leads out of the project.
@@ -98,8 +95,7 @@ def write_examples(
     if not extractions and not known:
         return ExamplesReport((), (), (), ())
     try:
-        wanted = extractions if isinstance(extractions, Mapping) else dict(extractions)
-        return _Update(root, known, wanted).run()
+        return _Update(root, known, extractions).run()
     except OSError as error:
         where = os.path.relpath(error.filename, root) if error.filename else FOLDER
         raise EffectError(f"{where} cannot be written: {reason(error)}") from None

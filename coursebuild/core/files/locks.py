@@ -74,23 +74,17 @@ def project_lock(
 
 
 @contextlib.contextmanager
-def folder_lock(folder: Path, *, wait: bool = True) -> Iterator[bool]:
-    """Hold a folder locked while something in it is replaced; without leaving a file there.
-
-    Gives whether nobody else holds it; so it is, for all that can be known, where there are no
-    locks or no such folder.
-    """
+def folder_lock(folder: Path) -> Iterator[None]:
+    """Hold a folder locked while something in it is replaced; without leaving a file there."""
     try:
         fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
-    except OSError:
-        yield True
+    except OSError:  # there is no such folder
+        yield
         return
     try:
-        free = try_lock(fd) is not False
-        if not free and wait:
+        if try_lock(fd) is False:
             fcntl.flock(fd, fcntl.LOCK_EX)
-            free = True
-        yield free
+        yield
     finally:
         os.close(fd)
 

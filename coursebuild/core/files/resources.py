@@ -10,6 +10,7 @@ In an installed package all are inside it. In a source tree they are where they 
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -53,7 +54,6 @@ class Bundle(Mapping[str, bytes]):
 
     def __init__(self) -> None:
         self._folder = assets_dir()
-        self._paths: tuple[str, ...] | None = None
 
     def __getitem__(self, path: str) -> bytes:
         try:  # most runs ask for one or two, and need not know which there are
@@ -62,16 +62,15 @@ class Bundle(Mapping[str, bytes]):
             raise KeyError(path) from error
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._found())
+        return iter(self._paths)
 
     def __len__(self) -> int:
-        return len(self._found())
+        return len(self._paths)
 
-    def _found(self) -> tuple[str, ...]:
-        if self._paths is None:
-            paths = _paths(self._folder)
-            self._paths = tuple(path for path in paths if Path(path).name != "stamp.json")
-        return self._paths
+    @functools.cached_property
+    def _paths(self) -> tuple[str, ...]:
+        found = _paths(self._folder)
+        return tuple(path for path in found if Path(path).name != "stamp.json")
 
 
 def _paths(folder: Path) -> Iterator[str]:
@@ -79,7 +78,7 @@ def _paths(folder: Path) -> Iterator[str]:
     top = len(f"{folder}/")
     walked = os.walk(folder, onerror=_refuse)
     found = (f"{at}/{name}"[top:] for at, _, names in walked for name in names)
-    return iter(sorted(found, key=lambda path: path.split("/")))
+    yield from sorted(found, key=lambda path: path.split("/"))
 
 
 def _refuse(error: OSError) -> None:

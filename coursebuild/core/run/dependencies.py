@@ -55,7 +55,7 @@ class Kind(enum.Enum):
     __hash__ = object.__hash__  # that of enumerations is much slower, and needs are many
 
 
-class Need(Struct, frozen=True, order=True):
+class Need(Struct, frozen=True):
     """Something whose state counts."""
 
     kind: Kind

@@ -190,8 +190,8 @@ class Memory:
 
         `lasting`: whether its result can be used again. `made`: when, in seconds since 1970.
         """
-        needed = [Need(Kind.FILE, path) for path in sorted(files)]
-        looked = tuple(Dependency(n.kind, n.name, self.states(n)) for n in needed)
+        states = ((path, self.states(Need(Kind.FILE, path))) for path in sorted(files))
+        looked = tuple(Dependency(Kind.FILE, path, state) for path, state in states)
         why = "" if lasting else "it may end in another way the next time"
         outcome = Outcome.OK if ok else Outcome.FAILED
         run = ScriptRun(inputs.path, outcome, 0, "", "", seconds)

@@ -31,7 +31,7 @@ def summary(report: ExamplesReport) -> Summary:
 
 
 def write(root: Path, *scripts: tuple[str, bytes]) -> Summary:
-    return summary(write_examples(root, scripts))
+    return summary(write_examples(root, dict(scripts)))
 
 
 def test_files_are_written_once_and_without_scripts_nothing_is_there(tmp_path: Path) -> None:
@@ -48,7 +48,7 @@ def test_edited_by_hand(tmp_path: Path) -> None:
     (tmp_path / A[0]).write_bytes(b"print(1)\nprint('mine')")
     for wanted, diverged in ((A, False), (NEXT, True)):
         for _ in range(2):  # it stays so until somebody decides
-            report = write_examples(tmp_path, [wanted, B])
+            report = write_examples(tmp_path, dict([wanted, B]))
             assert summary(report) == ((), (B[0],), (), (A[0],))
             (blocked,) = report.blocked
             assert (blocked.obstacle, blocked.diverged) == (Obstacle.EDITED, diverged)
@@ -74,7 +74,7 @@ def test_scripts_that_no_lesson_has_go_unless_they_were_edited(tmp_path: Path) -
     (tmp_path / "examples/sub/own.txt").write_text("the author's")
     assert write(tmp_path) == ((), (), (B[0],), (A[0],))
     assert sorted(p.name for p in (tmp_path / "examples/sub").iterdir()) == ["own.txt"]
-    (blocked,) = write_examples(tmp_path, []).blocked
+    (blocked,) = write_examples(tmp_path, {}).blocked
     assert blocked.obstacle is Obstacle.ORPHAN and "+mine" in blocked.diff
     assert (tmp_path / A[0]).read_bytes() == b"mine\n"
     (tmp_path / A[0]).unlink()
@@ -85,7 +85,7 @@ def test_the_authors_own_files_are_left_alone(tmp_path: Path) -> None:
     (tmp_path / "examples").mkdir()
     (tmp_path / "examples/own.py").write_bytes(b"own\n")
     (tmp_path / A[0]).write_bytes(b"own too\n")
-    report = write_examples(tmp_path, [A, B])
+    report = write_examples(tmp_path, dict([A, B]))
     assert summary(report) == ((B[0],), (), (), (A[0],))
     diff = (
         "--- examples/a.py (in the lesson)\n+++ examples/a.py (on the disk)\n"
@@ -113,7 +113,7 @@ def test_a_lost_manifest_makes_it_careful(tmp_path: Path, manifest: bytes | None
     path = root / MANIFEST
     path.unlink() if manifest is None else path.write_bytes(manifest)
     (tmp_path / "secret").write_bytes(b"x")
-    report = write_examples(root, [NEXT, B])
+    report = write_examples(root, dict([NEXT, B]))
     assert summary(report) == ((), (B[0],), (), (A[0],))
     assert report.blocked[0].obstacle is Obstacle.FOREIGN
     assert (tmp_path / "secret").exists()
@@ -131,7 +131,7 @@ def test_what_a_power_cut_emptied_is_written_again_with_its_permissions(tmp_path
 def test_files_that_are_not_text(tmp_path: Path) -> None:
     write(tmp_path, A)
     (tmp_path / A[0]).write_bytes(b"a\xffb\r\n\x0cc\n")
-    (blocked,) = write_examples(tmp_path, [A]).blocked
+    (blocked,) = write_examples(tmp_path, dict([A])).blocked
     assert blocked.current == "a\\xffb\r\n\x0cc\n"
     assert "+a\\xffb\r\n+\x0cc\n" in blocked.diff
 
@@ -152,7 +152,7 @@ def test_links_and_folders_in_the_way(tmp_path: Path) -> None:
         "examples/link.py": Obstacle.LINK,
         "examples/out/x.py": Obstacle.LINK,
     }
-    report = write_examples(root, [*((path, b"new\n") for path in obstacles), A])
+    report = write_examples(root, dict.fromkeys(obstacles, b"new\n") | dict([A]))
     assert report.written == (A[0],)
     assert {b.path: b.obstacle for b in report.blocked} == obstacles
     assert (tmp_path / "outside/x.py").read_bytes() == b"outside"
