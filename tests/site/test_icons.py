@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import sys
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from playwright.sync_api import Browser
+
+from support.png_files import read_png
 
 ROOT = Path(__file__).resolve().parents[2]
 ICON = (ROOT / "templates" / "icon.svg").read_text(encoding="utf-8")
@@ -27,25 +27,6 @@ def icons() -> Any:
     finally:
         sys.path.remove(str(ROOT / "site"))
     return prepare_icons
-
-
-def pixels(data: bytes) -> np.ndarray:
-    """A PNG of 8 bits in red, green, blue and opacity, as drawn here: filter 2 in each row."""
-    stream = io.BytesIO(data)
-    assert stream.read(8) == b"\x89PNG\r\n\x1a\n"
-    body = b""
-    width = height = 0
-    while chunk := stream.read(8):
-        length, name = int.from_bytes(chunk[:4], "big"), chunk[4:]
-        content, checksum = stream.read(length), stream.read(4)
-        assert zlib.crc32(name + content) == int.from_bytes(checksum, "big")
-        if name == b"IHDR":
-            width, height = (int.from_bytes(content[i : i + 4], "big") for i in (0, 4))
-            assert content[8:] == bytes((8, 6, 0, 0, 0))
-        body += content if name == b"IDAT" else b""
-    rows = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, 1 + 4 * width)
-    assert (rows[:, 0] == 2).all()
-    return np.add.accumulate(rows[:, 1:], axis=0, dtype=np.uint8).reshape(height, width, 4)
 
 
 @pytest.mark.browser
@@ -64,7 +45,7 @@ def test_icons_are_what_a_browser_draws(icons: Any, browsers: Mapping[str, Brows
         page = context.new_page()
         for side in (64, 192):
             theirs = np.array(page.evaluate(draw, [ICON, side]), float).reshape(side, side, 4)
-            ours = pixels(icons.drawn(shapes, icons.Picture("x", side))).astype(float)
+            ours = read_png(icons.drawn(shapes, icons.Picture("x", side))).astype(float)
             # Without opacity a colour means nothing.
             off = np.abs(theirs * theirs[..., 3:] - ours * ours[..., 3:]) / 255
             assert off.mean() < 1, side
@@ -73,7 +54,7 @@ def test_icons_are_what_a_browser_draws(icons: Any, browsers: Mapping[str, Brows
 
 def test_icon_has_ground_where_a_system_cuts(icons: Any) -> None:
     shapes = icons.shapes(ICON)
-    found = pixels(icons.drawn(shapes, icons.Picture("x", 96, full=True, share=0.8)))
+    found = read_png(icons.drawn(shapes, icons.Picture("x", 96, full=True, share=0.8)))
     assert (found[..., 3] == 255).all()
     ground = np.array(shapes[0].colour)
     y, x = np.mgrid[0:96, 0:96] + 0.5

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from html.parser import HTMLParser
+import re
+from html import unescape
 
 import pytest
 from hypothesis import given
@@ -71,17 +72,9 @@ def test_finding_quantities_loses_no_character(text: str) -> None:
     assert joined(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
     assert 0 <= unit_length(text) <= len(text)
 
-    class Read(HTMLParser):
-        text = ""
-
-        def handle_data(self, data: str) -> None:
-            self.text += data
-
     for way in ("ltr", "rtl"):
-        read = Read()
-        read.feed(str(text_html(text, way)))  # type: ignore[arg-type]
-        read.close()
-        assert read.text == joined(text)
+        html = str(text_html(text, way))  # type: ignore[arg-type]
+        assert unescape(re.sub("</?bdi[^>]*>", "", html)) == joined(text)
 
 
 def test_pages_say_their_direction_and_hold_numbers_and_units_together(make: Make) -> None:

@@ -23,6 +23,13 @@ from coursebuild.core.pages.fonts import (
     unicode_range,
 )
 
+SAMPLES = {
+    "latin": "AZaz09 é×÷±²−“”…",
+    "latin-ext": "ĀčłŐŽ",
+    "vietnamese": "ăĐơưẠỹ",
+    "greek": "ΑΩαβγδθλμπσφω",
+    "cyrillic": "АЯаяёі",
+}
 FORMULAS = "I=∫Vρ(‖𝐫‖2𝟙−⊤)dω∑√{}[]⟨⟩≥·˙ˆ𝝎mkc∂∇h"
 
 
@@ -136,7 +143,14 @@ def test_the_list_of_fonts_says_what_they_hold(assets: Assets) -> None:
     for face in read_faces(assets.file("fonts/fonts.json")):
         font = TTFont(io.BytesIO(assets.file(f"fonts/{face.file}")), lazy=True)
         assert characters_in(face.characters) == set(map(chr, font.getBestCmap()))
+        assert set(SAMPLES[face.subset]) <= characters_in(face.characters), face.file
         assert (face.measure is not None) == (face.subset == "latin")
+        assert (face.style == "italic") == bool(font["head"].macStyle & 2), face.file
+        if face.family == MATH:
+            assert "MATH" in font and set("∫√∂∇⟨≈") <= characters_in(face.characters)
+        else:
+            axis = next(axis for axis in font["fvar"].axes if axis.axisTag == "wght")
+            assert [*face.weight] == [axis.minValue, axis.maxValue], face.file
 
 
 def test_rules_have_fallbacks_of_the_same_measure(assets: Assets) -> None:

@@ -76,21 +76,6 @@ def test_names_of_shared_files_are_their_content(site: dict[str, bytes]) -> None
             assert is_copy or path.split(".")[-2] == hashlib.sha256(data).hexdigest()[:8]
 
 
-def test_the_same_values_give_the_same_bytes(make: Make, site: dict[str, bytes]) -> None:
-    assert make(LESSON).site(FILES) == site
-
-
-def test_no_link_is_broken(site: dict[str, bytes]) -> None:
-    files = [OutputFile(path, data) for path, data in site.items()]
-    assert check_links(files, "https://example.org/course/") == ()
-    without = [file for file in files if file.path != "lessons/1.1-spinning.html"]
-    assert {broken.page for broken in check_links(without, "https://example.org/course/")} >= {
-        "index.html",
-        "lessons/0.1-falling.html",
-        "levels/1.html",
-    }
-
-
 def addresses(page: str) -> list[str]:
     body = re.sub(r"<(meta|link rel=\"canonical\")[^>]*>", "", page)
     return [unescape(url) for url in re.findall(r'(?:href|src)="([^"]*)"', body)]

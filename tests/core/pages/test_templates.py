@@ -8,7 +8,7 @@ import pytest
 from jinja2 import TemplateNotFound, UndefinedError
 from markupsafe import Markup
 
-from coursebuild.core.pages.templates import archive_name, compile_templates, templates_of
+from coursebuild.core.pages.templates import compile_templates, templates_of
 
 TEXTS = (
     ("page.html", "<p>{{ a }}{% include 'part.html' %}</p>\n"),
@@ -29,14 +29,6 @@ def test_an_edited_template_is_not_taken_from_what_was_compiled(tmp_path: Path) 
     compile_templates(TEXTS, tmp_path)
     edited = (TEXTS[0], ("part.html", "edited"))
     assert templates_of(edited, tmp_path).get_template("part.html").render() == "edited"
-
-
-def test_compiling_gives_the_same_bytes_each_time(tmp_path: Path) -> None:
-    name, found = archive_name(TEXTS), set()
-    for _ in range(2):
-        compile_templates(TEXTS, tmp_path)
-        found.add((tmp_path / name).read_bytes())
-    assert len(found) == 1
 
 
 def test_what_is_not_there_is_an_error() -> None:
