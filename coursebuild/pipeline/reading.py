@@ -16,7 +16,6 @@ import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -33,11 +32,10 @@ from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import imported
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord, record
-from coursebuild.core.pages.renderer import Renderer, known_mathml, mark_now
+from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.templates import Texts, templates_of
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import summarize
-from coursebuild.core.run.versions import package_version
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
@@ -49,7 +47,7 @@ if TYPE_CHECKING:
 
 SUMMARIES, PAGES = "summaries", "pages"
 """Kinds of entries in the store. They stay on this machine, where they are made soon enough."""
-_MATHML, _CODE = "mathml", "code"
+_MATHML = "mathml"
 """Likewise. One has the formulas of a text: one for each formula would take as long to write as to
 make."""
 ROOM = 6_000_000
@@ -135,11 +133,12 @@ def prepare_to_read(sample: SourceText) -> None:
     """Import and make what reading and drawing need, so that copies of this process share it."""
     for name in _HEAVY:
         importlib.import_module(name)
+    from coursebuild.core.pages.highlight import highlight_lines
     from coursebuild.core.syntax.document import parse_document
 
     # Much is made only when it is needed for the first time.
     read = parse_document(sample.source, sample.callouts, lesson=sample.lesson).value
-    mark_now("python", 'f"{x}"\n')
+    highlight_lines("python", "x")
     if document_formulas(read):
         from coursebuild.core.run.v8 import start
 
@@ -278,30 +277,11 @@ class PageReader:
         return PageContext(renderer, inputs.shown, Place(inputs.head.path), whole.document)
 
     def _renderer_for(self, language: str, own: Texts, whole: _Whole | None) -> Renderer:
-        """Words, templates and marked code, with the formulas of a document."""
+        """Words and templates, with the formulas of a document."""
         if (language, own) not in self._renderers:
             texts = template_texts()
             templates = templates_of(texts, prepared_folder(), own)
             strings = strings_for(texts, language)
-            self._renderers = {
-                (language, own): Renderer(strings, templates, mark=_Marks(self._store))
-            }
+            self._renderers = {(language, own): Renderer(strings, templates)}
         renderer = self._renderers[language, own]
         return renderer if whole is None else replace(renderer, formulas=whole.formulas)
-
-
-class _Marks:
-    """Code whose tokens are marked, from the store where it was marked before."""
-
-    def __init__(self, store: Memo) -> None:
-        self._store = store
-        self._version = package_version("pygments")
-
-    def __call__(self, language: str, code: str) -> tuple[Markup, ...]:
-        key = step_key("code", self._version, language, code)
-        found = self._store.get_value(_CODE, key, list[str])
-        if found is not None:
-            return tuple(map(Markup, found))
-        lines = mark_now(language, code)
-        self._store.put_value(_CODE, key, list(map(str, lines)))
-        return lines

@@ -35,6 +35,7 @@ from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.folding import Part, fold
+from coursebuild.core.pages.highlight import highlight_lines
 from coursebuild.core.pages.page_inputs import ShownRun
 from coursebuild.core.pages.strings import Strings
 
@@ -241,7 +242,7 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 def _parts(page: PageContext, block: Script) -> tuple[CodePart, ...]:
     """The code as it is shown; what draws is folded whole, since its figure tells the story."""
     text = block.code.text.rstrip("\n")
-    lines = page.renderer.mark("python", text)
+    lines = highlight_lines("python", text)
     parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
     return tuple(
         CodePart(

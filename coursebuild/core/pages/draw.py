@@ -14,6 +14,7 @@ from coursebuild.core.pages.article import article, contents
 from coursebuild.core.pages.blocks import numbered_lines
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
+from coursebuild.core.pages.highlight import highlight_lines
 from coursebuild.core.pages.page_inputs import (
     AddedParts,
     Graphed,
@@ -51,7 +52,7 @@ def draw(
 def _drawn(value: object, renderer: Renderer) -> object:
     match value:
         case Highlighted():
-            return numbered_lines(renderer.mark(value.language, value.text), value.path)
+            return numbered_lines(highlight_lines(value.language, value.text), value.path)
         case Graphed():
             return drawings(value, renderer.words)
         case AddedParts():

@@ -5,8 +5,7 @@ Entry points: `Renderer`; `known_mathml`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Mapping
 
 from jinja2 import Environment
 from markupsafe import Markup
@@ -15,6 +14,7 @@ from msgspec import Struct, field
 from coursebuild.core.features import Mathml
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.highlight import highlight_lines
 from coursebuild.core.pages.quantities import text_html
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import TemplateFailure
@@ -30,25 +30,12 @@ def known_mathml(formulas: Mapping[Formula, str | MathError]) -> Mathml:
     return mathml
 
 
-Mark: TypeAlias = Callable[[str, str], tuple[Markup, ...]]
-"""Gives the lines of code in a language, their tokens marked."""
-
-
-def mark_now(language: str, code: str) -> tuple[Markup, ...]:
-    """See `highlight.highlight_lines`, which is imported when there is something to mark."""
-    from coursebuild.core.pages.highlight import highlight_lines
-
-    return highlight_lines(language, code)
-
-
 class Renderer(Struct, frozen=True):
     """The interface's words in the course's language, the templates, and formulas as MathML."""
 
     words: Strings
     templates: Environment
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
-    mark: Mark = mark_now
-    """How code is marked: whoever calls may keep what was marked before."""
 
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template, without its last line end.
@@ -69,7 +56,7 @@ class Renderer(Struct, frozen=True):
 
     def highlight(self, language: str, code: str) -> Markup:
         """Code with its tokens marked."""
-        return Markup("\n".join(self.mark(language, code)))
+        return Markup("\n".join(highlight_lines(language, code)))
 
     def mathml(self, tex: str, display: bool) -> Markup:
         """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""
