@@ -59,8 +59,8 @@ def _compile(root: Path) -> None:
     Where Python is told to write no bytecode (`PYTHONDONTWRITEBYTECODE`), a command would compile
     all that it imports each time: for a fifth of a second.
     """
-    for package in ("coursebuild", "mjcourse"):
-        compileall.compile_dir(root / package, quiet=2)
+    for folder in (root / "coursebuild", root / "mjcourse", bundle.DIST):
+        compileall.compile_dir(folder, quiet=2)
 
 
 def _assets() -> dict[str, str]:

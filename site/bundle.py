@@ -243,8 +243,12 @@ def _digest(root: Path) -> str:
 
 
 def _hashes(root: Path) -> dict[str, str]:
-    files = sorted(path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file())
-    return {name: _sha256(root / name) for name in files}
+    files = sorted(path for path in root.rglob("*") if path.is_file())
+    return {
+        path.relative_to(root).as_posix(): _sha256(path)
+        for path in files
+        if path.parent.name != "__pycache__"  # that of compiled templates
+    }
 
 
 def _sha256(path: Path) -> str:

@@ -41,10 +41,10 @@ def templates_of(texts: Texts, folder: Path | None = None, own: Texts = ()) -> E
 
     `own` are those of the course, which come first.
     """
-    archive = None if folder is None else folder / archive_name(texts)
+    compiled = None if folder is None else folder / compiled_name(texts)
     found: list[BaseLoader] = [DictLoader(_pages(texts))]
-    if archive is not None and archive.is_file():
-        found = [ModuleLoader(archive)]
+    if compiled is not None and compiled.is_dir():
+        found = [ModuleLoader(compiled)]
     if own:
         theirs = {name: (text, f"{TEMPLATES}{name}", None) for name, text in own}
         found = [FunctionLoader(theirs.get), *found]
@@ -82,13 +82,14 @@ def template_mistake(text: str) -> tuple[int, str] | None:
 def compile_templates(texts: Texts, folder: Path) -> None:
     """Write templates into a folder as Python that `templates_of` loads."""
     environment = _environment(DictLoader(_pages(texts)))
-    environment.compile_templates(folder / archive_name(texts), ignore_errors=False)
+    target = folder / compiled_name(texts)
+    environment.compile_templates(target, zip=None, ignore_errors=False)
 
 
-def archive_name(texts: Texts) -> str:
-    """The name of the archive of these templates as Python."""
+def compiled_name(texts: Texts) -> str:
+    """The name of the folder of these templates as Python."""
     digest = hashlib.sha256(repr(sorted(_pages(texts).items())).encode())
-    return f"templates-{digest.hexdigest()[:16]}.zip"
+    return f"templates-{digest.hexdigest()[:16]}"
 
 
 def _pages(texts: Texts) -> dict[str, str]:
