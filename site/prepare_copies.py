@@ -8,7 +8,6 @@ copies would be a third of the package.
 
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -28,17 +27,9 @@ def prepared(bundle: Path) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     listed: dict[str, str] = {}
     for name, data in whole.items():
-        keys: list[str] = []
-
-        def keep(key: str, make: Callable[[], bytes], keys: list[str] = keys) -> bytes:
-            keys.append(key)
-            return make()
-
-        copies = compressed_files([OutputFile(f"assets/{name}", data)], keep)
-        if len(copies) == len(keys):  # those that do not shrink are not published
-            for key, copy in zip(keys, copies, strict=True):
-                listed[key] = copy.path.removeprefix("assets/")
-                files[listed[key]] = copy.data
+        for copy in compressed_files([OutputFile(f"assets/{name}", data)], lambda _, make: make()):
+            listed[copy.key] = copy.path.removeprefix("assets/")
+            files[listed[copy.key]] = copy.make()
     text = json.dumps(listed, indent=1, sort_keys=True)
     return {**files, "copies.json": f"{text}\n".encode()}
 

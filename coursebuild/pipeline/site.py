@@ -22,21 +22,19 @@ from coursebuild.core.engine.prepared import (
     prepared_file,
     prepared_folder,
 )
-from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Results, SiteFile
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.common_files import PageFacts, common_characters
+from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Source, key_of
-from coursebuild.core.values import decode, encode
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.downloads import Downloads
@@ -78,14 +76,6 @@ _ANYTHING = PageFacts(
     frozenset(),
 )
 """What pages may need that nobody has looked at."""
-
-
-class SharedFiles(Struct, frozen=True):
-    """What all pages share."""
-
-    names: Names
-    files: dict[str, bytes]
-    """By path."""
 
 
 class SiteMaker:
@@ -133,33 +123,14 @@ class SiteMaker:
     # --- what all pages share
 
     def _shared(self, facts: PageFacts | None) -> tuple[Names, list[SiteFile]]:
-        """The shared files, made only for characters and styles for which they were not made.
-
-        With whole fonts where there are no facts.
-        """
-        from_whole = facts is None
+        """The shared files; with whole fonts where there are no facts."""
+        cut = None if facts is None else functools.partial(_cut_font, self.store)
         facts = facts or _ANYTHING
         facts = replace(facts, text=facts.text | common_characters(self.library))
-        theme = replace(self.course.theme, templates=())
-        key = step_key("shared files", facts, from_whole, theme)
-        found = self.store.get("shared", key, lambda data: decode(data, SharedFiles))
-        if found is None:
-            found = self._shared_made(facts, whole=from_whole)
-            self.store.put("shared", key, encode(found))
-        return found.names, [
-            CachedFile(path, key_of(key, path), functools.partial(found.files.__getitem__, path))
-            for path in found.files
-        ]
-
-    def _shared_made(self, facts: PageFacts, *, whole: bool) -> SharedFiles:
-        from coursebuild.core.pages.common_files import common_files
-
-        cut = (lambda job: job.data) if whole else functools.partial(_cut_font, self.store)
         made, names = common_files(self.assets, cut, facts, self.course.theme)
-        files = (*made, *self._copies(made))
-        return SharedFiles(names, {file.path: file.data for file in files})
+        return names, [*made, *self._copies(made)]
 
-    def _copies(self, files: Iterable[OutputFile]) -> tuple[OutputFile, ...]:
+    def _copies(self, files: Iterable[SiteFile]) -> tuple[CachedFile, ...]:
         """Compressed copies."""
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:

@@ -147,7 +147,7 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
                 kinds.add(kind)
         assert {"summaries", "pages", "maps", "keys"} <= kinds
         assert build(course) == before, junk
-    for kind in ("maps", "mathml", "pages", "shared", "summaries"):
+    for kind in ("maps", "mathml", "pages", "summaries"):
         for path in sorted((folder / kind).iterdir()):
             name = f"{kind}/{path.name}"
             names, packed = msgspec.msgpack.decode(unsealed(name, path.read_bytes()))

@@ -18,7 +18,7 @@ from html import unescape
 from msgspec import Struct
 
 from coursebuild.core.features import Feature, PagePart
-from coursebuild.core.model.results import OutputFile
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages import fonts, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
@@ -83,12 +83,15 @@ def needed_fonts(assets: Assets, facts: PageFacts, theme: Theme) -> tuple[fonts.
 
 def common_files(
     assets: Assets,
-    subset: Callable[[fonts.FontJob], bytes],
+    cut: Callable[[fonts.FontJob], bytes] | None,
     facts: PageFacts,
     theme: Theme,
-) -> tuple[tuple[OutputFile, ...], Names]:
-    """The files for pages with these facts, taken together, and their names."""
-    files: list[OutputFile] = []
+) -> tuple[tuple[SiteFile, ...], Names]:
+    """The files for pages with these facts, taken together, and their names.
+
+    Without a function that cuts them, fonts are whole.
+    """
+    files: list[SiteFile] = []
 
     def publish(path: str, data: bytes) -> str:
         name = hashed_name(f"assets/{path}", data)
@@ -103,9 +106,15 @@ def common_files(
         return publish(f"{feature.name}.js", page_script(part.code.encode()))
 
     def font(job: fonts.FontJob) -> str:
-        data = subset(job)
         stem, _, ending = job.face.file.rpartition(".")
-        return publish(f"fonts/{stem}.{'woff2' if data.startswith(b'wOF2') else ending}", data)
+        if cut is None:
+            ending = "woff2" if job.data.startswith(b"wOF2") else ending
+            return publish(f"fonts/{stem}.{ending}", job.data)
+        # Named by what it is cut from, and cut while the pages are written.
+        key = job.key
+        name = f"assets/fonts/{stem}.{key[:8]}.woff2"
+        files.append(CachedFile(name, key, functools.partial(cut, job)))
+        return name
 
     def picture(name: str, file: ThemeFile | None) -> str:
         return "" if file is None else publish(f"{name}.{file.ending}", file.data)
