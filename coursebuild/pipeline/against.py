@@ -33,7 +33,6 @@ from coursebuild.core.scripts.against import (
 )
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure
-from coursebuild.core.text.diagnostics import Severity
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.progress import Progress
@@ -67,7 +66,7 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
                 "version, install it in a second environment and name that in the map"
             )
         if course is None:
-            wrong = next(d for d in loaded.diagnostics if d.severity is Severity.ERROR)
+            wrong = next(d for d in loaded.diagnostics if d.is_error)
             raise EffectError(
                 f"the course cannot be read: {wrong.span.path}:{wrong.span.line}: {wrong.message}",
                 help="`coursebuild check` tells all that is wrong",

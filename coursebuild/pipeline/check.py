@@ -17,7 +17,7 @@ from coursebuild.core.model import Course
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.scripts.extract import extract
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
@@ -90,7 +90,7 @@ class CheckedCourse(Struct, frozen=True):
     @property
     def is_sound(self) -> bool:
         """Whether nothing is wrong but what warnings say."""
-        errors = (d for d in self.diagnostics if d.severity is Severity.ERROR)
+        errors = (d for d in self.diagnostics if d.is_error)
         return self.course is not None and not any(True for _ in errors)
 
     def report(self, more: Iterable[Diagnostic] = ()) -> Report:

@@ -15,7 +15,7 @@ from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course
 from coursebuild.core.scripts.edit import adopted, apply_edits, block_text
 from coursebuild.core.scripts.extract import extract as extract_course
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
@@ -50,7 +50,7 @@ def _extract(options: Options, *, adopt: bool) -> Report:
             extracted = extract_scripts(course, options)
         remarks += [*adoptions, *_remarks(extracted)]
     found = [*loaded.diagnostics, *extracted.diagnostics, *refused]
-    if not remarks and all(d.severity is not Severity.ERROR for d in found):
+    if not remarks and all(not d.is_error for d in found):
         remarks.append("every script is extracted already")
     return judge(course, found, began, remarks=tuple(remarks))
 

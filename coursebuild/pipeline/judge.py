@@ -14,7 +14,7 @@ from coursebuild.core.model.results import Outcome, Results, TrialLine
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.scripts.source_parts import shown_files
-from coursebuild.core.text.diagnostics import Diagnostic, Severity, sort_diagnostics
+from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary
 
 _NOT_RUN = ("skipped", "norun")
@@ -58,7 +58,7 @@ def judge(
         found = tuple(d for d in found if d.span.path in wanted or d.rule in _OF_RUNS)
     silences = course.silences if course is not None else ()
     kept = tuple(d for d in found if not _silenced(d, silences))
-    errors = sum(d.severity is Severity.ERROR for d in kept)
+    errors = sum(d.is_error for d in kept)
     summary = Summary(
         lessons=lessons,
         scripts=len(scripts),
@@ -75,7 +75,7 @@ def judge(
 
 def _silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
     """Errors cannot be silenced."""
-    return diagnostic.severity is Severity.WARNING and any(
+    return not diagnostic.is_error and any(
         silence.rule == diagnostic.rule
         and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
         for silence in silences

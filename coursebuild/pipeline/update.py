@@ -31,7 +31,7 @@ from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import apply_edits, updated_body
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.findings import held_lines, script_findings
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Severity, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.figures import figures_of, write_figures
 from coursebuild.pipeline.judge import judge
@@ -94,7 +94,7 @@ def _update(
             if _is_touched(r, edits, ())
         }
         found += _noise(now.course, chosen, changed, first, options, progress)
-    if not remarks and all(d.severity is not Severity.ERROR for d in found):
+    if not remarks and all(not d.is_error for d in found):
         remarks = ("every recorded output is up to date",)
     return judge(
         course,

@@ -32,7 +32,7 @@ from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, updated_body
 from coursebuild.core.scripts.figures import difference, drawn_file
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.judge import judge
 from coursebuild.preview.session import Session
@@ -107,7 +107,7 @@ def _news(session: Session, path: str) -> dict[str, Any]:
     own = "" if document is None else document.source.path
 
     def rank(d: Diagnostic) -> tuple[bool, ...]:
-        return d not in blocking, d.severity is not Severity.ERROR, d.span.path != own
+        return d not in blocking, not d.is_error, d.span.path != own
 
     found = sorted(report.diagnostics, key=rank)[:_MOST]
     news: dict[str, Any] = {
@@ -138,7 +138,7 @@ def _problem(diagnostic: Diagnostic, own: str) -> dict[str, Any]:
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
     return {
-        "severity": diagnostic.severity.value,
+        "severity": diagnostic.severity,
         "rule": diagnostic.rule,
         "place": location(span),
         "message": diagnostic.message,

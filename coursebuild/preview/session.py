@@ -37,7 +37,7 @@ from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.source_parts import shown_files
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP, load
@@ -143,7 +143,7 @@ class Session:
         document = self.files.document(path)
         own = [] if document is None else self._static.get(document.source.path, ())
         map_ = self._static.get(MAP, ()) if self._is_map_broken else ()
-        return [d for d in (*own, *map_) if d.severity is Severity.ERROR]
+        return [d for d in (*own, *map_) if d.is_error]
 
     def files_elsewhere(self) -> frozenset[str]:
         """The files of lessons and pages, and what they show of others."""
@@ -385,7 +385,7 @@ class Session:
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     """Whether anything is wrong; warnings do not count."""
-    return any(d.severity is Severity.ERROR for d in diagnostics)
+    return any(d.is_error for d in diagnostics)
 
 
 def script_keys(course: Course) -> dict[str, ScriptKey]:

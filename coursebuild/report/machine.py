@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import HELP, RULES
 from coursebuild.core.text.source import Span
 from coursebuild.report.terminal import Style
@@ -92,7 +92,7 @@ def _case(suite: Element, group: str, name: str, seconds: float) -> Element:
 
 
 def _outcome(case: Element, d: Diagnostic) -> None:
-    if d.severity is Severity.ERROR:
+    if d.is_error:
         message = _xml_text(f"{location(d.span)}: {d.message}")
         told = SubElement(case, "failure", type=d.rule, message=message)
     else:
@@ -140,7 +140,7 @@ def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
     result: dict[str, Any] = {
         "ruleId": d.rule,
         "ruleIndex": rule,
-        "level": d.severity.value,
+        "level": d.severity,
         "message": {"text": _message(d)},
         "locations": [_location(d.span)],
     }
@@ -174,7 +174,7 @@ def _message(d: Diagnostic) -> str:
 def to_annotations(report: Report) -> str:
     """One workflow command a diagnostic; CI services show it beside the changed lines."""
     return "".join(
-        f"::{d.severity.value} file={_property(d.span.path)},"
+        f"::{d.severity} file={_property(d.span.path)},"
         f"line={d.span.line},col={d.span.column},"
         f"endLine={d.span.end_line},endColumn={d.span.end_column},"
         f"title={_property(d.rule)}::{_data(_message(d))}\n"

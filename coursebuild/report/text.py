@@ -17,7 +17,7 @@ from typing import assert_never
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.core.text.cells import cells
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
 from coursebuild.report.terminal import (
     BLUE,
@@ -76,8 +76,8 @@ def lab_line(line: TrialLine, style: Style) -> str:
 def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:
     """One diagnostic in full, without a final newline."""
     span = diagnostic.span
-    colour = RED if diagnostic.severity is Severity.ERROR else YELLOW
-    head = style.paint(f"{diagnostic.severity.value}[{diagnostic.rule}]", colour)
+    colour = RED if diagnostic.is_error else YELLOW
+    head = style.paint(f"{diagnostic.severity}[{diagnostic.rule}]", colour)
     gutter = max(len(str(span.line)), 3)
     pad = " " * gutter
     bar = style.paint("|", BLUE)

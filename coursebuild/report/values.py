@@ -15,7 +15,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import TrialLine
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Report(Struct, frozen=True):
     @property
     def ok(self) -> bool:
         """Whether nothing is wrong (warnings do not count)."""
-        return all(d.severity is not Severity.ERROR for d in self.diagnostics)
+        return all(not d.is_error for d in self.diagnostics)
 
 
 def unchanged_report(report: Report, remark: str) -> Report:
@@ -125,7 +125,7 @@ def plain(value: object, **names: str) -> Any:
         case Diagnostic():
             return {
                 "rule": value.rule,
-                "severity": value.severity.value,
+                "severity": value.severity,
                 **place_fields(value.span),
                 "message": value.message,
                 "label": value.label,

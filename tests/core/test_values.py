@@ -24,7 +24,8 @@ from coursebuild.core.model import (
     Text,
 )
 from coursebuild.core.model.equations import DisplayFormula
-from coursebuild.core.text.diagnostics import Severity, diagnose
+from coursebuild.core.model.results import Outcome
+from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import decode, encode, fingerprint
 
@@ -61,7 +62,7 @@ def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
         Heading(SPAN, 1, (Text(SPAN, "One"),), "one", True),
         Excerpt(SOURCE, "One\ntwo", ((0, 2), (4, 7))),
         diagnose("link-broken", SPAN, "nowhere"),
-        Severity.ERROR,
+        Outcome.OK,
         DisplayFormula(0, "x", None, "one"),
         SOURCE,
     )
@@ -92,7 +93,7 @@ def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
         (Recording(*(SPAN, (), SPAN, "1", SPAN), "", None, None), Recording),
         (Comparison(rtol="0.1"), Comparison),
         (DisplayFormula(*("" for _ in DisplayFormula._fields)), DisplayFormula),
-        (Severity.ERROR, Mode),
+        (Outcome.OK, Mode),
         ({"a": 1}, dict[str, str]),
         ((1, "a"), tuple[int, int]),
         ((1,), tuple[int, int]),

@@ -53,7 +53,7 @@ class Live:
         self.session.close()
 
     def wrong(self) -> list[str]:
-        return sorted(d.rule for d in self.session.diagnostics() if d.severity.value == "error")
+        return sorted(d.rule for d in self.session.diagnostics() if d.severity == "error")
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ def dump(parsed: Parsed[Document]) -> str:
 def told(diagnostics: tuple[Diagnostic, ...]) -> str:
     lines = []
     for d in diagnostics:
-        lines.append(f"! {where(d.span)} {d.severity.value}[{d.rule}]: {d.message}")
+        lines.append(f"! {where(d.span)} {d.severity}[{d.rule}]: {d.message}")
         lines += [f"!   = help: {d.help}"] if d.help else []
         for note in d.notes:
             place = f" at {where(note.span)}" if note.span else ""

@@ -8,26 +8,15 @@ how to mend it.
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Iterable
 from typing import Generic, TypeVar
 
 from msgspec import Struct
 
-from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.rules import RULES, Severity
 from coursebuild.core.text.source import Span
 
 T_co = TypeVar("T_co", covariant=True)
-
-
-class Severity(enum.Enum):
-    """How bad it is.
-
-    An error keeps the site from being published; a warning can be silenced, with a reason.
-    """
-
-    ERROR = "error"
-    WARNING = "warning"
 
 
 class Note(Struct, frozen=True):
@@ -62,8 +51,13 @@ class Diagnostic(Struct, frozen=True):
 
     @property
     def severity(self) -> Severity:
-        """The rule's severity."""
-        return Severity(RULES[self.rule].severity)
+        """The rule's."""
+        return RULES[self.rule].severity
+
+    @property
+    def is_error(self) -> bool:
+        """Whether it keeps the site from being published."""
+        return self.severity == "error"
 
     @property
     def order(self) -> tuple[str, int, int, str, str]:

@@ -6,7 +6,7 @@ a fixture in `tests/fixtures/rules/` shows for each what an author sees.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -14,11 +14,15 @@ HELP = "https://github.com/OWNER/coursebuild/blob/main/docs/reference/rules.md#{
 """Where a rule is explained."""
 
 
+Severity: TypeAlias = Literal["error", "warning"]
+"""An error keeps the site from being published; a warning can be silenced, with a reason."""
+
+
 class Rule(Struct, frozen=True):
     """One entry of the catalogue."""
 
     name: str
-    severity: Literal["error", "warning"]
+    severity: Severity
     summary: str
     """What it means, one sentence, for the catalogue's page."""
 

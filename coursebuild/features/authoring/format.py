@@ -24,7 +24,7 @@ from coursebuild.core.syntax.fence import Fence, line_prefix, read_fence
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.markdown import block_tokens
 from coursebuild.core.syntax.spans import PositionedToken, whole
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Parsed, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.features.authoring.json_layout import lay_out
@@ -57,7 +57,7 @@ def format_document(
 
 
 def _errors(parsed: Parsed[model.Document]) -> tuple[Diagnostic, ...]:
-    return tuple(d for d in parsed.diagnostics if d.severity is Severity.ERROR)
+    return tuple(d for d in parsed.diagnostics if d.is_error)
 
 
 def _choose(

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 
 from msgspec import Struct
 
-from coursebuild.core.text.diagnostics import Diagnostic, Severity
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.departures import Checked, Departure
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report.terminal import (
@@ -45,7 +45,7 @@ class Measurement(Struct, Generic[_T], frozen=True):
     def ok(self) -> bool:
         """Whether everything was measured, is as it was recorded, and nothing is to be done."""
         departed = any(one.departures for one in self.checked)
-        wrong = any(one.severity is Severity.ERROR for one in self.diagnostics)
+        wrong = any(one.is_error for one in self.diagnostics)
         open_ones = any(not getattr(one, "ok", True) for one in self.reports)
         return not (wrong or self.failures or departed or open_ones)
 

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from coursebuild.core.scripts.bindings import Printed
 from coursebuild.core.scripts.extract import owners
 from coursebuild.core.scripts.findings import output_findings
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Severity
+from coursebuild.core.text.diagnostics import Diagnostic, Note
 from coursebuild.core.text.rules import HELP
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.places import Places
@@ -99,7 +99,7 @@ def _moves(old: Source, new: Source) -> dict[int, int]:
 
 def published(diagnostic: Diagnostic, places: Places) -> types.Diagnostic:
     """A diagnostic with its notes, and where its rule is explained."""
-    error = diagnostic.severity is Severity.ERROR
+    error = diagnostic.is_error
     said = [diagnostic.message, diagnostic.label, diagnostic.help and f"help: {diagnostic.help}"]
     said += [f"note: {note.message}" for note in diagnostic.notes if note.span is None]
     return types.Diagnostic(
