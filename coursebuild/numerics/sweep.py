@@ -76,8 +76,8 @@ def measure_sweep(
         SceneError: a parameter or a value is none of the model.
     """
     base = _runnable(spec.compile())
-    threads = [part for part in sweep.vary if part.parameter == THREADS]
-    parts = [part for part in sweep.vary if part.parameter != THREADS]
+    threads = [part for part in sweep.variations if part.parameter == THREADS]
+    parts = [part for part in sweep.variations if part.parameter != THREADS]
     variants = [one for part in parts for one in _variants(spec, scene.scenario, part)]
     own = simulate(Setup(scenario=scene.scenario), base, thickness(base))
     states = own.states if own.judgement.ok else None

@@ -132,14 +132,15 @@ def _said(declared: Declarations | None) -> str:
     for one in () if declared is None else declared.scenarios:
         parts.append(
             (
-                *(one.name, one.title, one.keyframe, one.qpos, one.qvel, one.duration, one.sample),
-                *(one.controls, one.hold, one.measure, one.reference, one.closed),
+                *(one.name, one.title or "", one.keyframe, one.qpos, one.qvel, one.duration),
+                *(one.sample, one.controls, one.hold, one.measured),
+                *(None if one.closed else one.reference, one.closed),
                 *(one.conserved, one.timesteps),
             )
         )
     for sweep in () if declared is None else declared.sweeps:
-        vary = [(one.parameter, one.values, one.relative) for one in sweep.vary]
-        parts.append((sweep.name, sweep.title, sweep.scenario, vary, sweep.show))
+        vary = [(one.parameter, one.values, one.relative) for one in sweep.variations]
+        parts.append((sweep.name, sweep.title or "", sweep.scenario or "", vary, sweep.show))
     return repr(parts)
 
 

@@ -88,7 +88,7 @@ def tried(
         model,
         pruning_scenes(model.model, declared, quick=quick),
         (read_code("examples/a.py", lesson),) if lesson else (),
-        {key: Keep(place, key, reason, place) for key, reason in (keeps or {}).items()},
+        {key: Keep(key, reason, finding_span=place) for key, reason in (keeps or {}).items()},
         {},
         has_commands,
         clock,

@@ -236,7 +236,7 @@ def _check_lengths(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Di
 
 
 def _check_measured(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    measure = scenario.measure
+    measure = scenario.measured
     if measure is None:
         return
     known = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}[measure.kind]
@@ -272,12 +272,12 @@ def _check_sweep(
     sweep: DeclaredSweep, scenarios: Sequence[DeclaredScenario], facts: ModelFacts
 ) -> Iterator[Diagnostic]:
     own, total = facts.timestep, 0.0
-    run = next((one for one in scenarios if sweep.scenario in ("", one.name)), None)
+    run = next((one for one in scenarios if sweep.scenario in (None, one.name)), None)
     duration = None if run is None else run.duration
     if duration is None:
         held = 0.0 if run is None else len(run.controls) * (run.hold or 0.0)
         duration = max(held, min(DURATION, MOST_STEPS * own))
-    for part in sweep.vary:
+    for part in sweep.variations:
         timed = part.parameter == "option.timestep"
         for value in part.values:
             step = own

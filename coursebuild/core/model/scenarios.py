@@ -7,16 +7,13 @@ times. What is left out is `None` or empty: whoever measures fills it in from th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
+from coursebuild.core.model import fields
 from coursebuild.core.text.source import Source, Span
 
-VISIBLE = 0.01
-"""Share of a model's extent that a learner sees in a picture of it: 2 pixels of 200."""
-VISIBLE_ANGLE = 1.0
-"""Degrees by which an attitude must be off for a learner to see it."""
 DURATION, MOST_STEPS = 2.0, 20_000
 """Seconds of a scenario that does not say how long it takes, and the model's timesteps that it is
 at most."""
@@ -42,9 +39,9 @@ def is_multiple(length: float, part: float) -> bool:
 class Visible(Struct, frozen=True):
     """From where on an error would be noticed."""
 
-    share: float = VISIBLE
-    """Of the model's extent, for places."""
-    angle: float = VISIBLE_ANGLE
+    share: float = 0.01
+    """Of the model's extent, for places: 2 pixels of a picture of 200."""
+    angle: float = 1.0
     """Degrees, for attitudes and hinges."""
 
 
@@ -63,42 +60,82 @@ class Measured(Struct, frozen=True):
     kind: Literal["body", "site", "sensor"]
     name: str
 
+
+class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """What happens to the model: where it begins, how long it takes, what is commanded."""
+
+    name: Annotated[fields.Slug, Meta(description="by which reports call it")]
+    title: Annotated[fields.Text | None, Meta(description="shown over its figures")] = None
+    keyframe: Annotated[
+        Annotated[int, Meta(ge=0)] | fields.Text | None,
+        Meta(description="where it begins, by name or by number from 0"),
+    ] = None
+    qpos: Annotated[
+        tuple[float, ...], Meta(description="positions at the beginning, instead of the keyframe's")
+    ] = ()
+    qvel: Annotated[
+        tuple[float, ...],
+        Meta(description="velocities at the beginning, instead of the keyframe's"),
+    ] = ()
+    duration: Annotated[fields.Positive | None, Meta(description="seconds")] = None
+    sample: Annotated[
+        fields.Positive | None,
+        Meta(description="seconds from one look at the state to the next; timesteps divide it"),
+    ] = None
+    controls: Annotated[
+        tuple[tuple[float, ...], ...],
+        Meta(description="commands one after the other, each a number for every actuator"),
+    ] = ()
+    hold: Annotated[
+        fields.Positive | None, Meta(description="seconds for which each command holds")
+    ] = None
+    measure: Annotated[
+        Annotated[
+            str,
+            fields.matching(
+                r"^(body|site|sensor):\S.*$", "`body:NAME`, `site:NAME` or `sensor:NAME`"
+            ),
+        ]
+        | None,
+        Meta(description="what is compared beside coordinates, as in `site:tip`"),
+    ] = None
+    reference: Annotated[
+        Annotated[
+            str, fields.matching(r"^(ode|self|closed:\S.*)$", "`ode`, `self` or `closed:CASE`")
+        ]
+        | None,
+        Meta(description="what errors are measured against, where not whichever fits"),
+    ] = None
+    conserved: Annotated[
+        tuple[Literal["energy", "angular-momentum"], ...] | None,
+        Meta(description="what does not change, where it cannot be told from the model"),
+    ] = None
+    timesteps: Annotated[
+        tuple[fields.Positive, ...],
+        Meta(description="seconds; instead of a ladder about the model's own"),
+    ] = ()
+
     @property
-    def text(self) -> str:
-        """As the file says it."""
-        return f"{self.kind}:{self.name}"
+    def measured(self) -> Measured | None:
+        """What `measure` names."""
+        match (self.measure or "").split(":", 1):
+            case ["body" | "site" | "sensor" as kind, name]:
+                return Measured(kind, name)
+            case _:
+                return None
+
+    @property
+    def closed(self) -> str:
+        """The hard case whose closed form is the reference; empty where none is."""
+        kind, _, name = (self.reference or "").partition(":")
+        return name if kind == "closed" else ""
 
 
-class DeclaredScenario(Struct, frozen=True):
+class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):
     """A scenario as its author wrote it."""
 
     span: Span
     """Its table."""
-    name: str
-    title: str
-    """Empty where none is given."""
-    keyframe: str | int | None
-    """Where it begins, by name or by number from 0; `None`: in the model's own state."""
-    qpos: tuple[float, ...]
-    """Where it begins, instead of the keyframe's; empty where the keyframe's hold."""
-    qvel: tuple[float, ...]
-    duration: float | None
-    """s."""
-    sample: float | None
-    """s from one look at the state to the next."""
-    controls: tuple[tuple[float, ...], ...]
-    """Commands one after the other, each for `hold`, the last to the end."""
-    hold: float | None
-    """s."""
-    measure: Measured | None
-    reference: Literal["ode", "self"] | None
-    """`None`: whichever fits."""
-    closed: str
-    """The hard case whose closed form is the reference; empty where none is."""
-    conserved: tuple[Literal["energy", "angular-momentum"], ...] | None
-    """`None`: as far as it can be told from the model."""
-    timesteps: tuple[float, ...]
-    """Those to measure beside the model's own, s; empty: a ladder about the model's own."""
     places: tuple[tuple[str, Span], ...]
     """Where each field that is given stands."""
 
@@ -121,28 +158,52 @@ class Variation(Struct, frozen=True):
     span: Span
 
 
-class DeclaredSweep(Struct, frozen=True):
-    """Parameters to be varied, one at a time, as their author wrote it."""
-
-    span: Span
-    """Its table."""
-    name: str
-    title: str
-    scenario: str
-    """By name; empty: the first one."""
-    vary: tuple[Variation, ...]
-    show: tuple[str, ...]
-    """The figures that it is about; empty: those that differ."""
+SweepFigure: TypeAlias = Literal[
+    "change", "figure", "penetration", "slip", "restitution",
+    "residual", "iterations", "cost", "throughput",
+]  # fmt: skip
+SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
+"""How a sweep names a share of what the model has."""
 
 
-class Keep(Struct, frozen=True):
+class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of the model at other values, one at a time."""
+
+    name: Annotated[fields.Slug, Meta(description="by which reports call it")]
+    vary: Annotated[
+        dict[
+            str,
+            tuple[float | str | tuple[float, ...], ...]
+            | Annotated[str, fields.matching(SHARE, "values, or a share: `±1 %`")],
+        ],
+        Meta(description="values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
+    ]
+    title: Annotated[fields.Text | None, Meta(description="shown over its figures")] = None
+    scenario: Annotated[
+        fields.Slug | None, Meta(description="the first one where it is left out")
+    ] = None
+    show: Annotated[
+        tuple[SweepFigure, ...], Meta(description="figures; those that differ where none is named")
+    ] = ()
+
+
+class DeclaredSweep(SweepTable, frozen=True, kw_only=True):
+    """The same as its author wrote it."""
+
+    variations: tuple[Variation, ...]
+    """What `vary` says."""
+
+
+class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A finding of the scene diet that is wanted as it is."""
 
-    span: Span
-    """Its table."""
-    finding: str
-    """As the diet names it."""
-    reason: str
+    finding: Annotated[fields.Text, Meta(description="as `coursebuild diet` names it")]
+    reason: Annotated[fields.Text, Meta(description="why it stays")]
+
+
+class Keep(KeepTable, frozen=True, kw_only=True):
+    """The same as its author wrote it."""
+
     finding_span: Span
 
 

@@ -15,16 +15,9 @@ from typing import Annotated, Literal, TypeAlias
 from msgspec import Meta, Struct
 
 from coursebuild.core.model import Filter, Limits, Pace, Silence
-from coursebuild.core.syntax.fields import NotNegative, Text, matching
+from coursebuild.core.model.fields import NotNegative, Slug, Text, matching
 from coursebuild.core.syntax.theme import ThemeTable
 
-Slug: TypeAlias = Annotated[
-    str,
-    matching(
-        r"^[a-z0-9]+(-[a-z0-9]+)*$",
-        "lower-case letters and digits in words joined by single hyphens",
-    ),
-]
 LessonId: TypeAlias = Annotated[
     str,
     matching(

@@ -23,7 +23,7 @@ from typing import Generic, TypeVar
 import msgspec.inspect as inspect
 from msgspec import Struct
 
-from coursebuild.core.syntax.fields import NOT_BLANK
+from coursebuild.core.model.fields import NOT_BLANK
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
     BoolNode,

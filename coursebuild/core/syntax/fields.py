@@ -1,58 +1,18 @@
-"""Types of fields that several declarations share, and checks of how fields hang together.
+"""Checks of how the fields of a declaration hang together.
 
-Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`, `matching`;
-`has_value`, `one_of`, `repeated`.
-
-What a type adds to its plain Python type stands in `Meta`: bounds and patterns, which the decoder
-and the JSON Schemas both read, and in `extra` two remarks for the decoder alone: `text` ("blocks"
-or "inlines": the string is Markdown) and `expects` (what a string that does not match the pattern
-should have been).
+Entry points: `has_value`, `one_of`, `repeated`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Annotated, Any, TypeAlias
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from coursebuild.core.syntax.nodes import NullNode, ObjectNode
 from coursebuild.core.syntax.wording import short
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, nearest
 from coursebuild.core.text.source import Span
-
-NOT_BLANK = r"\S"
-"""The pattern of a text that must say something."""
-
-_MARKDOWN: dict[str, Any] = {"contentMediaType": "text/markdown"}
-
-Text: TypeAlias = Annotated[str, Meta(pattern=NOT_BLANK)]
-"""Plain text that says something."""
-
-Blocks: TypeAlias = Annotated[
-    str, Meta(pattern=NOT_BLANK, extra={"text": "blocks"}, extra_json_schema=_MARKDOWN)
-]
-"""Markdown of any length."""
-
-OptionalBlocks: TypeAlias = Annotated[
-    str, Meta(extra={"text": "blocks"}, extra_json_schema=_MARKDOWN)
-]
-"""Markdown of any length, or nothing."""
-
-Inlines: TypeAlias = Annotated[
-    str, Meta(pattern=NOT_BLANK, extra={"text": "inlines"}, extra_json_schema=_MARKDOWN)
-]
-"""Markdown that fits into a line."""
-
-Positive: TypeAlias = Annotated[float, Meta(gt=0)]
-NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
-Digits: TypeAlias = Annotated[int, Meta(ge=0, le=15)]
-"""Decimal places."""
-
-
-def matching(pattern: str, expects: str) -> Meta:
-    """What a string must look like, and the words for it in messages."""
-    return Meta(pattern=pattern, extra={"expects": expects})
 
 
 def has_value(node: ObjectNode, name: str) -> bool:

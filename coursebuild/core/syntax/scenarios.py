@@ -15,29 +15,28 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated
 
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
 
 from coursebuild.core.model.scenarios import (
-    VISIBLE,
-    VISIBLE_ANGLE,
     Bands,
     Declarations,
     DeclaredScenario,
     DeclaredSweep,
     Keep,
-    Measured,
+    KeepTable,
+    ScenarioTable,
+    SweepTable,
     SweepValue,
     Variation,
     Visible,
     is_multiple,
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
-from coursebuild.core.syntax.course_schema import Slug
 from coursebuild.core.syntax.decode import Decoding, decode
-from coursebuild.core.syntax.fields import Positive, Text, matching, repeated
+from coursebuild.core.syntax.fields import repeated
 from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.wording import TOML, short
@@ -58,18 +57,18 @@ _SLACK = 1e-9
 """Relative: decimal fractions are not exact."""
 
 
-# ------------------------------------------------------------------------------------------ tables
-
-BANDS = Bands()
+VISIBLE, BANDS = Visible(), Bands()
 
 
 class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
     """From where on an error would be noticed, and what it may differ by."""
 
-    visible: Annotated[float, Meta(gt=0, le=1, description="share of the model's extent")] = VISIBLE
+    visible: Annotated[float, Meta(gt=0, le=1, description="share of the model's extent")] = (
+        VISIBLE.share
+    )
     visible_angle: Annotated[
         float, Meta(gt=0, le=180, description="degrees, for attitudes and hinges")
-    ] = VISIBLE_ANGLE
+    ] = VISIBLE.angle
     band: Annotated[
         float,
         Meta(gt=0, le=1, description="share by which an error may differ from the recorded one"),
@@ -78,88 +77,6 @@ class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
         float,
         Meta(gt=0, le=1, description="by how much a fitted order may differ from the recorded one"),
     ] = BANDS.order
-
-
-class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """What happens to the model: where it begins, how long it takes, what is commanded."""
-
-    name: Annotated[Slug, Meta(description="by which reports call it")]
-    title: Annotated[Text | None, Meta(description="shown over its figures")] = None
-    keyframe: Annotated[
-        Annotated[int, Meta(ge=0)] | Text | None,
-        Meta(description="where it begins, by name or by number from 0"),
-    ] = None
-    qpos: Annotated[
-        tuple[float, ...], Meta(description="positions at the beginning, instead of the keyframe's")
-    ] = ()
-    qvel: Annotated[
-        tuple[float, ...],
-        Meta(description="velocities at the beginning, instead of the keyframe's"),
-    ] = ()
-    duration: Annotated[Positive | None, Meta(description="seconds")] = None
-    sample: Annotated[
-        Positive | None,
-        Meta(description="seconds from one look at the state to the next; timesteps divide it"),
-    ] = None
-    controls: Annotated[
-        tuple[tuple[float, ...], ...],
-        Meta(description="commands one after the other, each a number for every actuator"),
-    ] = ()
-    hold: Annotated[Positive | None, Meta(description="seconds for which each command holds")] = (
-        None
-    )
-    measure: Annotated[
-        Annotated[
-            str, matching(r"^(body|site|sensor):\S.*$", "`body:NAME`, `site:NAME` or `sensor:NAME`")
-        ]
-        | None,
-        Meta(description="what is compared beside coordinates, as in `site:tip`"),
-    ] = None
-    reference: Annotated[
-        Annotated[str, matching(r"^(ode|self|closed:\S.*)$", "`ode`, `self` or `closed:CASE`")]
-        | None,
-        Meta(description="what errors are measured against, where not whichever fits"),
-    ] = None
-    conserved: Annotated[
-        tuple[Literal["energy", "angular-momentum"], ...] | None,
-        Meta(description="what does not change, where it cannot be told from the model"),
-    ] = None
-    timesteps: Annotated[
-        tuple[Positive, ...], Meta(description="seconds; instead of a ladder about the model's own")
-    ] = ()
-
-
-SweepFigure: TypeAlias = Literal[
-    "change", "figure", "penetration", "slip", "restitution",
-    "residual", "iterations", "cost", "throughput",
-]  # fmt: skip
-_SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
-
-
-class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """Parameters of the model at other values, one at a time."""
-
-    name: Annotated[Slug, Meta(description="by which reports call it")]
-    vary: Annotated[
-        dict[
-            str,
-            tuple[float | str | tuple[float, ...], ...]
-            | Annotated[str, matching(_SHARE, "values, or a share: `±1 %`")],
-        ],
-        Meta(description="values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
-    ]
-    title: Annotated[Text | None, Meta(description="shown over its figures")] = None
-    scenario: Annotated[Slug | None, Meta(description="the first one where it is left out")] = None
-    show: Annotated[
-        tuple[SweepFigure, ...], Meta(description="figures; those that differ where none is named")
-    ] = ()
-
-
-class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """A finding of the scene diet that is wanted as it is."""
-
-    finding: Annotated[Text, Meta(description="as `coursebuild diet` names it")]
-    reason: Annotated[Text, Meta(description="why it stays")]
 
 
 class ModelFile(Struct, frozen=True, forbid_unknown_fields=True):
@@ -205,8 +122,7 @@ def _declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declar
         scenarios=tuple(map(_scenario, root.objects("scenario"), fields.scenario)),
         visible=Visible(bench.visible, bench.visible_angle),
         keep=tuple(
-            Keep(node.mark, table.finding, table.reason, node.place("finding"))
-            for node, table in keeps
+            Keep(**asdict(table), finding_span=node.place("finding")) for node, table in keeps
         ),
         bands=Bands(bench.band, bench.order_band),
         sweeps=tuple(map(_sweep, root.objects("sweep"), fields.sweep)),
@@ -215,14 +131,8 @@ def _declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declar
 
 def _sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
     spans = {member.key.value: member.key.mark for member in node.object("vary").members}
-    return DeclaredSweep(
-        span=node.mark,
-        name=table.name,
-        title=table.title or "",
-        scenario=table.scenario or "",
-        vary=tuple(_variation(name, given, spans[name]) for name, given in table.vary.items()),
-        show=table.show,
-    )
+    variations = (_variation(name, given, spans[name]) for name, given in table.vary.items())
+    return DeclaredSweep(**asdict(table), variations=tuple(variations))
 
 
 def _variation(name: str, given: tuple[SweepValue, ...] | str, span: Span) -> Variation:
@@ -233,24 +143,8 @@ def _variation(name: str, given: tuple[SweepValue, ...] | str, span: Span) -> Va
 
 
 def _scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
-    kind, _, closed = (table.reference or "").partition(":")
-    fields = asdict(table) | {
-        "title": table.title or "",
-        "measure": _measured(table.measure),
-        "reference": kind if kind in ("ode", "self") else None,
-        "closed": closed,
-    }
     places = tuple((member.key.value, member.value.mark) for member in node.members)
-    return DeclaredScenario(**fields, span=node.mark, places=places)
-
-
-def _measured(written: str | None) -> Measured | None:
-    kind, _, name = (written or "").partition(":")
-    match kind:
-        case "body" | "site" | "sensor":
-            return Measured(kind, name)
-        case _:
-            return None
+    return DeclaredScenario(**asdict(table), span=node.mark, places=places)
 
 
 # ---------------------------------------------------------------------------------------- checks
@@ -350,8 +244,7 @@ def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnost
 
 
 def _check_reference(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
-    kind, _, name = (table.reference or "").partition(":")
-    if kind == "closed" and name not in CLOSED_FORMS:
-        message = f"no hard case with a closed form is called `{short(name)}`"
-        help = did_you_mean(name, CLOSED_FORMS)
+    if table.closed and table.closed not in CLOSED_FORMS:
+        message = f"no hard case with a closed form is called `{short(table.closed)}`"
+        help = did_you_mean(table.closed, CLOSED_FORMS)
         yield diagnose("field-value", node.place("reference"), message, help=help)

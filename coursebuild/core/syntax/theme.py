@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 from msgspec import Meta, Struct
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, LEAST, contrast, legible
+from coursebuild.core.model.fields import matching
 from coursebuild.core.model.theme import PICTURES, FontFamily, Theme, ThemeFile
-from coursebuild.core.syntax.fields import matching
 from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 

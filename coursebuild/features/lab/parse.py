@@ -16,9 +16,9 @@ from typing import Any
 
 from msgspec import Struct, ValidationError, convert
 
+from coursebuild.core.model.fields import Positive
 from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.fields import Positive
 from coursebuild.core.syntax.info import Word, kind_of
 from coursebuild.core.syntax.json_text import one_line, parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.syntax.fields import (
+from coursebuild.core.model.fields import (
     Digits,
     Inlines,
     NotNegative,

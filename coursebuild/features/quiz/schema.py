@@ -11,7 +11,7 @@ from typing import Annotated, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.syntax.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
+from coursebuild.core.model.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
 from coursebuild.features.lab.schema import SimLab, Step
 
 Index: TypeAlias = Annotated[int, Meta(extra_json_schema={"minimum": 0})]

@@ -72,25 +72,24 @@ def test_everything_that_a_file_can_say(newline: str) -> None:
     assert (reach.qpos, reach.qvel) == ((0.0, 1.5), (0.5, 0.0))
     assert (reach.duration, reach.sample, reach.hold) == (2.0, 0.1, 0.5)
     assert reach.controls == ((0.5, 0.3), (-0.5, 1.0), (0.0, 0.0))
-    assert reach.measure == Measured("site", "tip of it")
-    assert reach.measure.text == "site:tip of it"
+    assert reach.measured == Measured("site", "tip of it")
     assert (reach.reference, reach.closed, reach.conserved) == ("ode", "", ())
     assert reach.timesteps == (0.001, 0.05)
     assert reach.place("keyframe").text == '"home"'
     assert reach.place("nothing").text == "[[scenario]]"
-    assert (rest.keyframe, rest.reference, rest.closed) == (0, None, "damped-spring-0.1")
+    assert (rest.keyframe, rest.closed) == (0, "damped-spring-0.1")
     assert rest.conserved == ("energy", "angular-momentum")
     assert (rest.duration, rest.sample, rest.hold, rest.measure) == (None, None, None, None)
-    assert (other.title, other.keyframe, other.reference) == ("", None, "self")
+    assert (other.title, other.keyframe, other.reference) == (None, None, "self")
     assert other.conserved is None
     (sweep,) = declared.sweeps
     assert (sweep.name, sweep.scenario, sweep.show) == ("soft", "rest", ("penetration",))
-    assert [(one.parameter, one.values, one.relative) for one in sweep.vary] == [
+    assert [(one.parameter, one.values, one.relative) for one in sweep.variations] == [
         ("geom:a b.solref", ((0.1, 1.0),), False),
         ("option.cone", ("elliptic",), False),
         ("body.mass", (0.975, 1.025), True),
     ]
-    assert sweep.vary[0].span.text == '"geom:a b.solref"'
+    assert sweep.variations[0].span.text == '"geom:a b.solref"'
     (keep,) = declared.keep
     assert (keep.finding, keep.reason) == ("sensor-unread tip", "lesson 5.2 reads it")
     assert keep.finding_span.text == '"sensor-unread tip"'

@@ -103,7 +103,7 @@ def swept(
     """
     tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
-    found = (one for one in loaded.scenarios if sweep.scenario in ("", one.name))
+    found = (one for one in loaded.scenarios if sweep.scenario in (None, one.name))
     with _told(loaded.scene):
         return measure_sweep(loaded.spec, next(found), sweep, clocks, quick=quick)
 

@@ -175,7 +175,7 @@ def _readers(
     found = list(readers_of(course, root, files, scene))
     if scene.declared is not None:
         declared = scene.declared.scenarios
-        names = frozenset(one.measure.name for one in declared if one.measure is not None)
+        names = frozenset(one.measured.name for one in declared if one.measured is not None)
         fields = {"energy"} if any("energy" in (one.conserved or ()) for one in declared) else set()
         if names or fields:
             path = scene.declared.source.path
