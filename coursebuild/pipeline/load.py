@@ -30,7 +30,6 @@ from coursebuild.core.model import (
     Level,
     Limits,
     Page,
-    Status,
 )
 from coursebuild.core.model.theme import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS
@@ -158,7 +157,7 @@ class _Loader:
             return None
         self.callouts = frozenset(kind.name for kind in course.callouts)
         self.unnamed = self._unnamed(course)
-        planned = {x.path for x in course.lessons if x.status is Status.PLANNED}
+        planned = {x.path for x in course.lessons if x.status == "planned"}
         named = {page.path for page in course.pages}
         self._announce(
             [source for source in self.files.lessons if source.path not in planned],
@@ -270,7 +269,7 @@ class _Loader:
 
     def _lesson(self, lesson: Lesson) -> Lesson:
         source = self.sources.get(lesson.path)
-        if lesson.status is Status.PLANNED:
+        if lesson.status == "planned":
             if source is not None:
                 message = f"lesson {lesson.id} is planned, and there is a file {lesson.path}"
                 help = 'say `status = "draft"` or `"complete"`, or move the file away'

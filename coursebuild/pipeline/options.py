@@ -18,7 +18,7 @@ from coursebuild.core.files.changes import undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
-from coursebuild.core.model import Course, Lesson, Page, Status
+from coursebuild.core.model import Course, Lesson, Page
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
@@ -186,10 +186,10 @@ def _named(course: Course, name: str, root: Path) -> Lesson | Page:
     found = by_name.get(name) or by_name.get(path_from_root(name, root))
     if found is None:
         near = nearest(name, [alias for alias in by_name if ("/" in alias) == ("/" in name)])
-        written = [lesson.id for lesson in course.lessons if lesson.status is not Status.PLANNED]
+        written = [lesson.id for lesson in course.lessons if lesson.status != "planned"]
         known = did_you_mean("", [*written, *(page.id for page in course.pages)])
         help = f"did you mean `{near}`?" if near is not None else known
         raise UsageError(f"no lesson or page is called `{name}`", help=help)
-    if isinstance(found, Lesson) and found.status is Status.PLANNED:
+    if isinstance(found, Lesson) and found.status == "planned":
         raise UsageError(f"lesson {found.id} is planned, so there is nothing in it yet")
     return found

@@ -21,7 +21,7 @@ from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, Trials
-from coursebuild.core.model import Course, FeatureBlock, Status, document_blocks
+from coursebuild.core.model import Course, FeatureBlock, document_blocks
 from coursebuild.core.model.results import (
     CompileResult,
     Outcome,
@@ -141,7 +141,7 @@ def _again(
 def _nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
     """That there is nothing to publish, or that nothing of it was verified."""
     place = course.map.span(0, 0)
-    if all(lesson.status is Status.PLANNED for lesson in course.lessons):
+    if all(lesson.status == "planned" for lesson in course.lessons):
         message = "no lesson of the course is written"
         help = "write a file in content/lessons, and give its entry in the map a `status`"
         yield diagnose("no-lessons", place, message, help=help)

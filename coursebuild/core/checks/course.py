@@ -12,7 +12,6 @@ from coursebuild.core.model import (
     Block,
     Course,
     Document,
-    Status,
     Term,
     block_inlines,
     document_blocks,
@@ -76,7 +75,7 @@ def _lesson_findings(
             'or say `status = "planned"` and remove the file',
         )
         for lesson in course.lessons
-        if lesson.document is document and lesson.status is Status.COMPLETE
+        if lesson.document is document and lesson.status == "complete"
     )
 
 

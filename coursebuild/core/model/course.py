@@ -5,13 +5,13 @@ Entry point: `Course`.
 
 from __future__ import annotations
 
-import enum
 import hashlib
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
+from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.model.theme import Theme
@@ -20,34 +20,52 @@ from coursebuild.core.text.source import Source, Span
 _COMMENT = re.compile("<!--(.*?)-->", re.DOTALL)
 _LICENCE = re.compile("copyright|licen[cs]e", re.IGNORECASE)
 
+LessonId: TypeAlias = Annotated[
+    str,
+    fields.matching(
+        r"^[A-Za-z0-9]+(\.[A-Za-z0-9]+)+$",
+        "letters and digits in parts joined by dots, as in `4.2` or `A.1`",
+    ),
+]
 
-class Status(enum.Enum):
-    """How far a lesson is."""
 
-    COMPLETE = "complete"
-    DRAFT = "draft"
-    PLANNED = "planned"
+class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A lesson, written or planned."""
+
+    id: Annotated[LessonId, Meta(description="its level's id, a dot and its own part")]
+    slug: Annotated[fields.Slug, Meta(description="with the id, the name of its file and page")]
+    title: Annotated[fields.Text, Meta(description="plain text")]
+    status: Annotated[
+        Literal["complete", "draft", "planned"],
+        Meta(description="a planned lesson has no file yet"),
+    ]
+    summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
+    aliases: Annotated[
+        tuple[fields.Text, ...], Meta(description="other names, by which the search finds it")
+    ] = ()
+    objectives: Annotated[
+        tuple[fields.Text, ...], Meta(description="what a learner can do afterwards")
+    ] = ()
+    prerequisites: Annotated[
+        tuple[fields.Text, ...],
+        Meta(description="ids of lessons to read first; circles are errors"),
+    ] = ()
+    minutes: Annotated[
+        Annotated[int, Meta(ge=1, le=100_000)] | None,
+        Meta(description="the time to read it and work through it, without what goes further"),
+    ] = None
+    further: Annotated[
+        Annotated[int, Meta(ge=1, le=100_000)] | None,
+        Meta(description="minutes of the sections marked `{.further}`"),
+    ] = None
 
 
-class Lesson(Struct, frozen=True):
+class Lesson(LessonTable, frozen=True, kw_only=True):
     """A lesson of the map; `document` is `None` for a planned one."""
 
     span: Span
     """Its entry in the course map."""
-    id: str
-    slug: str
-    title: str
-    status: Status
-    summary: str
-    aliases: tuple[str, ...]
-    """Other names, by which the search finds it."""
-    objectives: tuple[str, ...]
-    prerequisites: tuple[str, ...]
     prerequisite_spans: tuple[Span, ...]
-    minutes: int | None
-    """Of its main path."""
-    further: int | None
-    """Minutes of the sections that go further."""
     level: str
     document: Document | None
 

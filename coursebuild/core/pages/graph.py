@@ -98,7 +98,7 @@ def _graph(
                 lesson.id,
                 lesson.title,
                 place.href(urls.lesson_path(lesson)),
-                lesson.status.value,
+                lesson.status,
                 lesson.id == current,
                 level is not None and lesson.level != level,
             )

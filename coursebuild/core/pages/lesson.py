@@ -8,7 +8,7 @@ from __future__ import annotations
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import Document, Lesson, Level, Status, document_scripts
+from coursebuild.core.model import Document, Lesson, Level, document_scripts
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.graph import neighbourhood
@@ -55,7 +55,7 @@ def lesson_link(
         lesson.id,
         lesson.title,
         place.href(urls.lesson_path(lesson)),
-        lesson.status.value,
+        lesson.status,
         lesson.minutes,
         lesson.further,
         lesson.summary,
@@ -81,7 +81,7 @@ def level_view(
         level.summary,
         place.href(urls.level_path(level)),
         tuple(lesson_link(library, place, lesson, whole=whole) for lesson in level.lessons),
-        sum(lesson.status is not Status.PLANNED for lesson in level.lessons),
+        sum(lesson.status != "planned" for lesson in level.lessons),
     )
 
 

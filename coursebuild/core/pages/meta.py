@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from markupsafe import Markup
 
-from coursebuild.core.model import Course, Lesson, Status
+from coursebuild.core.model import Course, Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.library import Library
@@ -44,9 +44,7 @@ def course_data(library: Library) -> Markup:
     """Structured data of the home page: the course and its written lessons."""
     course = library.course
     parts: list[Json] = [
-        _resource(library, lesson)
-        for lesson in course.lessons
-        if lesson.status is not Status.PLANNED
+        _resource(library, lesson) for lesson in course.lessons if lesson.status != "planned"
     ]
     return _script({**_context("Course"), **_course(course), "hasPart": parts})
 

@@ -14,17 +14,10 @@ from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model import Filter, Limits, Pace, Silence
+from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
 from coursebuild.core.model.fields import NotNegative, Slug, Text, matching
 from coursebuild.core.syntax.theme import ThemeTable
 
-LessonId: TypeAlias = Annotated[
-    str,
-    matching(
-        r"^[A-Za-z0-9]+(\.[A-Za-z0-9]+)+$",
-        "letters and digits in parts joined by dots, as in `4.2` or `A.1`",
-    ),
-]
 Url: TypeAlias = Annotated[
     str, matching(r"^https?://[^\s/]\S*$", "an address that begins with `https://` or `http://`")
 ]
@@ -143,36 +136,6 @@ class CalloutTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     label: Annotated[Text, Meta(description="shown over the callout")]
     promise: Annotated[str, Meta(description="what it promises the reader")] = ""
-
-
-class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """A lesson, written or planned."""
-
-    id: Annotated[LessonId, Meta(description="its level's id, a dot and its own part")]
-    slug: Annotated[Slug, Meta(description="with the id, the name of its file and page")]
-    title: Annotated[Text, Meta(description="plain text")]
-    status: Annotated[
-        Literal["complete", "draft", "planned"],
-        Meta(description="a planned lesson has no file yet"),
-    ]
-    summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
-    aliases: Annotated[
-        tuple[Text, ...], Meta(description="other names, by which the search finds it")
-    ] = ()
-    objectives: Annotated[
-        tuple[Text, ...], Meta(description="what a learner can do afterwards")
-    ] = ()
-    prerequisites: Annotated[
-        tuple[Text, ...], Meta(description="ids of lessons to read first; circles are errors")
-    ] = ()
-    minutes: Annotated[
-        Annotated[int, Meta(ge=1, le=100_000)] | None,
-        Meta(description="the time to read it and work through it, without what goes further"),
-    ] = None
-    further: Annotated[
-        Annotated[int, Meta(ge=1, le=100_000)] | None,
-        Meta(description="minutes of the sections marked `{.further}`"),
-    ] = None
 
 
 class LevelTable(Struct, frozen=True, forbid_unknown_fields=True):

@@ -20,10 +20,9 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec.structs import asdict
 
-from coursebuild.core.model import Course, Lesson, Level, NamedPath, Page, Status
+from coursebuild.core.model import Course, Lesson, LessonTable, Level, NamedPath, Page
 from coursebuild.core.syntax.course_schema import (
     CourseFile,
-    LessonTable,
     LevelTable,
     PageTable,
     VerifyTable,
@@ -137,7 +136,7 @@ def _levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Level]
 
 def _lesson(node: ObjectNode, table: LessonTable, level: str) -> Lesson:
     spans = tuple(item.span for item in node.items("prerequisites"))
-    fields = asdict(table) | {"status": Status(table.status)}
+    fields = asdict(table)
     return Lesson(**fields, span=node.span, prerequisite_spans=spans, level=level, document=None)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from markupsafe import Markup
 
-from coursebuild.core.model import Lesson, Level, Status
+from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
@@ -55,7 +55,7 @@ def lesson_text(
     return context.library.render(
         "book/lesson.html",
         lesson=lesson,
-        draft=lesson.status is Status.DRAFT,
+        draft=lesson.status == "draft",
         article=Markup(write(list(rewritten(parse_html(text), rules)))),
         top=top,
         heading=1 + rules.lowered,

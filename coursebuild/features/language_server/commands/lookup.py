@@ -142,7 +142,7 @@ class _Lookup:
             case model.LessonTarget(id=id, anchor=anchor) if id in library.lessons:
                 lesson = library.lessons[id]
                 learnt = "\n".join(f"- {one}" for one in lesson.objectives)
-                title = f"**Lesson {id}: {lesson.title}** ({lesson.status.value})"
+                title = f"**Lesson {id}: {lesson.title}** ({lesson.status})"
                 return self.owner(lesson, anchor, title, lesson.summary, learnt)
             case model.PageTarget(id=id, anchor=anchor) if id in library.pages:
                 return self.owner(library.pages[id], anchor, f"**{library.pages[id].title}**")
