@@ -29,6 +29,7 @@ from coursebuild.core.model import (
     Lesson,
     Level,
     Limits,
+    Owner,
     Page,
 )
 from coursebuild.core.model.theme import TEMPLATES, Theme
@@ -286,7 +287,7 @@ class _Loader:
             self._report("lesson-missing", lesson, f"there is no file {lesson.path}", help)
         return lesson
 
-    def _report(self, rule: str, entry: Lesson | Page, message: str, help: str) -> None:
+    def _report(self, rule: str, entry: Owner, message: str, help: str) -> None:
         self.found.append(diagnose(rule, entry.span.first_line(), message, help=help))
 
     def _unnamed(self, course: Course) -> dict[str, Source]:

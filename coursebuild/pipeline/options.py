@@ -18,7 +18,7 @@ from coursebuild.core.files.changes import undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
-from coursebuild.core.model import Course, Lesson, Page
+from coursebuild.core.model import Course, Lesson, Owner, Page
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
@@ -160,9 +160,9 @@ def select(course: Course, names: tuple[str, ...], root: Path) -> Selection:
     return Selection(lessons, pages, frozenset(paths))
 
 
-def documents_by_name(course: Course) -> dict[str, Lesson | Page]:
+def documents_by_name(course: Course) -> dict[str, Owner]:
     """Lessons by id, slug, `id-slug` and file, pages by id and file."""
-    found: dict[str, Lesson | Page] = {}
+    found: dict[str, Owner] = {}
     for page in course.pages:
         found |= {page.id: page, page.path: page}
     for lesson in course.lessons:
@@ -181,7 +181,7 @@ def path_from_root(name: str, root: Path) -> str:
     return name
 
 
-def _named(course: Course, name: str, root: Path) -> Lesson | Page:
+def _named(course: Course, name: str, root: Path) -> Owner:
     by_name = documents_by_name(course)
     found = by_name.get(name) or by_name.get(path_from_root(name, root))
     if found is None:

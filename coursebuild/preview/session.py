@@ -26,11 +26,11 @@ from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.features import PublishedTrials
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, template_texts
-from coursebuild.core.model import Course, Document, Lesson, Page
+from coursebuild.core.model import Course, Document, Lesson, Owner, Page
 from coursebuild.core.model.results import Outcome, Results, ScriptJob, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.library import Library, Owner, owners
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.templates import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.run.versions import engine_version, python_version
@@ -150,7 +150,7 @@ class Session:
         course = self.course
         if course is None:
             return frozenset()
-        return shown_files(course) | {one.path for one in owners(course)}
+        return shown_files(course) | {one.path for one in course.owners}
 
     def packages(self) -> frozenset[str]:
         """The folders that scripts import from."""
@@ -199,7 +199,7 @@ class Session:
         if self.library is None or len(paths) > MOST:
             return None
         course = self.library.course
-        known = {owner.path: owner for owner in owners(course)}
+        known = {owner.path: owner for owner in course.owners}
         fresh: list[tuple[Owner, tuple[Diagnostic, ...]]] = []
         for path in sorted(paths):
             owner = known.get(path)
@@ -347,7 +347,7 @@ class Session:
             library = self.library
             assert library is not None
             wrong = {path for path, found in self._static.items() if has_errors(found)}
-            broken = {urls.owner_path(o) for o in owners(library.course) if o.path in wrong}
+            broken = {urls.owner_path(o) for o in library.course.owners if o.path in wrong}
         try:
             site = self.files.make(library, broken, pause)
         except TemplateFailure as failure:

@@ -102,6 +102,10 @@ class Page(Struct, frozen=True):
         return self.id == "home"
 
 
+Owner: TypeAlias = Lesson | Page
+"""What a document belongs to."""
+
+
 class MjcfModel(Struct, frozen=True):
     """A file of `models/`; its name is its path there without `.xml`."""
 
@@ -223,10 +227,19 @@ class Course(Struct, frozen=True):
         return tuple(lesson for level in self.levels for lesson in level.lessons)
 
     @property
+    def owners(self) -> tuple[Owner, ...]:
+        """Everything that has, or may have, a document: lessons, then pages."""
+        return (*self.lessons, *self.pages)
+
+    @property
+    def owned_documents(self) -> tuple[tuple[Owner, Document], ...]:
+        """Every parsed document, with what it belongs to."""
+        return tuple((one, one.document) for one in self.owners if one.document is not None)
+
+    @property
     def documents(self) -> tuple[Document, ...]:
         """Every parsed document: lessons, then pages."""
-        parts: tuple[Lesson | Page, ...] = (*self.lessons, *self.pages)
-        return tuple(part.document for part in parts if part.document is not None)
+        return tuple(document for _, document in self.owned_documents)
 
     @property
     def sources(self) -> tuple[Source, ...]:

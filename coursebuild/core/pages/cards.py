@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from coursebuild.core.model import FeatureBlock, Lesson, document_blocks
+from coursebuild.core.model import FeatureBlock, Lesson, Owner, document_blocks
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.lesson import LessonLink, lesson_link
-from coursebuild.core.pages.library import Library, Owner
+from coursebuild.core.pages.library import Library
 from coursebuild.core.registry import kind_of_block
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 from jinja2 import Environment
 from markupsafe import Markup
@@ -26,6 +26,7 @@ from coursebuild.core.model import (
     Level,
     Link,
     ModelTarget,
+    Owner,
     Page,
     Recording,
     Script,
@@ -56,10 +57,6 @@ from coursebuild.core.registry import feature_trials, page_kinds, publish_trials
 from coursebuild.numerics.reports import Reports
 
 _OURS = {kind.name: kind for kind in CALLOUTS}
-
-Owner: TypeAlias = Lesson | Page
-"""What a document belongs to."""
-
 
 BY_LAB, BY_SCRIPT, BY_LINK = WAYS = "model.by_lab", "model.by_script", "model.by_link"
 """How a document uses a model: keys of interface texts, in the order in which a page says them."""
@@ -130,7 +127,7 @@ class Library(Struct, frozen=True, dict=True):
         questions: dict[str, str] = {}
         terms: dict[str, Owner] = {}
         referrers: dict[str, list[Owner]] = {}
-        for owner, document in documents(course):
+        for owner, document in course.owned_documents:
             text = quiz_index(document)  # while its blocks are at hand
             if text:
                 questions[document.source.path] = text
@@ -191,7 +188,7 @@ class Library(Struct, frozen=True, dict=True):
 
     def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
         """What a feature has of documents (`Feature.summary`), in the order of the course."""
-        for owner, document in documents(self.course):
+        for owner, document in self.course.owned_documents:
             known = document.summaries
             if known is None:
                 known = summarize(document, self.mathml).value
@@ -231,18 +228,6 @@ def _placed(course: Course, trials: PublishedTrials) -> dict[tuple[str, int], St
     found = feature_trials(course) if trials.shown else {}
     spans = {name: trial.block.span for name, (_, trial) in found.items() if name in trials.shown}
     return {(span.path, span.start): trials.shown[name] for name, span in spans.items()}
-
-
-def owners(course: Course) -> tuple[Owner, ...]:
-    """Everything of the course that has, or may have, a document."""
-    return (*course.lessons, *course.pages)
-
-
-def documents(course: Course) -> Iterator[tuple[Owner, Document]]:
-    """The documents that there are, in the order of the course."""
-    for owner in owners(course):
-        if owner.document is not None:
-            yield owner, owner.document
 
 
 def links(course: Course, document: Document) -> Iterator[Target]:
@@ -296,7 +281,7 @@ def _model_names(document: Document) -> Iterator[tuple[str, str]]:
 def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
     """The scripts of a course by path, in order; of two with one path, the first."""
     found: dict[str, tuple[Script, Owner]] = {}
-    for owner, document in documents(course):
+    for owner, document in course.owned_documents:
         for script in document_scripts(document):
             found.setdefault(script.path, (script, owner))
     return found
@@ -313,7 +298,7 @@ def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
 def _uses(course: Course) -> dict[str, tuple[ModelUse, ...]]:
     """Where each model is used."""
     found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
-    for owner, document in documents(course) if found else ():
+    for owner, document in course.owned_documents if found else ():
         for name, ways in _named_models(document).items():
             if name in found:
                 found[name].append(ModelUse(owner, tuple(way for way in WAYS if way in ways)))

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.model import Lesson
+from coursebuild.core.model import Lesson, Owner
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library, Owner
+from coursebuild.core.pages.library import Library
 
 MOST = 12
 """Links that a list shows; of more it says how many there are."""

@@ -18,7 +18,7 @@ from urllib.parse import quote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Lesson, Level, Page
+from coursebuild.core.model import Course, Lesson, Level, Owner, Page
 from coursebuild.core.registry import page_kinds
 
 HOME = "index.html"
@@ -77,7 +77,7 @@ def page_path(page: Page) -> str:
     return HOME if page.is_home else f"{page.id}.html"
 
 
-def owner_path(owner: Lesson | Page) -> str:
+def owner_path(owner: Owner) -> str:
     """The page of a lesson, or another page."""
     return lesson_path(owner) if isinstance(owner, Lesson) else page_path(owner)
 

@@ -9,12 +9,12 @@ apart, or when one is a folder on the way to the other. The first in the order o
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import PurePosixPath
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Document, Lesson, Limits, Page, Script, document_scripts
+from coursebuild.core.model import Course, Limits, Script, document_scripts
 from coursebuild.core.model.results import ScriptJob
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Span
@@ -60,14 +60,6 @@ class Extraction(Struct, frozen=True):
         return code.span(start, start + len(lines[line - 1]))
 
 
-def owners(course: Course) -> Iterator[tuple[str, Document]]:
-    """Every document of a course with the id of its lesson or page, in order."""
-    parts: tuple[Lesson | Page, ...] = (*course.lessons, *course.pages)
-    for part in parts:
-        if part.document is not None:
-            yield part.id, part.document
-
-
 def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     """The scripts of a course in order, no two of which clash."""
     kept: list[Extraction] = []
@@ -75,10 +67,10 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     files: dict[str, Extraction] = {}
     folders: dict[str, Extraction] = {}
     packages = tuple(package.path for package in course.packages)
-    for owner, document in owners(course):
+    for owner, document in course.owned_documents:
         for script in document_scripts(document):
             extraction = Extraction(
-                script, owner, packages, course.environment, course.limits.scripts
+                script, owner.id, packages, course.environment, course.limits.scripts
             )
             key = _key(script.path)
             clash = _clash(extraction, files, folders)

@@ -24,7 +24,6 @@ from collections.abc import Callable, Iterator, Sequence
 from coursebuild.core.model import Course
 from coursebuild.core.model.figures import RecordedFigure, recorded_figures, unshown_figures
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.scripts.extract import owners
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 TOLERANCE = 1e-3
@@ -49,7 +48,7 @@ def figure_findings(
 ) -> Iterator[Diagnostic]:
     """What is wrong with the figures of the scripts that ran."""
     by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
-    for owner, document in owners(course):
+    for owner, document in course.owned_documents:
         for figure in unshown_figures(document):
             message = f"no paragraph below shows `{figure.name}`"
             help = f"write `Figure: ![what it shows]({figure.name}) A caption.` below the script"
@@ -60,7 +59,7 @@ def figure_findings(
         for recorded in recorded_figures(document):
             run = by_path.get(recorded.script)
             if run is not None and not run.recorded:  # a run that the course keeps drew nothing now
-                yield from _compared(recorded, run, read(recorded.path), owner)
+                yield from _compared(recorded, run, read(recorded.path), owner.id)
 
 
 def _compared(

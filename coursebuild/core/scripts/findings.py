@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from coursebuild.core.model import Course, Document
+from coursebuild.core.model import Course, Document, Owner
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bindings import (
     HeldLines,
@@ -21,7 +21,7 @@ from coursebuild.core.scripts.bindings import (
 from coursebuild.core.scripts.bound_numbers import Shown, shows
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quoted, shortened
-from coursebuild.core.scripts.extract import Extraction, extract, owners
+from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import divergence, effects, failure, silence
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.numbers import scan
@@ -61,19 +61,19 @@ def script_findings(
             found += divergence(extraction, run, everything)
             found += effects(extraction, run, everything)
     printed = Printed(verdicts, runs, [extraction.path for extraction in everything])
-    return (*found, *output_findings(course, owners(course), printed, held, again))
+    return (*found, *output_findings(course, course.owned_documents, printed, held, again))
 
 
 def output_findings(
     course: Course,
-    documents: Iterable[tuple[str, Document]],
+    documents: Iterable[tuple[Owner, Document]],
     printed: Printed,
     held: HeldLines | None = None,
     again: Mapping[str, ScriptRun] | None = None,
 ) -> Iterator[Diagnostic]:
     """What is wrong with what some documents of a course record and bind.
 
-    They come with the ids of their lessons and pages; for the rest see `script_findings`.
+    For the rest see `script_findings`.
     """
     for owner, document in documents:
         for verdict in printed.outputs(document):
@@ -84,7 +84,7 @@ def output_findings(
             elif verdict.status == "drift":
                 leaning = leaning_on(verdict, course.documents, printed)
                 unstable_output = _instability(course, verdict, run, again or {})
-                yield unstable_output or drift_diagnostic(verdict, owner, leaning)
+                yield unstable_output or drift_diagnostic(verdict, owner.id, leaning)
         yield from check_bindings(document, printed, held)
 
 

@@ -19,7 +19,7 @@ from coursebuild.core.pages.marks import fence, table
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import text_diff
-from coursebuild.core.scripts.extract import extract, owners
+from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.figures import ReadFile, difference
 from coursebuild.core.scripts.findings import classes
 from coursebuild.core.text.source import Excerpt
@@ -65,7 +65,8 @@ class LabState(Struct, frozen=True):
 def report(base: str, old: CourseState, new: CourseState) -> str:
     """What became of a course since `base`."""
     before, now = (
-        {id: one.source.text for id, one in owners(state.course)} for state in (old, new)
+        {owner.id: one.source.text for owner, one in state.course.owned_documents}
+        for state in (old, new)
     )
     edited = ", ".join(f"{id} {what}" for id, what in _changes(before, now)) or "no change"
     figures = _changes(_figures(old), _figures(new), _redrawn)

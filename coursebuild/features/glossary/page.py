@@ -11,9 +11,9 @@ from itertools import groupby
 
 from msgspec import Struct
 
-from coursebuild.core.model import TermTarget
+from coursebuild.core.model import Owner, TermTarget
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library, Owner, documents, links
+from coursebuild.core.pages.library import Library, links
 from coursebuild.core.pages.owner_links import (
     OwnerLink,
     OwnerLinks,
@@ -48,7 +48,7 @@ def glossary_values(library: Library) -> dict[str, object]:
 def _entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
     """An entry for each term of the course; of two definitions of one for the first."""
     users: dict[str, list[Owner]] = {}
-    for owner, document in documents(library.course):
+    for owner, document in library.course.owned_documents:
         targets = links(library.course, document)
         for id in {target.id for target in targets if isinstance(target, TermTarget)}:
             users.setdefault(id, []).append(owner)

@@ -13,7 +13,6 @@ from coursebuild.core.features import Trial
 from coursebuild.core.model import Course
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.extract import owners
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab
@@ -29,9 +28,9 @@ _UNTRIED = ("id", "title", "model", "height", "toggles")
 
 def lab_trials(course: Course) -> Iterator[Trial]:
     """Every lab of a course, in order; then those of models that have none in a text."""
-    for owner, document in owners(course):
+    for owner, document in course.owned_documents:
         for number, lab in enumerate(labs_in((document,)), 1):
-            yield Trial(f"{owner}-lab-{number}", owner, lab)
+            yield Trial(f"{owner.id}-lab-{number}", owner.id, lab)
     for model, lab in own_labs(course):
         yield Trial(f"model-{model.name.replace('/', '-')}", model.name, lab)
 

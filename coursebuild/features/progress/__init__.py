@@ -12,7 +12,7 @@ from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.lesson import level_view
-from coursebuild.core.pages.library import Library, owners
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.quiz_index import count
 
 _PROGRESS, _REVIEW = "progress/index.html", "review/index.html"
@@ -55,7 +55,7 @@ def review_values(library: Library) -> dict[str, object]:
 def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:
     """Everything with questions, in the order of the course."""
     found = []
-    for owner in owners(library.course):
+    for owner in library.course.owners:
         text = library.asked.get(owner.path, "")
         if text:
             id = owner.id if isinstance(owner, Lesson) else ""

@@ -14,7 +14,6 @@ from coursebuild.core.model import document_blocks
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
-from coursebuild.core.pages.library import owners
 from coursebuild.core.pages.xml import identifier, render_xml
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.qti.flow import STRUCK
@@ -61,7 +60,7 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
 
 def _quizzes(context: ExportContext) -> Iterator[QuizItems]:
     """All quizzes, in the order of the course."""
-    for owner in owners(context.course):
+    for owner in context.course.owners:
         summary = owner.document
         if summary and any(isinstance(block, Quiz) for block in document_blocks(summary)):
             page = context.page(summary)

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from markupsafe import Markup
 from msgspec import Struct, field
 
-from coursebuild.core.model import Lesson
+from coursebuild.core.model import Lesson, Owner
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library, Owner
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.owner_links import (
     OwnerLink,
     OwnerLinks,

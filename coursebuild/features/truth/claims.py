@@ -79,15 +79,11 @@ def claims_of(document: model.Document) -> Claims:
     return known if isinstance(known, Claims) else document_claims(document)
 
 
-def documents_of(
-    course: model.Course,
-) -> Iterator[tuple[model.Lesson | model.Page, model.Document]]:
+def documents_of(course: model.Course) -> Iterator[tuple[model.Owner, model.Document]]:
     """The lessons, and the pages that every page's menu has, as far as they are written."""
-    pages = (page for page in course.pages if page.menu)
-    owners: tuple[model.Lesson | model.Page, ...] = (*course.lessons, *pages)
-    for owner in owners:
-        if owner.document is not None:
-            yield owner, owner.document
+    for owner, document in course.owned_documents:
+        if isinstance(owner, model.Lesson) or owner.menu:
+            yield owner, document
 
 
 def total(claims: Iterable[Claims]) -> Claims:

@@ -9,7 +9,7 @@ from coursebuild.cli.arguments import add_lessons, options_of
 from coursebuild.cli.output import CLEAN, WRONG, fail, write
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model import Course, Lesson, Page
+from coursebuild.core.model import Course, Lesson, Owner
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.commands import apply_changes
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _formatted(course: Course, chosen: Selection) -> Iterator[tuple[Source, Parsed[str]]]:
     callouts = frozenset(kind.name for kind in course.callouts)
-    parts: tuple[Lesson | Page, ...] = (*chosen.lessons, *chosen.pages)
+    parts: tuple[Owner, ...] = (*chosen.lessons, *chosen.pages)
     for part in parts:
         if part.document is not None:
             source, lesson = part.document.source, isinstance(part, Lesson)

@@ -18,7 +18,6 @@ from lsprotocol import types
 from msgspec.structs import replace
 
 from coursebuild.core.scripts.bindings import Printed
-from coursebuild.core.scripts.extract import owners
 from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Note
 from coursebuild.core.text.rules import HELP
@@ -51,7 +50,7 @@ def _diagnoses(session: Session, version: int) -> tuple[Diagnostic, ...]:
         if changed:
             last = tuple(d for d in last if d.span.path not in changed or d.rule not in _COMPARED)
             printed = Printed(library.results.verdicts, library.results.runs, library.scripts)
-            edited = [one for one in owners(course) if one[1].source.path in changed]
+            edited = [one for one in course.owned_documents if one[1].source.path in changed]
             found += tuple(output_findings(course, edited, printed))
         found += tuple(d for one in last if (d := _moved(one, now)) is not None)
     return judge(course, found).diagnostics

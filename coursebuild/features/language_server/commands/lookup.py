@@ -18,9 +18,10 @@ from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.checks.links import anchors
+from coursebuild.core.model import Owner
 from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.results import Formula, ModelFacts
-from coursebuild.core.pages.library import Library, Owner, models_named
+from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.scripts.bindings import Printed
 from coursebuild.core.scripts.bound_numbers import Shown
 from coursebuild.core.syntax.decode import description

@@ -11,8 +11,8 @@ from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.read import read_sources
-from coursebuild.core.model import Document, Lesson
-from coursebuild.core.pages.library import Library, Owner, owners
+from coursebuild.core.model import Document, Lesson, Owner
+from coursebuild.core.pages.library import Library
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.language_server.commands.places import Places
@@ -42,7 +42,7 @@ class OpenTexts(Struct, frozen=True):
     def owner(self, source: Source) -> Owner | None:
         """The lesson or page that has a text, if it is not too long to be read."""
         course = self.library.course
-        known = owners(course) if len(source.text) <= course.limits.text else ()
+        known = course.owners if len(source.text) <= course.limits.text else ()
         return next((owner for owner in known if owner.path == source.path), None)
 
 
