@@ -29,8 +29,8 @@ def visible_error(model: Any, scene: Scene, states: EngineStates, exact: EngineS
     exact_place, exact_turn = _picture(model, exact)
     moved = float(np.linalg.norm(place - exact_place, axis=2).max(initial=0.0))
     turned = float(angular_distance(exact_turn, turn).max(initial=0.0))
-    length = scene.visible.share * max(float(model.stat.extent), 1e-15)
-    return max(moved / length, turned / math.radians(scene.visible.angle))
+    length = scene.bench.visible * max(float(model.stat.extent), 1e-15)
+    return max(moved / length, turned / math.radians(scene.bench.visible_angle))
 
 
 def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:

@@ -22,9 +22,9 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import (
     DURATION,
     MOST_STEPS,
+    BenchTable,
     Declarations,
     DeclaredScenario,
-    Visible,
     is_multiple,
     keyframe_scenarios,
 )
@@ -76,7 +76,7 @@ class Scene(Struct, frozen=True):
     """Rising, the model's own among them, s."""
     own: float
     """The model's own timestep, s."""
-    visible: Visible
+    bench: BenchTable
     declared: DeclaredScenario | None
     """`None` for a scenario that nobody wrote."""
     exact: ExactMotion | None = None
@@ -98,9 +98,8 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
             raise SceneError("nothing can move in the model", declared.scenarios[0].span)
         return ()
     if declared is not None and declared.scenarios:
-        visible = declared.visible
-        return tuple(_declared(model, one, visible, steps) for one in declared.scenarios)
-    visible = Visible() if declared is None else declared.visible
+        return tuple(_declared(model, one, declared.bench, steps) for one in declared.scenarios)
+    bench = BenchTable() if declared is None else declared.bench
     scenario = _timed(step, None, None, None, ())
     names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
     found = []
@@ -108,7 +107,7 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
         name = names[max(key, 0)]
         title = "from the model's own state" if key < 0 else f"from the keyframe {name}"
         one = replace(scenario, keyframe=key)
-        found.append(Scene(name, title, one, _ladder(one, step, steps), step, visible, None))
+        found.append(Scene(name, title, one, _ladder(one, step, steps), step, bench, None))
     return tuple(found)
 
 
@@ -124,7 +123,7 @@ def thickness(model: Any) -> Array:
 
 
 def _declared(
-    model: Any, declared: DeclaredScenario, visible: Visible, steps: Sequence[float]
+    model: Any, declared: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
 ) -> Scene:
     step = float(model.opt.timestep)
     times = _timed(step, declared.duration, declared.sample, declared.hold, declared.controls)
@@ -146,7 +145,7 @@ def _declared(
         place = declared.place("duration" if declared.duration is not None else "timesteps")
         raise SceneError(message, place, "measure a shorter time, or longer timesteps")
     title = declared.title or declared.name
-    return Scene(declared.name, title, scenario, ladder, step, visible, declared)
+    return Scene(declared.name, title, scenario, ladder, step, bench, declared)
 
 
 def _keyframe(model: Any, wanted: str | int | None) -> int:

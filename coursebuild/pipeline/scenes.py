@@ -22,7 +22,7 @@ from msgspec import Struct
 
 from coursebuild.core.checks.compiled import broken_model, check_scenarios, scenarios_of_no_model
 from coursebuild.core.files.read import CourseFiles, read_course
-from coursebuild.core.model import Declarations, MjcfModel, Visible
+from coursebuild.core.model import BenchTable, Declarations, MjcfModel
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
 from coursebuild.core.syntax.scenarios import parse_declarations
@@ -127,21 +127,24 @@ def _content(file: Path) -> bytes:
 
 
 def _said(declared: Declarations | None) -> str:
-    """All that is declared and changes a figure, wherever it stands in the file."""
-    parts: list[object] = [Visible() if declared is None else declared.visible]
+    """All that is declared and changes a figure, wherever it stands in the file.
+
+    Recorded reports hold the digest of this text: said otherwise, none of them would fit any more.
+    """
+    bench = BenchTable() if declared is None else declared.bench
+    parts = [f"Visible(share={bench.visible}, angle={bench.visible_angle})"]
     for one in () if declared is None else declared.scenarios:
-        parts.append(
-            (
-                *(one.name, one.title or "", one.keyframe, one.qpos, one.qvel, one.duration),
-                *(one.sample, one.controls, one.hold, one.measured),
-                *(None if one.closed else one.reference, one.closed),
-                *(one.conserved, one.timesteps),
-            )
+        said = (
+            *(one.name, one.title or "", one.keyframe, one.qpos, one.qvel, one.duration),
+            *(one.sample, one.controls, one.hold, one.measured),
+            *(None if one.closed else one.reference, one.closed),
+            *(one.conserved, one.timesteps),
         )
+        parts.append(repr(said))
     for sweep in () if declared is None else declared.sweeps:
         vary = [(one.parameter, one.values, one.relative) for one in sweep.variations]
-        parts.append((sweep.name, sweep.title or "", sweep.scenario or "", vary, sweep.show))
-    return repr(parts)
+        parts.append(repr((sweep.name, sweep.title or "", sweep.scenario or "", vary, sweep.show)))
+    return f"[{', '.join(parts)}]"
 
 
 # --- which

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.numerics.reports.bench import (
     FittedOrder,
     OrderRow,
@@ -20,11 +20,9 @@ from coursebuild.numerics.reports.departures import Departure, case_departures, 
 from support.bench_reports import FIRST, MACHINE, interval, lost, row, scenario, scene, swing
 from support.model_reports import case
 
-BANDS = Bands()
 
-
-def between(old: ScenarioReport, new: ScenarioReport, bands: Bands = BANDS) -> list[Departure]:
-    return list(scene_departures(scene(old), scene(new), bands))
+def between(old: ScenarioReport, new: ScenarioReport) -> list[Departure]:
+    return list(scene_departures(scene(old), scene(new), BenchTable()))
 
 
 def of_rows(old: WorkPrecisionRow, new: WorkPrecisionRow) -> list[tuple[str, ...]]:
@@ -36,7 +34,7 @@ def test_times_and_what_follows_from_them_do_not_matter() -> None:
     slow = [replace(r, cost=interval(9.0), seconds=None, front=True) for r in swing().rows]
     other = replace(swing(), rows=tuple(slow), verdict=scenario([]).verdict, source="elsewhere")
     new = scene(other, machine=replace(MACHINE, cpu="another"), digest="1" * 64)
-    assert scene_departures(scene(), new, BANDS) == ()
+    assert scene_departures(scene(), new, BenchTable()) == ()
 
 
 def test_an_error_that_left_its_band_is_told_exactly() -> None:
@@ -159,8 +157,8 @@ def test_orders_that_can_be_fitted_no_more() -> None:
 
 
 def test_a_case_that_is_gone_is_a_departure() -> None:
-    assert case_departures([case()], [case()], BANDS) == ()
-    (gone,) = case_departures([case()], [], BANDS)
+    assert case_departures([case()], [case()]) == ()
+    (gone,) = case_departures([case()], [])
     assert gone == Departure("spring", "", "case", "there", "nothing", "the same")
 
 
@@ -169,14 +167,14 @@ def figure(measured: float | None, exact: float | None = 1.0) -> Any:
 
 
 def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
-    assert case_departures([figure(1 + 1e-4)], [figure(1 + 1.04e-4)], BANDS) == ()
-    (found,) = case_departures([figure(1 + 1e-4)], [figure(1 + 2e-4)], BANDS)
+    assert case_departures([figure(1 + 1e-4)], [figure(1 + 1.04e-4)]) == ()
+    (found,) = case_departures([figure(1 + 1e-4)], [figure(1 + 2e-4)])
     assert found == Departure(
         "spring", "Euler", "growth, against theory", "0.0001", "0.0002", "± 5 %"
     )
-    assert case_departures([figure(-2e-15, 0.0)], [figure(3e-15, 0.0)], BANDS) == ()
-    assert case_departures([figure(2.0, None)], [figure(2.05, None)], BANDS) == ()
-    assert len(case_departures([figure(2.0, None)], [figure(2.2, None)], BANDS)) == 1
+    assert case_departures([figure(-2e-15, 0.0)], [figure(3e-15, 0.0)]) == ()
+    assert case_departures([figure(2.0, None)], [figure(2.05, None)]) == ()
+    assert len(case_departures([figure(2.0, None)], [figure(2.2, None)])) == 1
 
 
 def test_boundaries_and_runs_of_cases() -> None:
@@ -185,7 +183,7 @@ def test_boundaries_and_runs_of_cases() -> None:
     )
     old, run = case(), replace(case().errors[0], status="reset")
     new = replace(old, boundaries=(line, *old.boundaries[1:]), errors=(run, *old.errors[1:]))
-    found = case_departures([old], [new], BANDS)
+    found = case_departures([old], [new])
     assert [(one.setting, one.figure, one.recorded, one.measured) for one in found] == [
         ("Euler", "largest stable timestep", "200 ms", "all"),
         ("Euler", "monotone", "yes", "no"),
@@ -194,5 +192,5 @@ def test_boundaries_and_runs_of_cases() -> None:
     ]
     near = replace(old, boundaries=(replace(line, largest=0.22), *old.boundaries[1:]))
     for pair in ((old, near), (near, old)):
-        figures = {one.figure for one in case_departures(pair[:1], pair[1:], BANDS)}
+        figures = {one.figure for one in case_departures(pair[:1], pair[1:])}
         assert figures == {"monotone", "beyond"}, "a limit beyond which some are stable is fuzzy"

@@ -9,7 +9,7 @@ import mujoco
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports import Interval
@@ -176,7 +176,7 @@ def test_a_figure_that_left_its_band_is_told() -> None:
 
     def departures(one: SweepReport, other: SweepReport) -> list[tuple[str, str, str]]:
         pair = (replace(scene(), sweeps=(sweep,)) for sweep in (one, other))
-        found = scene_departures(*pair, Bands())
+        found = scene_departures(*pair, BenchTable())
         return [(each.setting, each.figure, each.measured) for each in found]
 
     assert departures(old, old) == []

@@ -36,22 +36,21 @@ def is_multiple(length: float, part: float) -> bool:
     return count >= 1 and abs(count * part - length) <= 1e-9 * length
 
 
-class Visible(Struct, frozen=True):
-    """From where on an error would be noticed."""
+class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """From where on an error would be noticed, and what it may differ by."""
 
-    share: float = 0.01
-    """Of the model's extent, for places: 2 pixels of a picture of 200."""
-    angle: float = 1.0
-    """Degrees, for attitudes and hinges."""
-
-
-class Bands(Struct, frozen=True):
-    """What figures may differ by from those recorded, before `--check` fails."""
-
-    error: float = 0.05
-    """Share of an error or a drift."""
-    order: float = 0.05
-    """Of a fitted order."""
+    visible: Annotated[float, Meta(gt=0, le=1, description="share of the model's extent")] = 0.01
+    visible_angle: Annotated[
+        float, Meta(gt=0, le=180, description="degrees, for attitudes and hinges")
+    ] = 1.0
+    band: Annotated[
+        float,
+        Meta(gt=0, le=1, description="share by which an error may differ from the recorded one"),
+    ] = 0.05
+    order_band: Annotated[
+        float,
+        Meta(gt=0, le=1, description="by how much a fitted order may differ from the recorded one"),
+    ] = 0.05
 
 
 class Measured(Struct, frozen=True):
@@ -214,7 +213,6 @@ class Declarations(Struct, frozen=True):
     """Its path below `models/`, without suffix, POSIX: the name of the model."""
     source: Source
     scenarios: tuple[DeclaredScenario, ...]
-    visible: Visible
     keep: tuple[Keep, ...]
-    bands: Bands = Bands()
+    bench: BenchTable = BenchTable()
     sweeps: tuple[DeclaredSweep, ...] = ()

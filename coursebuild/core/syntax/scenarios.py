@@ -15,13 +15,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Annotated
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 from msgspec.structs import asdict
 
 from coursebuild.core.model.scenarios import (
-    Bands,
+    BenchTable,
     Declarations,
     DeclaredScenario,
     DeclaredSweep,
@@ -31,7 +30,6 @@ from coursebuild.core.model.scenarios import (
     SweepTable,
     SweepValue,
     Variation,
-    Visible,
     is_multiple,
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
@@ -55,28 +53,6 @@ MOST_VALUES, MOST_THREADS = 100, 256
 """Of a sweep: values of all parameters together, and threads."""
 _SLACK = 1e-9
 """Relative: decimal fractions are not exact."""
-
-
-VISIBLE, BANDS = Visible(), Bands()
-
-
-class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """From where on an error would be noticed, and what it may differ by."""
-
-    visible: Annotated[float, Meta(gt=0, le=1, description="share of the model's extent")] = (
-        VISIBLE.share
-    )
-    visible_angle: Annotated[
-        float, Meta(gt=0, le=180, description="degrees, for attitudes and hinges")
-    ] = VISIBLE.angle
-    band: Annotated[
-        float,
-        Meta(gt=0, le=1, description="share by which an error may differ from the recorded one"),
-    ] = BANDS.error
-    order_band: Annotated[
-        float,
-        Meta(gt=0, le=1, description="by how much a fitted order may differ from the recorded one"),
-    ] = BANDS.order
 
 
 class ModelFile(Struct, frozen=True, forbid_unknown_fields=True):
@@ -114,17 +90,15 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
 
 
 def _declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declarations:
-    bench = fields.bench or BenchTable()
     keeps = zip(root.objects("keep"), fields.keep, strict=True)
     return Declarations(
         model=source.path.removeprefix("models/").removesuffix(".toml"),
         source=source,
         scenarios=tuple(map(_scenario, root.objects("scenario"), fields.scenario)),
-        visible=Visible(bench.visible, bench.visible_angle),
         keep=tuple(
             Keep(**asdict(table), finding_span=node.place("finding")) for node, table in keeps
         ),
-        bands=Bands(bench.band, bench.order_band),
+        bench=fields.bench or BenchTable(),
         sweeps=tuple(map(_sweep, root.objects("sweep"), fields.sweep)),
     )
 

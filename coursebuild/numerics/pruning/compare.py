@@ -22,7 +22,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import Declarations, Visible
+from coursebuild.core.model.scenarios import BenchTable, Declarations
 from coursebuild.numerics.detector import Peaks, RunJudgement, judge, peaks
 from coursebuild.numerics.engine import advance, initial_data
 from coursebuild.numerics.problem import Scenario
@@ -50,7 +50,7 @@ def pruning_scenes(
     found = scenes(model, declared, quick=quick)
     if not found:  # nothing moves, but there are things to be without
         step = float(model.opt.timestep)
-        return (Scene("start", "", Scenario(10 * step, step), (step,), step, Visible(), None),)
+        return (Scene("start", "", Scenario(10 * step, step), (step,), step, BenchTable(), None),)
     return tuple(_shortened(scene) for scene in found) if quick else found
 
 

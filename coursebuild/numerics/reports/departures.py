@@ -1,6 +1,6 @@
 """What is measured now against what was recorded: figures that left their band.
 
-Entry points: `scene_departures(recorded, measured, bands)`, `case_departures`.
+Entry points: `scene_departures(recorded, measured, bench)`, `case_departures`.
 
 1. Figures that say how accurate something is are compared, times and what follows from them never.
 2. An error has left its band when it differs from the recorded one by more than the band's share of
@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.numerics.reports.bench import (
     FLOORS,
     MeasuredRun,
@@ -39,6 +39,8 @@ _ROUNDING = 1e-9
 _INVISIBLE = 1e-6
 """What errors in a picture may differ by, where 1 is just visible."""
 _SAME = 1e-9
+_BENCH = BenchTable()
+"""The bands of hard cases."""
 _PARTS = ("position", "attitude", "velocity")
 
 
@@ -94,22 +96,22 @@ _Report: TypeAlias = dict[tuple[str, str, str], _Figures]
 
 
 def scene_departures(
-    recorded: SceneReport, measured: SceneReport, bands: Bands
+    recorded: SceneReport, measured: SceneReport, bench: BenchTable
 ) -> tuple[Departure, ...]:
     """Everything of a model that left its band, in the order of the recorded report."""
 
     def figures(report: SceneReport) -> _Report:
-        tables = [(one.name, _scenario(one, bands)) for one in report.scenarios]
-        return _by_name([*tables, *((one.name, _sweep(one, bands)) for one in report.sweeps)])
+        tables = [(one.name, _scenario(one, bench)) for one in report.scenarios]
+        return _by_name([*tables, *((one.name, _sweep(one, bench)) for one in report.sweeps)])
 
     return tuple(_departures(figures(recorded), figures(measured)))
 
 
 def case_departures(
-    recorded: Sequence[CaseReport], measured: Sequence[CaseReport], bands: Bands
+    recorded: Sequence[CaseReport], measured: Sequence[CaseReport]
 ) -> tuple[Departure, ...]:
     """Everything of the hard cases that left its band, in the order of the recorded report."""
-    old, new = (_by_name((one.name, _case(one, bands)) for one in c) for c in (recorded, measured))
+    old, new = (_by_name((one.name, _case(one)) for one in c) for c in (recorded, measured))
     return tuple(_departures(old, new))
 
 
@@ -200,8 +202,8 @@ def _largest(row: StableRow) -> _Figures:
     }
 
 
-def _scenario(report: ScenarioReport, bands: Bands) -> _Table:
-    share = bands.error
+def _scenario(report: ScenarioReport, bench: BenchTable) -> _Table:
+    share = bench.band
     place, speed = FLOORS * report.floor, FLOORS * report.velocity_floor
     known = report.horizon >= report.duration * (1 - _SAME)
     found: _Table = {
@@ -222,16 +224,16 @@ def _scenario(report: ScenarioReport, bands: Bands) -> _Table:
         if row.status == "ok" and known:
             figures["slip"] = _Figure(row.slip, share, _ROUNDING)
         found[setting_text(row.setting), "setting"] = figures
-    found |= _orders(report.orders, bands.order)
+    found |= _orders(report.orders, bench.order_band)
     return found | {(row.integrator, "stable timestep"): _largest(row) for row in report.stable}
 
 
-def _sweep(sweep: SweepReport, bands: Bands) -> _Table:
+def _sweep(sweep: SweepReport, bench: BenchTable) -> _Table:
     return {("", "sweep"): {}} | {
         (f"{row.parameter} {row.value}", "value"): {
             "status": _Figure(status_text(row.status)),
             **{
-                name: _Figure(getattr(row, name), bands.error, _INVISIBLE)
+                name: _Figure(getattr(row, name), bench.band, _INVISIBLE)
                 for name in ("change", "penetration", "slip", "restitution")
             },
         }
@@ -240,8 +242,8 @@ def _sweep(sweep: SweepReport, bands: Bands) -> _Table:
     }
 
 
-def _case(case: CaseReport, bands: Bands) -> _Table:
-    known, share = case.reference, bands.error
+def _case(case: CaseReport) -> _Table:
+    known, share = case.reference, _BENCH.band
     place, speed = FLOORS * max(known.position, known.attitude), FLOORS * known.velocity
     found: _Table = {("", "case"): {}}
     for line in case.boundaries:
@@ -251,7 +253,7 @@ def _case(case: CaseReport, bands: Bands) -> _Table:
         found[line.integrator, "stable timestep"] = figures
     for figure in case.figures:
         found[figure.integrator, figure.name] = _figure(figure, share, place)
-    found |= _orders(case.orders, bands.order)
+    found |= _orders(case.orders, _BENCH.order_band)
     for run in case.errors:
         name = f"{run.integrator} at {seconds_text(run.timestep)}"
         found[name, "run"] = _run(run, share, place, speed, known=True)

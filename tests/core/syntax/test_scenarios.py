@@ -66,7 +66,7 @@ def test_everything_that_a_file_can_say(newline: str) -> None:
     declared = parsed.value
     assert declared is not None
     assert declared.model == "arms/arm"
-    assert (declared.visible.share, declared.visible.angle) == (0.02, 2.0)
+    assert (declared.bench.visible, declared.bench.visible_angle) == (0.02, 2.0)
     reach, rest, other = declared.scenarios
     assert (reach.name, reach.title, reach.keyframe) == ("reach", "A reach", "home")
     assert (reach.qpos, reach.qvel) == ((0.0, 1.5), (0.5, 0.0))
@@ -101,7 +101,7 @@ def test_a_file_may_say_nothing(text: str) -> None:
     assert parsed.diagnostics == ()
     assert parsed.value is not None
     assert (parsed.value.scenarios, parsed.value.keep) == ((), ())
-    assert (parsed.value.visible.share, parsed.value.visible.angle) == (0.01, 1.0)
+    assert (parsed.value.bench.visible, parsed.value.bench.visible_angle) == (0.01, 1.0)
 
 
 @settings(max_examples=60)

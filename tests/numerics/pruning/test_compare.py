@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.core.model.scenarios import Visible
+from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import compare, pruning_scenes
@@ -23,7 +23,7 @@ DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".
 
 def lasting(duration: float, keyframe: int = -1) -> Scene:
     scenario = Scenario(duration, 0.002, keyframe=keyframe)
-    return Scene("go", "go", scenario, (0.002,), 0.002, Visible(), None)
+    return Scene("go", "go", scenario, (0.002,), 0.002, BenchTable(), None)
 
 
 CHAOS, SHORT = lasting(15.0, 0), lasting(1.0, 0)

@@ -18,7 +18,6 @@ import time
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.model.scenarios import Bands
 from coursebuild.core.run.machine import machine, one_processor
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
@@ -83,7 +82,7 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     here = engine_version()
     others = sorted({case.machine.engine for case in old} - {here})
     remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in others)
-    departures = case_departures(old, found.reports, Bands())
+    departures = case_departures(old, found.reports)
     return replace(found, checked=(Checked("stability", STABILITY.path(), departures, remarks),))
 
 

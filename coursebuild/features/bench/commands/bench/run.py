@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.model.scenarios import Bands
+from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench import measuring
@@ -110,8 +110,8 @@ def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -
     ):
         if before != now:
             remarks.append(f"recorded with {what}{before}, measured with {now}")
-    bands = Bands() if scene.declared is None else scene.declared.bands
-    departures = scene_departures(recorded, measured, bands)
+    bench = BenchTable() if scene.declared is None else scene.declared.bench
+    departures = scene_departures(recorded, measured, bench)
     return Checked(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
 
 
