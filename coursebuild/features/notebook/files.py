@@ -12,6 +12,8 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 
+import msgspec
+
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Lesson, document_scripts
 from coursebuild.core.model.results import CachedFile
@@ -56,9 +58,9 @@ def _notebook(site: SiteContext, lesson: Lesson, page: str, archive: zips.Archiv
         "nbformat": 4,
         "nbformat_minor": 5,
     }
-    # As Jupyter writes it.
-    text = json.dumps(document, ensure_ascii=False, indent=1, sort_keys=True)
-    return f"{text}\n".encode("utf-8", "replace")
+    text = json.dumps(document, ensure_ascii=False, sort_keys=True)
+    # As Jupyter writes it; `json` itself takes five times as long to indent.
+    return msgspec.json.format(text.encode("utf-8", "replace"), indent=1) + b"\n"
 
 
 def _setup(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> Iterator[Cell]:

@@ -38,6 +38,7 @@ _UNIT = re.compile(
 _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
 """What a formula without claims does not have."""
+_DIGIT = re.compile("[0-9]")
 
 
 class Claims(Struct, frozen=True):
@@ -178,6 +179,8 @@ class _Counter:
 
 def claimed(text: str) -> Iterator[Number]:
     """The numbers of a text that are claims."""
+    if _DIGIT.search(text) is None:
+        return  # as in most texts, which take long to scan
     for number in scan_prose(text):
         if not number.finite:
             continue
