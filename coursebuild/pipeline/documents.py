@@ -147,7 +147,13 @@ class Documents(Parser):
         self, source: Source, callouts: frozenset[str], *, lesson: bool
     ) -> Parsed[Document]:
         """A document without its prose, and what is wrong in it."""
-        self.ahead([(source, lesson)], callouts)
+        known = self._texts.get(source.path)
+        if (
+            known is None
+            or known.source is not source
+            or (known.callouts, known.lesson) != (callouts, lesson)
+        ):
+            self.ahead([(source, lesson)], callouts)
         summary = self._summaries[source.path]
         return Parsed(summary.document, summary.diagnostics)
 

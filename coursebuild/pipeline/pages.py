@@ -4,8 +4,9 @@ Entry point: `Pages`.
 
 1. Every page has inputs, all that it shows of the course, and a key: a hash of its inputs, of its
    document's text, and of the tool. Where nothing has changed of what inputs are made of, the key
-   is known without (`page_index`).
-2. What was drawn before comes from the store; a page that is not there is drawn.
+   is known without.
+2. Of the pages of the last build it is known what the site must know (`page_index`). What was drawn
+   earlier comes from the store; a page that is not there is drawn.
 3. From the records of pages it is known whether all links lead somewhere, and which characters and
    styles the pages use.
 4. A body is fetched, and framed, when its file is written: a course may have any number of pages.
@@ -17,8 +18,6 @@ import functools
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 
-from msgspec import Struct
-
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model.results import CachedFile
@@ -26,28 +25,15 @@ from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.common_files import PageFacts
 from coursebuild.core.pages.frame import Names, PageFrame
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.links import has
+from coursebuild.core.pages.links import Reference, has
 from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
-from coursebuild.pipeline.page_index import PageKeys
+from coursebuild.pipeline.page_index import PageIndex, SitePage
 from coursebuild.pipeline.reading import PAGES, DrawnPage, PageRequest, SourceText
-
-
-class SitePage(Struct, frozen=True):
-    """A page that was drawn, now or before."""
-
-    entry: PageEntry
-    key: str
-    indexed: bool
-    """Whether search engines should list it."""
-    notes: tuple[tuple[str, NotedPage], ...]
-    """Of features, by name."""
-    ids: tuple[str, ...]
-    """Its anchors."""
 
 
 class Pages:
@@ -69,25 +55,22 @@ class Pages:
         self._documents = documents
         self._store = store
         self._last_good = last_good or {}
-        self._text: set[str] = set()
-        self._mathematics: set[str] = set()
-        self._declarations: set[str] = set()
-        self._links: set[tuple[str, str]] = set()
-        """Site paths and anchors that pages lead to on others."""
-        self._sound = True
-        """Whether every page has the anchors that it leads to itself."""
         self._latest: tuple[str, DrawnPage] | None = None
         """The page that was asked for last: several files are made of it."""
-        keys = PageKeys(store, self._around())
-        self._pages = self._made(page_list(library) if entries is None else entries, keys)
+        index = PageIndex(store, self._around())
+        self._pages = self._made(page_list(library) if entries is None else entries, index)
         if entries is None:
-            keys.save()
+            index.save(self._pages.values())
 
     @property
     def facts(self) -> PageFacts:
         """What the shared files must know of all pages together."""
-        found = self._text, self._mathematics, self._declarations
-        return PageFacts(*map(frozenset, found))
+        pages = self._pages.values()
+        return PageFacts(
+            frozenset[str]().union(*(page.text for page in pages)),
+            frozenset[str]().union(*(page.mathematics for page in pages)),
+            frozenset[str]().union(*(page.declarations for page in pages)),
+        )
 
     @property
     def keys(self) -> dict[str, str]:
@@ -115,7 +98,9 @@ class Pages:
         def leads(path: str, anchor: str) -> bool:
             return anchor == "" or has(ids[path], anchor) if path in ids else path in files
 
-        return self._sound and all(leads(path, anchor) for path, anchor in self._links)
+        pages = self._pages.values()
+        links = set[Reference]().union(*(page.links for page in pages))
+        return all(page.sound for page in pages) and all(leads(*link) for link in links)
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
@@ -156,71 +141,55 @@ class Pages:
             return None
         return key_of(course, results_fingerprint(self._library.results, self._library.reports))
 
-    def _request(self, entry: PageEntry, keys: PageKeys) -> tuple[str, PageRequest | None]:
-        """The key of a page; where its inputs were made for that, the request with them."""
-        if entry.path in self._last_good:
-            return self._last_good[entry.path], None
-        text = text_of(entry, self._library)
-        text_key = "" if text is None else text.key
-        key = keys.get(entry.path, text_key)
-        if key is not None:
-            return key, None
-        request = page_request(entry, self._library)
-        keys.add(entry.path, text_key, request.key)
-        return request.key, request
-
     # --- drawing
 
-    def _made(self, entries: Iterable[PageEntry], keys: PageKeys) -> dict[str, SitePage]:
+    def _made(self, entries: Iterable[PageEntry], index: PageIndex) -> dict[str, SitePage]:
         """The pages by site path, in order; they are drawn where they are not kept."""
         found: dict[str, SitePage | None] = {}
-        asked: deque[tuple[PageEntry, str]] = deque()
+        asked: deque[tuple[PageEntry, str, str]] = deque()
 
         def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
             for entry in entries:
-                key, request = self._request(entry, keys)
-                kept = self._store.get(PAGES, key, lambda data: decode(data, DrawnPage))
-                if kept is not None:
-                    found[entry.path] = self._noted(entry, key, kept.record)
-                elif entry.path not in self._last_good:  # else what it was is gone
-                    found[entry.path] = None
-                    asked.append((entry, key))
-                    yield request or page_request(entry, self._library)
+                path, text = entry.path, text_of(entry, self._library)
+                text_key = "" if text is None else text.key
+                stays = path in self._last_good
+                key = self._last_good[path] if stays else index.key(path, text_key)
+                request = None
+                if key is None:
+                    request = page_request(entry, self._library, text)
+                    key = request.key
+                page = index.page(entry, key) or self._kept(entry, key, text_key)
+                if page is not None:
+                    found[path] = page
+                elif not stays:  # else what it was is gone
+                    found[path] = None
+                    asked.append((entry, key, text_key))
+                    yield request or page_request(entry, self._library, text)
 
         drawn: list[str] = []
         for data in self._documents.draw(missing()):
-            entry, key = asked.popleft()
+            entry, key, text_key = asked.popleft()
             record = decode(data, PageRecord)
             assert record is not None
-            found[entry.path] = self._noted(entry, key, record)
+            found[entry.path] = SitePage.of(entry, key, text_key, record)
             drawn.append(entry.path)
         self.drawn = tuple(drawn)
         """Site paths of the pages that were drawn just now."""
         return {path: page for path, page in found.items() if page is not None}
 
-    def _noted(self, entry: PageEntry, key: str, record: PageRecord) -> SitePage:
-        """A page, now that it is known what it says."""
-        self._text.update(record.text)
-        self._mathematics.update(record.mathematics)
-        self._declarations.update(record.declarations)
-        own = frozenset(record.ids)
-        for path, anchor in record.references:
-            if path != entry.path:
-                self._links.add((path, "" if anchor == "top" else anchor))
-            elif anchor not in ("", "top") and not has(own, anchor):
-                self._sound = False
-        head = record.head
-        notes = tuple(
-            (name, NotedPage(head.path, head.kind, entry.id, head.title, digest))
-            for name, digest in record.notes
-        )
-        return SitePage(entry, key, head.indexed, notes, record.ids)
+    def _kept(self, entry: PageEntry, key: str, text_key: str) -> SitePage | None:
+        """A page that was drawn before the last build."""
+        kept = self._store.get(PAGES, key, lambda data: decode(data, DrawnPage))
+        return None if kept is None else SitePage.of(entry, key, text_key, kept.record)
 
     def _drawn(self, path: str) -> DrawnPage:
         """What was drawn of a page."""
         if self._latest is None or self._latest[0] != path:
             page = self._pages[path]
-            make = functools.partial(page_request, page.entry, self._library)
+
+            def make() -> PageRequest:
+                return page_request(page.entry, self._library, text_of(page.entry, self._library))
+
             self._latest = path, self._documents.page(page.key, make)
         return self._latest[1]
 
@@ -242,9 +211,9 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
     return SourceText.of(document.source, callouts, lesson=is_lesson)
 
 
-def page_request(entry: PageEntry, library: Library) -> PageRequest:
-    """A page with all that it shows; its key is a hash of that."""
-    course, text = library.course, text_of(entry, library)
+def page_request(entry: PageEntry, library: Library, text: SourceText | None) -> PageRequest:
+    """A page with all that it shows, and its text; its key is a hash of both."""
+    course = library.course
     inputs = encode(entry.inputs(library))
     text_key = "" if text is None else text.key
     own = course.theme.template_texts

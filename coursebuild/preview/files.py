@@ -26,7 +26,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.pages import framed, page_request
+from coursebuild.pipeline.pages import framed, page_request, text_of
 from coursebuild.pipeline.reading import DrawnPage
 from coursebuild.pipeline.site import Site, SiteMaker
 
@@ -155,7 +155,8 @@ class Files:
         if known is None or known.frame is not frame:
             document = self.document(path)
             if document is None or self._is_sound(document):
-                request = page_request(self._entries[path], library)
+                entry = self._entries[path]
+                request = page_request(entry, library, text_of(entry, library))
                 if known is None or known.key != request.key:
                     page = self._documents.page(request.key, lambda: request)
                 else:

@@ -145,7 +145,7 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
             if path.is_file() and len(path.name) == 64 and kind not in SERVED:
                 path.write_bytes(sealed(name, junk))
                 kinds.add(kind)
-        assert {"summaries", "pages", "maps", "keys"} <= kinds
+        assert {"summaries", "pages", "maps", "index"} <= kinds
         assert build(course) == before, junk
     for kind in ("maps", "mathml", "pages", "summaries"):
         for path in sorted((folder / kind).iterdir()):

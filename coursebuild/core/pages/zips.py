@@ -175,6 +175,8 @@ def _models(
     library: Library, around: Surroundings, scripts: tuple[Script, ...]
 ) -> Mapping[str, bytes]:
     """The models that scripts name, and the files that these pull in."""
+    if not library.course.models:
+        return {}
     sources = {model.source.path: model.source.text.encode() for model in library.course.models}
     others = {file.path: file.data for file in around.model_files}
     named = {name for script in scripts for name in models_named(script)}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property
 
 from msgspec import Struct
 
@@ -27,23 +28,22 @@ from coursebuild.core.text.source import Excerpt, Span
 Locate = Callable[[int, int], Span]
 
 
-class PrintedLine(Struct, frozen=True):
+class PrintedLine(Struct, frozen=True, dict=True):
     """A line of output, or a row of a recorded table with its cells joined."""
 
     text: str
-    numbers: tuple[Number, ...]
     locate: Locate | None = None
     """Where `text[start:end]` stands in the lesson; `None` for what is not recorded."""
 
-    @classmethod
-    def of(cls, text: str, locate: Locate | None = None) -> PrintedLine:
-        """A line with its numbers."""
-        return cls(text, scan(text), locate)
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """The numbers in it. Those of most lines nobody asks for."""
+        return scan(self.text)
 
 
 def lines_of_run(stdout: str, filters: Iterable[Filter] = ()) -> list[PrintedLine]:
     """The lines of an output that is not recorded."""
-    return list(map(PrintedLine.of, Side.of(stdout, filters).lines))
+    return list(map(PrintedLine, Side.of(stdout, filters).lines))
 
 
 def printed_lines(recording: Recording, filters: Iterable[Filter] = ()) -> tuple[PrintedLine, ...]:
@@ -52,7 +52,7 @@ def printed_lines(recording: Recording, filters: Iterable[Filter] = ()) -> tuple
         return tuple(map(_row_line, table_rows(recording.body)))
     side = Side.of(recording.body.text, filters)
     return tuple(
-        PrintedLine.of(line, _in_fence(recording.body, side, index))
+        PrintedLine(line, _in_fence(recording.body, side, index))
         for index, line in enumerate(side.lines)
     )
 
@@ -75,7 +75,7 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
         _, high = row[last].mapped.origin(0, min(end - starts[last], len(row[last].mapped.text)))
         return Span(row[first].cell.span.source, low, max(low, high))
 
-    return PrintedLine.of(" ".join(cell.mapped.text for cell in row), locate)
+    return PrintedLine(" ".join(cell.mapped.text for cell in row), locate)
 
 
 def shows(shown: Number, printed: Number) -> bool:
@@ -143,16 +143,22 @@ class Shown(Struct, frozen=True):
 
     def is_in(self, lines: Sequence[PrintedLine]) -> bool:
         """Whether printed numbers that may be meant are those shown, rounded."""
+        digits = self.numbers[0].text.lstrip("+-\u2212")
+        same = filter(self.shows, self._windows(line for line in lines if digits in line.text))
+        if any(map(self.stands_beside, same)):  # as nearly always: the others need no look
+            return True
         return any(map(self.shows, self.windows(lines)))
+
+    def _windows(self, lines: Iterable[PrintedLine]) -> Iterator[Window]:
+        """As many printed numbers, one after the other."""
+        count = len(self.numbers)
+        for line in lines:
+            for first in range(len(line.numbers) - count + 1):
+                yield Window(line, line.numbers[first : first + count])
 
     def windows(self, lines: Iterable[PrintedLine]) -> list[Window]:
         """The printed numbers that may be meant, by number and by the text around them."""
-        count = len(self.numbers)
-        windows = [
-            Window(line, line.numbers[first : first + count])
-            for line in lines
-            for first in range(len(line.numbers) - count + 1)
-        ]
+        windows = list(self._windows(lines))
         for stands_beside in self._sides():
             windows = [window for window in windows if stands_beside(window)] or windows
         return windows

@@ -76,7 +76,9 @@ class MappedText(Struct, frozen=True):
 
     def substituted(self, pattern: re.Pattern[str], text: str) -> MappedText:
         """The text with another in place of each match."""
-        return self.edited({found.span(): text for found in pattern.finditer(self.text)})
+        found = pattern.finditer(self.text)
+        places = {one.span(): text for one in found if one.group() != text}
+        return self.edited(places) if places else self
 
     def edited(self, places: Mapping[tuple[int, int], str]) -> MappedText:
         """The text with others in places of it, given in order by where they start and end."""

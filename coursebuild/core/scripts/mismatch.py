@@ -39,7 +39,7 @@ def mismatch(
             f"`{binding.text}` does not stand in the output of `{path}`",
             help="write it as it is printed, or take `{out}` away",
         )
-    label, better = _proposal(shown, binding.text, lines, list(map(PrintedLine.of, before)))
+    label, better = _proposal(shown, binding.text, lines, list(map(PrintedLine, before)))
     return diagnose(
         "binding-mismatch",
         binding.text_span,

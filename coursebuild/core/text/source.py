@@ -48,7 +48,7 @@ class Source(Struct, frozen=True, dict=True):
     def __repr__(self) -> str:
         return f"Source({self.path!r})"
 
-    @property
+    @cached_property
     def digest(self) -> bytes:
         """SHA-256 of the text."""
         return text_digest(self.text)
