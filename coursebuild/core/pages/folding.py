@@ -44,20 +44,39 @@ class Part(Struct, frozen=True):
     """Names that are defined in it."""
 
 
-@functools.lru_cache(maxsize=64)
 def fold(code: str) -> tuple[Part, ...]:
     """The parts of a script; a short one, and one that does not parse, is one part in sight."""
-    lines = code.removesuffix("\n").split("\n")
-    if len(lines) <= LONG:
-        return (Part(1, len(lines), folded=False),)
-    return _cut(_statements(code), lines)
+    return _read(code.rstrip("\n"))[0]
 
 
-@functools.lru_cache(maxsize=64)
 def imported(code: str) -> frozenset[str]:
     """Top-level modules that a Python text imports by name; none where it does not parse."""
+    return _read(code.rstrip("\n"))[1]
+
+
+@functools.lru_cache(maxsize=1024)
+def _read(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
+    """The parts and the modules: when a lesson is read and when it is drawn, each is asked for."""
+    body = _statements(code)
+    lines = code.split("\n")
+    parts = _cut(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
+    return parts, _modules(body)
+
+
+def _statements(code: str) -> list[ast.stmt]:
+    """The statements of a text; none where it does not parse."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return ast.parse(code).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return []
+
+
+def _modules(body: list[ast.stmt]) -> frozenset[str]:
+    """Top-level modules that statements import by name."""
     found: set[str] = set()
-    waiting: list[ast.AST] = [*_statements(code)]
+    waiting: list[ast.AST] = [*body]
     while waiting:
         node = waiting.pop()
         if isinstance(node, ast.Import):
@@ -69,16 +88,6 @@ def imported(code: str) -> frozenset[str]:
             for name in ("body", "orelse", "finalbody", "handlers", "cases"):
                 waiting += getattr(node, name, None) or ()
     return frozenset(found)
-
-
-def _statements(code: str) -> list[ast.stmt]:
-    """The statements of a text; none where it does not parse."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return ast.parse(code).body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return []
 
 
 def _cut(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
