@@ -46,19 +46,19 @@ class Part(Struct, frozen=True):
 
 def fold(code: str) -> tuple[Part, ...]:
     """The parts of a script; a short one, and one that does not parse, is one part in sight."""
-    return _read(code.rstrip("\n"))[0]
+    return _read(code)[0]
 
 
 def imported(code: str) -> frozenset[str]:
     """Top-level modules that a Python text imports by name; none where it does not parse."""
-    return _read(code.rstrip("\n"))[1]
+    return _read(code.rstrip("\n"))[1]  # as it is drawn
 
 
 @functools.lru_cache(maxsize=1024)
 def _read(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
     """The parts and the modules: when a lesson is read and when it is drawn, each is asked for."""
     body = _statements(code)
-    lines = code.split("\n")
+    lines = code.removesuffix("\n").split("\n")
     parts = _cut(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
     return parts, _modules(body)
 
