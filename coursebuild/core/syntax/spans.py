@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from markdown_it import MarkdownIt
@@ -134,6 +135,9 @@ class InlineState(StateInline):
 
 def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
     """The rows joined, each character with its place in the source of `base`."""
+    follows = all(row.end == after.start for row, after in pairwise(rows))
+    if rows and follows and not any(row.padding for row in rows):  # as most are
+        return base.slice(rows[0].start, rows[-1].end)
     parts: list[Excerpt] = []
     for start, end, padding in rows:
         for _ in range(padding):
