@@ -70,16 +70,21 @@ class _Reader:
     def __init__(self, tex: str, start: int, end: int) -> None:
         self.tex, self.at, self.end = tex, start, end
         self.count = 0
+        self.seen: tuple[int, str] = (-1, "")
+        """Where the last token that was looked at stands, and the token."""
 
     # --- tokens
 
     def peek(self) -> str:
         """The next token, past spaces; empty at the end."""
+        if self.seen[0] == self.at:  # each rule asks again
+            return self.seen[1]
         space = SPACE.match(self.tex, self.at, self.end)
         if space is not None:
             self.at = space.end()
         found = TOKEN.match(self.tex, self.at, self.end)
-        return found[0] if found is not None else ""
+        self.seen = self.at, found[0] if found is not None else ""
+        return self.seen[1]
 
     def takes(self, *signs: str) -> str:
         """The next token, passed over, where it is one of these."""
