@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ast
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +11,7 @@ import pytest
 
 import coursebuild
 from coursebuild.core.registry import installed_features
+from support.run_code import run_code
 
 PACKAGE = Path(coursebuild.__file__).parent
 ROOT = PACKAGE.parent
@@ -182,5 +181,5 @@ def test_asking_for_the_version_imports_nothing_heavy() -> None:
         "print(sorted(set(sys.modules) & {'numpy', 'mujoco', 'markdown_it', 'jinja2', 'pygments',"
         " 'msgspec', 'coursebuild.core.run.v8', 'fontTools', 'uharfbuzz', 'watchfiles'}))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = run_code(code)
     assert done.stdout.splitlines()[-1] == "[]"

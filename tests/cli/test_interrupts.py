@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -15,10 +14,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from coursebuild.cli import interrupts
 from coursebuild.cli.interrupts import Terminated, heeded
+from support.run_code import run_code
 
-ROOT = Path(interrupts.__file__).parents[2]
 EXCEPTIONS = {signal.SIGINT: KeyboardInterrupt, signal.SIGTERM: Terminated}
 pytestmark = pytest.mark.site
 numbers = pytest.mark.parametrize("number", EXCEPTIONS)
@@ -30,11 +28,6 @@ def heard(number: signal.Signals, act: Callable[[], object]) -> None:
         act()
         time.sleep(120)  # it ends as soon as the signal comes again
     assert raised.type is EXCEPTIONS[number]
-
-
-def run(code: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
 @numbers
@@ -57,7 +50,7 @@ def test_signal_is_heard_where_python_drops_what_is_raised(number: signal.Signal
     heard(number, lambda: signal.raise_signal(number))
     heard(number, Goes)
     heard(number, refer)
-    done = run(
+    done = run_code(
         "import os, signal, sys, time\n"
         "from coursebuild.cli.interrupts import heeded\n"
         "number = int(sys.argv[1])\n"
@@ -141,7 +134,7 @@ def test_afterwards_all_is_as_it_was(capsys: pytest.CaptureFixture[str]) -> None
 
 def test_nothing_is_changed_where_signals_are_ignored_or_in_another_thread() -> None:
     """As under `nohup`, or in the background of a shell: the command goes on and ends well."""
-    done = run(
+    done = run_code(
         "import os, signal\n"
         "from coursebuild.cli.interrupts import heeded\n"
         "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
@@ -169,7 +162,7 @@ def test_signal_does_not_change_the_status_of_a_command_that_is_through(
     number: signal.Signals,
 ) -> None:
     for threads in (0, 1):
-        done = run(
+        done = run_code(
             "import os, signal, sys, threading, time\n"
             f"for _ in range({threads}):\n"
             "    threading.Thread(target=time.sleep, args=(60,), daemon=True).start()\n"
@@ -181,7 +174,7 @@ def test_signal_does_not_change_the_status_of_a_command_that_is_through(
             int(number),
         )
         assert done.returncode == 5
-    done = run(  # nor does an interrupt out of a text that was executed
+    done = run_code(  # nor does an interrupt out of a text that was executed
         "import sys\n"
         "from coursebuild.cli.interrupts import heeded\n"
         "with heeded(alone=True):\n"

@@ -29,15 +29,6 @@ def same_rotation(got: np.ndarray, want: np.ndarray) -> None:
     close(got * np.sign(got @ want), want)
 
 
-def test_mul_and_conj(rng: np.random.Generator) -> None:
-    res = np.zeros(4)
-    for a, b in zip(unit_quats(rng), unit_quats(rng), strict=True):
-        mujoco.mju_mulQuat(res, a, b)
-        close(spatial.quat_mul(a, b), res)
-        mujoco.mju_negQuat(res, a)
-        assert (spatial.quat_conj(a) == res).all()
-
-
 def test_matrices_both_ways(rng: np.random.Generator) -> None:
     flat, quat = np.zeros(9), np.zeros(4)
     half_turns = [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [1e-9, 1, 0, 0], [0, 0.6, 0.8, 0]]
@@ -46,34 +37,6 @@ def test_matrices_both_ways(rng: np.random.Generator) -> None:
         close(spatial.quat_to_mat(q), flat.reshape(3, 3))
         mujoco.mju_mat2Quat(quat, flat)
         same_rotation(spatial.mat_to_quat(flat.reshape(3, 3)), quat)
-
-
-def test_rotate(rng: np.random.Generator) -> None:
-    res = np.zeros(3)
-    for q, v in zip(unit_quats(rng), rng.normal(size=(COUNT, 3)), strict=True):
-        mujoco.mju_rotVecQuat(res, v, q)
-        close(spatial.quat_rotate(q, v), res, np.linalg.norm(v))
-
-
-def test_axis_angle_and_rotation_vectors(rng: np.random.Generator) -> None:
-    quat, rotvec = np.zeros(4), np.zeros(3)
-    for axis, angle in zip(
-        rng.normal(size=(COUNT, 3)), rng.uniform(-7, 7, size=COUNT), strict=True
-    ):
-        axis = axis / np.linalg.norm(axis)
-        mujoco.mju_axisAngle2Quat(quat, axis, angle)
-        close(spatial.axis_angle_to_quat(axis, angle), quat)
-        close(spatial.rotvec_to_quat(axis * angle), quat)
-        mujoco.mju_quat2Vel(rotvec, quat, 0.01)
-        close(spatial.quat_to_rotvec(quat) / 0.01, rotvec, 4 / 0.01)
-
-
-def test_integration(rng: np.random.Generator) -> None:
-    for q, v in zip(unit_quats(rng), rng.normal(size=(COUNT, 3)), strict=True):
-        for dt in (0.002, -1.0, 1e-9):
-            quat = q.copy()
-            mujoco.mju_quatIntegrate(quat, v, dt)
-            close(spatial.quat_integrate(q, v, dt), quat)
 
 
 def test_euler_sequences(rng: np.random.Generator) -> None:

@@ -54,28 +54,6 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     assert limits["discrete"] is None
 
 
-def test_bodies_that_lie_in_each_other_without_any_warning() -> None:
-    text = """\
-<mujoco>
-  <option timestep="0.001"/>
-  <worldbody>
-    <geom type="box" size="1 1 0.05"/>
-    <body pos="0 0 0.03">
-      <joint type="slide" axis="0 0 1"/>
-      <geom type="box" size="0.1 0.1 0.01" density="100"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-    short = '[[scenario]]\nname = "a"\nduration = 0.2\nsample = 0.02\n'
-    (report,) = measured(mujoco.MjModel.from_xml_string(text), short, quick=True)
-    statuses = {one.status for one in report.rows}
-    assert statuses == {"diverged"}
-    assert all("in each other" in " ".join(one.reasons) for one in report.rows)
-    warned = " ".join(" ".join(one.reasons) for one in report.rows)
-    assert "MuJoCo warned" not in warned
-
-
 def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
     with pytest.raises(SceneError, match=r"it diverges within .* s even at 0\.25 s a step"):
         measured(stiff(1.0, 0.01), quick=True)

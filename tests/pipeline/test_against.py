@@ -7,7 +7,6 @@ import os
 import platform
 import signal
 import subprocess
-import time
 import zipfile
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import pytest
 
 from coursebuild.core.run.versions import engine_version
 from support.scratch_course import Done, Folder, Make, block, ended, wait_until_alone
+from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
 
@@ -272,10 +272,7 @@ def test_interrupted_installations_leave_nothing_and_two_commands_at_once_instal
         mark.unlink(missing_ok=True)
         slow = course.start("check", "--against", "9.4.0", stdout=subprocess.DEVNULL)
         with ended(slow) as process:
-            until = time.monotonic() + 600
-            while not mark.exists():
-                assert process.poll() is None and time.monotonic() < until
-                time.sleep(0.02)
+            wait_for_file(mark)
             process.send_signal(number)
             process.wait(120)
         assert environments(course) == left

@@ -5,18 +5,16 @@ from __future__ import annotations
 import gc
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from coursebuild import __version__
 from coursebuild.cli.commands import known_commands
+from support.run_code import run_code
 from support.scratch_course import (
     FIRST,
     GOOD,
-    ROOT,
     SECOND,
     Done,
     Folder,
@@ -172,7 +170,7 @@ def test_on_windows_one_sentence_says_where_it_runs() -> None:
     code = (
         "import sys; sys.platform = 'win32'; from coursebuild.cli import main; sys.exit(main([]))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    done = run_code(code)
     said = "coursebuild runs on Linux and macOS; on Windows, install it in WSL\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
 

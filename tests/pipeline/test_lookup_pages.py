@@ -143,24 +143,6 @@ def test_the_index_of_symbols(site: dict[str, str]) -> None:
     assert [item.split()[0] for item in symbols] == ["a", "I", "x", "z", "ρ"]
 
 
-def test_lessons_say_who_refers_to_them(site: dict[str, str]) -> None:
-    one, two = site["lessons/1.1-one.html"], site["lessons/1.2-two.html"]
-    assert "Referred to by 1.2 Lesson two, 1.3 Lesson three" in text(one)
-    assert "Referred to by 1.1 Lesson one" in text(two)
-    assert "Referred to by" not in text(site["lessons/1.3-three.html"])
-
-
-def test_the_foot_has_both_unless_a_course_has_neither(site: dict[str, str], make: Make) -> None:
-    foot = site["glossary/index.html"].partition('class="site-more"')[2]
-    assert '<a href="index.html" aria-current="page">Glossary</a>' in foot
-    assert '<a href="../symbols/index.html">Symbols</a>' in foot
-    folder = make("Text.")
-    assert folder.main("build").status == 0
-    plain = folder.tree("public")
-    assert not {"glossary/index.html", "symbols/index.html"} & plain.keys()
-    assert b"Glossary" not in plain["index.html"]
-
-
 # --- drawings
 
 

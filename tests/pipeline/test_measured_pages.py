@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import time
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from support.edited_course import drawn
 from support.model_reports import box, case, diet, finding
 from support.preview_process import serving
 from support.scratch_course import GOOD, Folder
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
 
@@ -214,10 +214,7 @@ def test_the_preview_follows_reports(course: Course) -> None:
     with serving(course.folder) as preview:
 
         def shows(path: str, text: str) -> None:
-            until = time.monotonic() + 300
-            while text not in preview.get(path)[2].decode():
-                assert time.monotonic() < until, (path, text)
-                time.sleep(0.05)
+            wait_until(lambda: text in preview.get(path)[2].decode(), f"{text!r} on {path}")
 
         shows(SHOWING, "A pendulum swings")
         course.write_diet("it is far away")

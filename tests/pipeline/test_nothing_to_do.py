@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 
 import pytest
 
-from support.scratch_course import FIRST, ROOT, Folder, Make
+from support.run_code import run_code
+from support.scratch_course import FIRST, Folder, Make
 
 pytestmark = pytest.mark.site
 
@@ -29,12 +28,7 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
         "print(sorted(heavy & set(sys.modules)), file=sys.stderr); sys.exit(status)"
     )
     for _ in range(2):
-        done = subprocess.run(
-            [sys.executable, "-c", code, "-C", str(folder.root), "check"],
-            capture_output=True,
-            text=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-        )
+        done = run_code(code, "-C", folder.root, "check")
         assert done.returncode == 0
     assert done.stdout == (
         "ok       examples/one.py  cached\n\n"
@@ -47,21 +41,21 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
 def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     """A formula that the lesson had before is not typeset again."""
     folder = make(FIRST)
-    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 1$.\n")
     code = (
         "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
         "rare = {'mujoco', 'numpy', 'fontTools', 'coursebuild.core.run.v8'};"
         "print(sorted(rare & set(sys.modules)), file=sys.stderr); sys.exit(status)"
     )
-    command = [sys.executable, "-c", code, "-C", str(folder.root), "build", "-q"]
-    env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run(command, check=True, capture_output=True, env=env)
-    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 1$.\n")
-    done = subprocess.run(command, check=True, capture_output=True, text=True, env=env)
-    assert done.stderr == "[]\n"
-    folder.write(folder.lesson(), folder.read(folder.lesson()) + b"\nIt is $a^2 + 2$.\n")
-    done = subprocess.run(command, check=True, capture_output=True, text=True, env=env)
-    assert "coursebuild.core.run.v8" in done.stderr
+
+    def loaded_after(edit: bytes) -> str:
+        folder.write(folder.lesson(), folder.read(folder.lesson()) + edit)
+        done = run_code(code, "-C", folder.root, "build", "-q")
+        assert done.returncode == 0
+        return done.stderr
+
+    loaded_after(b"\nIt is $a^2 + 1$.\n")
+    assert loaded_after(b"\nIt is $a^2 + 1$.\n") == "[]\n"
+    assert "coursebuild.core.run.v8" in loaded_after(b"\nIt is $a^2 + 2$.\n")
 
 
 def test_nothing_changed_counts_for_the_same_command_only(make: Make) -> None:
@@ -102,15 +96,9 @@ def test_working_directory_that_is_gone_gives_2(make: Make) -> None:
     gone = folder.root / "gone"
     gone.mkdir()
     code = (
-        "import os, sys; from coursebuild.cli import main;os.rmdir(os.getcwd()); sys.exit(main())"
+        "import os, sys; from coursebuild.cli import main; os.rmdir(os.getcwd()); sys.exit(main())"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, "check"],
-        cwd=gone,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+    done = run_code(code, "check", cwd=gone)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.endswith("the working directory is not there any more\n")
     assert "Traceback" not in done.stderr

@@ -10,8 +10,9 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from support.preview_page import LESSON, Open, lesson_page, see
-from support.preview_process import serving, wait_for
+from support.preview_process import serving
 from support.scratch_course import GOOD, Make, block
+from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.browser
 
@@ -39,7 +40,7 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             see(panel)
             expect(panel).to_contain_text("The last good page is shown")
             panel.get_by_role("button", name="content/lessons/1.1-one.md:3:5").click()
-            wait_for(told, 1)
+            wait_for_file(told, 1)
             assert told.read_text() == f"--goto {folder.root / folder.lesson()}:3:5\n"
             expect(panel).to_contain_text("lesson 9.9 is linked to, and the course map does not")
             expect(panel.locator(".preview-source mark")).to_have_text("lesson:9.9")

@@ -76,15 +76,6 @@ def test_files_of_somebody_else_are_never_removed(make: Make) -> None:
     assert (done.status, done.out) == (2, "")
     assert not (folder.root / "examples").exists()
     assert folder.read("out/notes.txt") == b"mine"
-    assert folder.main("build").status == 0
-    for name in ("public/lessons/mine.txt", "public/mine.txt"):
-        folder.write(name, "precious")
-        before = folder.tree()
-        done = folder.main("build")
-        assert done.status == 2
-        assert "public holds files that coursebuild did not put there" in done.err
-        assert folder.tree() == before
-        (folder.root / name).unlink()
 
 
 def test_caches_that_are_gone_or_damaged_are_made_again(make: Make, stores: Path) -> None:

@@ -3,25 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 from support.scratch_course import Make, block
 
 pytestmark = pytest.mark.site
-
-
-def test_a_learner_runs_the_extracted_file(make: Make) -> None:
-    code = "import sys\nfrom helper import WHAT\n\nprint(WHAT, sys.argv[1:])"
-    lesson = block("helper.py", "WHAT = 1") + block("x.py", code, "1 ['a']", info="args=a")
-    folder = make("## One\n\n" + lesson)
-    assert folder.main("check").status == 0
-    learner = subprocess.run(
-        [sys.executable, "examples/x.py", "a"], cwd=folder.root, capture_output=True, text=True
-    )
-    assert learner.stdout == "1 ['a']\n"
 
 
 # --- simulations that are lost

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from support.preview_process import Preview, serving, wait_for
+from support.preview_process import Preview, serving
 from support.scratch_course import GOOD, Folder, Make
+from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
 
@@ -41,7 +42,7 @@ def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[
 
 def test_browser_is_opened_when_the_address_answers(preview: Preview) -> None:
     told = preview.folder.tmp / "told"
-    wait_for(told)
+    wait_for_file(told)
     assert told.read_text() == f"http://127.0.0.1:{preview.port}/ 200"
 
 

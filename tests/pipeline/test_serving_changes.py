@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from support.preview_process import PATIENT, serving, wait_for
+from support.preview_process import PATIENT, serving
 from support.scratch_course import GOOD, SILENT, Make, block, ended, wait_until_alone
+from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
 
@@ -169,7 +170,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
     code = f"{begun}{waits}print(1)"
     folder = make("## First\n\n" + block("x.py", code, "1", info="timeout=3000"))
     with serving(folder) as preview, preview.events() as events:
-        wait_for(folder.root / "begun")
+        wait_for_file(folder.root / "begun")
         assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
             {"path": "examples/x.py", "state": "running"}
         ]
@@ -182,7 +183,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
         assert folder.read("begun") == b"x"
         (folder.root / "go").unlink()
         folder.replace(folder.lesson(), "print(1)", "print(int(1))")
-        wait_for(folder.root / "begun", 2)
+        wait_for_file(folder.root / "begun", 2)
         events.until(lambda told: told.news["scripts"][0]["state"] == "running")
         folder.replace(folder.lesson(), waits, "")
         events.settled("script-writes")
@@ -263,7 +264,7 @@ def test_scripts_end_with_a_preview_that_is_killed(make: Make) -> None:
     slow = "import time, pathlib\npathlib.Path('begun').touch()\nwhile True: time.sleep(60)"
     folder = make("## One\n\n" + block("x.py", slow))
     with serving(folder) as preview:
-        wait_for(folder.root / "begun")
+        wait_for_file(folder.root / "begun")
         preview.process.kill()
         assert preview.process.wait(600) == -signal.SIGKILL
 

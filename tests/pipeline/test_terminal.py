@@ -32,6 +32,7 @@ from support.scratch_course import (
     wait_until_alone,
     without_seconds,
 )
+from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
 ERASE = "\r\x1b[K"
@@ -259,14 +260,6 @@ def slow(name: str) -> str:
     return block(name, SLOW, "1", info="timeout=600")
 
 
-def begun(folder: Folder, process: subprocess.Popen[bytes], mark: str) -> None:
-    """Wait until a script runs."""
-    until = time.monotonic() + 120
-    while not (folder.root / mark).exists():
-        assert time.monotonic() < until and process.poll() is None
-        time.sleep(0.01)
-
-
 @pytest.mark.parametrize(
     ("command_", "number", "status"),
     [
@@ -283,8 +276,8 @@ def test_signal_ends_command_and_its_scripts(
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     process = folder.start(command_, "--jobs", "2", env=SILENT, **pipes)
     with ended(process):
-        begun(folder, process, "examples/slow.running")
-        begun(folder, process, "examples/b.running")
+        wait_for_file(folder.root / "examples/slow.running")
+        wait_for_file(folder.root / "examples/b.running")
         assert len(processes(folder)) >= 5
         os.killpg(process.pid, number)  # as a terminal does
         out, err = process.communicate(timeout=120)
@@ -302,7 +295,7 @@ def test_a_closed_terminal_ends_the_scripts(make: Make) -> None:
     folder = make("## One\n\n" + slow("slow.py"))
     process = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with ended(process):
-        begun(folder, process, "examples/slow.running")
+        wait_for_file(folder.root / "examples/slow.running")
         os.kill(process.pid, signal.SIGHUP)
         assert process.wait(120) == -signal.SIGHUP
     wait_until_alone(folder)
@@ -312,7 +305,7 @@ def test_ctrl_c_ends_waiting_for_another_run(make: Make) -> None:
     folder = make("## One\n\n" + slow("slow.py"))
     first = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with ended(first):
-        begun(folder, first, "examples/slow.running")
+        wait_for_file(folder.root / "examples/slow.running")
         second = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         with ended(second):
             assert second.stderr is not None

@@ -7,11 +7,11 @@ import os
 import signal
 import stat
 import subprocess
-import time
 
 import pytest
 
 from support.scratch_course import GOOD, Make, block, command, ended
+from support.waiting import wait_for_file, wait_until
 
 pytestmark = pytest.mark.site
 HELD = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)\nprint(1)"
@@ -125,10 +125,7 @@ def test_build_and_update_begun_together_take_turns(make: Make) -> None:
         ended(folder.start("update", **quiet, stderr=to_update.fileno())) as update,
         ended(folder.start("build", **quiet, stderr=to_build.fileno())) as build,
     ):
-        until = time.monotonic() + 300
-        while not any(waits()):
-            assert time.monotonic() < until
-            time.sleep(0.01)
+        wait_until(lambda: any(waits()), "one that waits for the other")
         folder.write("go", "")
         assert update.wait(600) == 0
         build.wait(600)
@@ -144,9 +141,7 @@ def test_a_build_does_not_wait_for_a_dead_one(make: Make) -> None:
     folder = make("## One\n\n" + block("x.py", HELD, "1"))
     first = folder.start("build", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with ended(first):
-        while not (folder.root / ".coursebuild/lock").exists():
-            assert first.poll() is None
-            time.sleep(0.01)
+        wait_for_file(folder.root / ".coursebuild/lock")
         os.kill(first.pid, signal.SIGKILL)
         first.wait()
     folder.write("go", "")

@@ -15,7 +15,7 @@ import pytest
 import watchfiles
 
 from coursebuild.preview.watcher import FolderWatcher
-from support.runners import wait_until
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
 

@@ -10,7 +10,6 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from coursebuild.preview.server import PREFIX
@@ -103,14 +102,6 @@ class Preview:
                 assert head.startswith(b"HTTP/1.1 200 ")
                 assert b"text/event-stream" in head
                 yield Events(_events(stream))
-
-
-def wait_for(path: Path, size: int = 0) -> None:
-    """Wait until a file is there, and has so many bytes."""
-    until = time.monotonic() + 300
-    while not path.exists() or path.stat().st_size < size:
-        assert time.monotonic() < until, f"{path} does not come"
-        time.sleep(0.01)
 
 
 class Events:

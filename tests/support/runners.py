@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import runner
 from coursebuild.core.run.runner import ScriptServer
+from support.waiting import wait_for_file, wait_until
 
 SOURCE_TREE = Path(runner.__file__).parents[3]
 Run = Callable[..., ScriptRun]
@@ -63,17 +63,9 @@ def computed(pid: int) -> int:
     return int(fields[11]) + int(fields[12])
 
 
-def wait_until(happened: Callable[[], object], what: str = "") -> None:
-    """Look again and again; what takes two minutes hangs."""
-    until = time.monotonic() + 120
-    while not happened():
-        assert time.monotonic() < until, f"this never came: {what}"
-        time.sleep(0.005)
-
-
 def wait_for(path: Path) -> int:
     """The process whose number a script writes into a file."""
-    wait_until(lambda: path.exists() and path.read_text(), str(path))
+    wait_for_file(path, 1)
     return int(path.read_text())
 
 

@@ -241,9 +241,9 @@ def processes(folder: Folder) -> list[str]:
     return found
 
 
-def wait_until_alone(folder: Folder, seconds: float = 300.0) -> None:
+def wait_until_alone(folder: Folder) -> None:
     """Nothing of a course runs any more."""
-    until = time.monotonic() + seconds
+    until = time.monotonic() + 300
     while left := processes(folder):
         assert time.monotonic() < until, f"still running: {left}"
         time.sleep(0.02)

@@ -14,7 +14,7 @@ import pytest
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.shared_cache import FolderPlace, SharedCache, shared_cache
 from coursebuild.core.files.errors import EffectError
-from support.runners import wait_until
+from support.waiting import wait_until
 
 KEY = hashlib.sha256(b"a key").hexdigest()
 GROUP = hashlib.sha256(b"a group").hexdigest()

@@ -15,6 +15,7 @@ import pytest
 
 from coursebuild.core.engine.workers import Workers, can_fork
 from coursebuild.core.files.errors import EffectError
+from support.run_code import run_code
 from support.runners import gone
 
 pytestmark = pytest.mark.site
@@ -137,9 +138,7 @@ def test_a_signal_at_the_moment_of_a_fork_is_for_the_process_that_forks(
         "    answers = [a for a, _ in workers.map([(None, 1)])]\n"
         "    print(answers, signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(int(number))], cwd=ROOT, capture_output=True, text=True
-    )
+    done = run_code(code, int(number))
     # SIGTERM ends the worker, as it would a moment later: what it was to answer is answered here.
     answered_here = number == signal.SIGTERM
     assert done.stdout == f"heard by True\n[(1, {answered_here})] set()\n"

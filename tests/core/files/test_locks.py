@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.files.locks import is_abandoned, project_lock
-from support.runners import SOURCE_TREE, wait_until
+from support.runners import SOURCE_TREE
+from support.waiting import wait_until
 
 HOLD = """
 import sys

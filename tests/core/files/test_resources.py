@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.metadata
-import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 from coursebuild.core.files import resources
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run import versions
+from support.run_code import run_code
 
 
 @pytest.mark.parametrize("ask", [resources.assets_dir, resources.templates_dir])
@@ -78,10 +78,5 @@ def test_importing_files_and_runners_loads_nothing_heavy() -> None:
         "versions.engine_version()\n"
         "print(sorted({'mujoco', 'numpy', 'py_mini_racer'} & set(sys.modules)))\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=Path(resources.__file__).parents[3],
-    )
+    done = run_code(code)
     assert done.stdout == "[]\n", done.stderr

@@ -14,7 +14,8 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import JsonChild
-from support.runners import SOURCE_TREE, alive, gone, wait_until
+from support.runners import SOURCE_TREE, alive, gone
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.script_environment import clean_environment
+from support.run_code import run_code
 from support.runners import SOURCE_TREE, TOOL, Run, both_ways, forked_or_not, hanging, job
 
 pytestmark = pytest.mark.site
@@ -238,10 +237,5 @@ def test_signals_are_as_at_the_start(root: Path, fork: bool) -> None:
         "import signal\nprint([signal.getsignal(n) is not signal.SIG_IGN for n in (1, 2, 15)])"
     )
     code = "import signal\nfor n in (1, 2, 15): signal.signal(n, signal.SIG_IGN)\n" + TOOL
-    done = subprocess.run(
-        [sys.executable, "-c", code, root, str(fork)],
-        capture_output=True,
-        text=True,
-        cwd=SOURCE_TREE,
-    )
+    done = run_code(code, root, fork)
     assert "[True, True, True]" in done.stdout, done.stderr

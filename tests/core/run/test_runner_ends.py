@@ -22,8 +22,8 @@ from support.runners import (
     hanging,
     job,
     wait_for,
-    wait_until,
 )
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
 

@@ -24,7 +24,9 @@ from coursebuild.core.run.v8 import (
     ScriptError,
     StoppedError,
 )
-from support.runners import computed, wait_until
+from support.run_code import run_code
+from support.runners import computed
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.engine
 
@@ -381,9 +383,7 @@ class TestIsolate:
             "    print(can_fork())\n"
         )
         can = sys.platform != "darwin"
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
-        )
+        done = run_code(code)
         assert (done.stdout.splitlines(), done.stderr) == (
             [str(can), f"True {not can}", "False"],
             "",
@@ -422,7 +422,5 @@ class TestLife:
             "from coursebuild.core.model.results import Formula\n"
             "engine = MathEngine()\nprint(len(engine.typeset([Formula('x', False)])))\n"
         )
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=300
-        )
+        done = run_code(code)
         assert (done.stdout, done.stderr, done.returncode) == ("1\n", "", 0)

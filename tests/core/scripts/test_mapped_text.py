@@ -35,21 +35,3 @@ def test_a_filter_ends_where_backtracking_would_not() -> None:
     text = "a" * 5000 + "b"
     rules = (Filter(r"(a+)+$", ""), Filter(r"(a|a)*c", ""), Filter("(a*)*b$", "end"))
     assert filtered(MappedText.of_text(text), rules).text == "end"
-
-
-@given(TEXTS, st.lists(PATTERNS, max_size=4), st.data())
-def test_origins_lie_in_the_text_and_grow(
-    text: str, rules: list[tuple[str, str]], data: st.DataObject
-) -> None:
-    mapped = filtered(MappedText.of_text(text), [Filter(*rule) for rule in rules])
-    start = data.draw(st.integers(0, len(mapped.text)))
-    end = data.draw(st.integers(start, len(mapped.text)))
-    low, high = mapped.origin(start, end)
-    assert 0 <= low <= high <= len(text)
-    if start < end < len(mapped.text):
-        later = mapped.origin(end, len(mapped.text))
-        assert later[0] >= low and later[1] >= high
-    copies = [p for p in mapped.segments if p.verbatim]
-    for piece in copies:
-        length = piece.end - piece.start
-        assert mapped.text[piece.at : piece.at + length] == text[piece.start : piece.end]

@@ -19,7 +19,8 @@ from coursebuild.core.run.versions import engine_version
 from coursebuild.features.lab.engines import browser, files
 from coursebuild.features.lab.engines.browser import LabEngine
 from support.lab_values import BALL, Bench, make_lab, request
-from support.runners import computed, wait_until
+from support.runners import computed
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.engine
 

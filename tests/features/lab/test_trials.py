@@ -34,8 +34,8 @@ from support.lab_lessons import BALL, checked, course, fence
 from support.lab_values import OpenEngines, try_labs
 from support.made_courses import make_course
 from support.poisoned_values import poisoned
-from support.runners import wait_until
 from support.scratch_course import Folder, block, ended, wait_until_alone
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.engine
 
