@@ -96,23 +96,6 @@ def test_the_last_good_page_stays_and_the_others_go_on(
         running.save(folder.lesson())
 
 
-def test_a_broken_map_changes_nothing_that_is_shown(
-    make: Make, live: Callable[[Folder], Live]
-) -> None:
-    folder = make(GOOD)
-    running = live(folder)
-    before = running.site()
-    good = folder.read("content/course.toml")
-    folder.write("content/course.toml", b"[course\n")
-    running.save("content/course.toml")
-    assert running.wrong() == ["map-syntax"]
-    assert {path: running.find(path) for path in before} == before
-    folder.write("content/course.toml", good)
-    running.save("content/course.toml")
-    assert running.wrong() == []
-    assert running.site() == before
-
-
 # --- what others make of a lesson
 
 

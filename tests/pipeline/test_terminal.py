@@ -22,6 +22,7 @@ import pytest
 
 from support.scratch_course import (
     GOOD,
+    HELD,
     SILENT,
     Folder,
     Make,
@@ -43,12 +44,6 @@ child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
 Path(sys.argv[0]).with_suffix(".running").touch()
 time.sleep(600)
 """
-HELD = """
-import pathlib, time
-while not pathlib.Path("go").exists():
-    time.sleep(0.01)
-"""
-"""A script that goes on when the test has seen what it is about."""
 
 
 # --- a terminal

@@ -42,56 +42,6 @@ OLD
 > lines
 > ```
 
-1. In a list
-
-   ~~~~python file=examples/listed.py
-   print("```")
-   print("~~~")
-   ~~~~
-
-   Output, here:
-
-   ~~~~text
-   OLD
-   ~~~~
-
-   - deeper
-
-     ```python file=examples/deep.py
-     print("deep")
-     ```
-
-     Output:
-
-     ```text
-     ```
-
-```python file=examples/mixed.py
-print("same", 3.0)
-print("took 5.25 ms")
-print("last line")
-```
-
-Output:
-
-```text ellipsis
-same 2.0
-took ... ms
-...
-```
-
-```python file=examples/table.py
-for name, error in (("Euler", 1.25e-2), ("RK4", 3.5e-9)):
-    print(f"{name:8} {error:.2e} {-error:.1e}")
-```
-
-Output with a table:
-
-| method | error   | with a sign |
-| :----- | ------: | --- |
-| Euler  | 9.99e-02 | \u22129.9e-02 |
-| RK4 | 3.50e-09 | \u22123.5e-09 |
-
 ```python file=examples/clock.py
 import time
 print(time.perf_counter_ns())
@@ -105,21 +55,13 @@ never
 
 The end, without a final newline: `1.5`{out=examples/plain.py}"""
 
-UPDATED = (
-    EVERYTHING.replace(
-        "```text\nOLD\n```\n\n> [!note]",
-        "```text\nalpha 1.5\n\nbeta    -0.25\n```\n\n> [!note]",
-    )
-    .replace("> ```text\n> OLD\n> lines\n", "> ```text\n> quoted\n>\n>     indented\n")
-    .replace("   ~~~~text\n   OLD\n", "   ~~~~text\n   ```\n   ~~~\n")
-    .replace("     ```text\n     ```", "     ```text\n     deep\n     ```")
-    .replace("same 2.0", "same 3.0")
-    .replace("9.99e-02", "1.25e-02")
-    .replace("\u22129.9e-02", "\u22121.3e-02")
-)
+UPDATED = EVERYTHING.replace(
+    "```text\nOLD\n```\n\n> [!note]",
+    "```text\nalpha 1.5\n\nbeta    -0.25\n```\n\n> [!note]",
+).replace("> ```text\n> OLD\n> lines\n", "> ```text\n> quoted\n>\n>     indented\n")
 
 
-def test_update_changes_outputs_of_every_form_and_no_other_byte(make: Make) -> None:
+def test_update_changes_outputs_and_no_other_byte(make: Make) -> None:
     """Line ends of Windows and a byte order mark stay, too."""
     folder = make(("\ufeff" + EVERYTHING).replace("\n", "\r\n").encode())
     done = folder.main("update")

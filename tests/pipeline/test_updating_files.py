@@ -10,14 +10,10 @@ import subprocess
 
 import pytest
 
-from support.scratch_course import GOOD, Make, block, command, ended
+from support.scratch_course import GOOD, HELD, Make, block, command, ended
 from support.waiting import wait_for_file, wait_until
 
 pytestmark = pytest.mark.site
-HELD = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)\nprint(1)"
-"""A script that goes on when there is a file `go`."""
-
-
 STALE = GOOD.replace("hello 3.14159\n", "OLD\n")
 
 
@@ -112,7 +108,7 @@ def test_update_tells_what_cannot_be_read_or_written(make: Make) -> None:
 
 def test_build_and_update_begun_together_take_turns(make: Make) -> None:
     """A build and an update, begun together: one waits, and each is whole."""
-    folder = make("## One\n\n" + block("x.py", HELD, "OLD", info="timeout=600"), GOOD)
+    folder = make("## One\n\n" + block("x.py", HELD + "print(1)", "OLD", info="timeout=600"), GOOD)
     said = folder.tmp / "update", folder.tmp / "build"
     quiet = {"stdout": subprocess.DEVNULL}
 
@@ -138,7 +134,7 @@ def test_build_and_update_begun_together_take_turns(make: Make) -> None:
 
 
 def test_a_build_does_not_wait_for_a_dead_one(make: Make) -> None:
-    folder = make("## One\n\n" + block("x.py", HELD, "1"))
+    folder = make("## One\n\n" + block("x.py", HELD + "print(1)", "1"))
     first = folder.start("build", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with ended(first):
         wait_for_file(folder.root / ".coursebuild/lock")
