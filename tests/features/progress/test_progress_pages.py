@@ -8,11 +8,6 @@ from typing import Any
 
 import pytest
 
-from coursebuild.core.model import Document
-from coursebuild.core.model.summary import without_prose
-from coursebuild.core.pages.quiz_index import count, quiz_index
-from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.text.source import Source
 from coursebuild.features.quiz.keys import text_key
 from support.rendered_course import Make
 
@@ -29,23 +24,6 @@ def why(text: str, **more: str) -> dict[str, Any]:
 TWO = quiz("0.1-one", why("Why?"), why("How?", id="how")) + quiz("0.1-two", why("What?"))
 WHY, WHAT = text_key("open", "Why?"), text_key("open", "What?")
 NAMES = f"0.1-one:{WHY},how 0.1-two:{WHAT}"
-
-
-def test_the_questions_of_a_document() -> None:
-    document = parsed("> [!note]\n> Text.\n\n" + TWO)
-    assert quiz_index(document) == NAMES
-    assert quiz_index(without_prose(document)) == NAMES, "its skeleton is enough"
-    assert quiz_index(parsed("Text.")) == ""
-
-
-def parsed(text: str) -> Document:
-    found = parse_document(Source("a.md", text), frozenset({"note"}), lesson=True).value
-    assert found is not None
-    return found
-
-
-def test_the_number_of_questions() -> None:
-    assert [count(text) for text in ("", "a:x", NAMES)] == [0, 1, 3]
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +43,8 @@ def test_lists_of_lessons_name_their_questions(found: dict[str, str]) -> None:
         (NAMES, ' data-lesson="0.1"'),
         ("about:which", ""),
     ]
+    counts = re.findall(r'"asking-count">(.*?)<', found["review/index.html"])
+    assert counts == ["3 tasks", "1 task"]
 
 
 def test_only_lists_of_lessons_name_questions(found: dict[str, str]) -> None:

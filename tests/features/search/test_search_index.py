@@ -114,14 +114,6 @@ def test_every_term_stands_once_where_the_browser_looks(library: Library, pages:
     assert alone == {term for term in expected if is_fuzzy(term)}
 
 
-def test_the_plan_grows_with_the_course() -> None:
-    plans = {pages: IndexPlan.of(pages) for pages in (0, 1, 80, 2000, 100_000)}
-    assert plans[0] == plans[1] == IndexPlan(1, 1)
-    assert plans[80] == IndexPlan(8, 1)
-    assert plans[2000] == IndexPlan(128, 16)
-    assert plans[100_000].terms == 1024
-
-
 def test_an_edit_sorts_few_pages_and_makes_few_shards(library: Library) -> None:
     terms, shelf = course(400), Shelf()
     before = made(library, terms, shelf)

@@ -82,32 +82,16 @@ def test_the_same_symbol_in_other_surroundings_is_the_same(typeset: Typeset) -> 
         assert alone[0] in symbols(typeset(tex)), tex
 
 
-@pytest.mark.parametrize(
-    ("tex", "single"),
-    [
-        (r"\omega", True),
-        (r"\mathbf c_k", True),
-        (r"\mathrm{Re}", True),
-        (r"\mathit{St}", True),
-        (r"x^*", True),
-        (r"I_{zz}", True),
-        (r"\Delta", True),
-        (r"mg", False),
-        (r"v^2", False),
-        (r"A^\top", False),
-        (r"I = 1", False),
-        (r"1", False),
-        (r"\frac ab", False),
-        (r"", False),
-    ],
-)
-def test_what_is_a_single_symbol(typeset: Typeset, tex: str, single: bool) -> None:
-    assert (only_symbol(typeset(tex) if tex else "<math></math>") is not None) is single
+SINGLE = r"\omega \mathbf{c}_k x^* \tilde{I}_{xy} I_{zz} \Delta \ell".split()
+NAMES = r"\mathrm{Re} \mathit{St}".split()
+NO_SYMBOL = r"mg v^2 A^\top I=1 1 \frac{a}{b}".split()
 
 
-def test_a_declared_symbol_is_the_one_that_formulas_have(typeset: Typeset) -> None:
-    for tex in (r"\omega", r"\mathbf c_k", r"x^*", r"\tilde I_{xy}", r"\Omega", r"\ell"):
+def test_what_is_a_single_symbol_is_the_one_that_formulas_have(typeset: Typeset) -> None:
+    for tex in SINGLE:
         assert symbols(typeset(f"1 + {tex}")) == (only_symbol(typeset(tex)),)
+    assert [tex for tex in (*NAMES, *NO_SYMBOL) if only_symbol(typeset(tex))] == NAMES
+    assert only_symbol("<math></math>") is None
 
 
 def test_latin_comes_first_then_greek_each_letter_with_its_kin(typeset: Typeset) -> None:

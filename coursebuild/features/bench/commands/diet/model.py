@@ -17,9 +17,9 @@ from typing import Any
 
 import mujoco
 
+from coursebuild.core.files.changes import FileChange, change_files
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
-from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course, MjcfModel
 from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import model_files
@@ -131,15 +131,8 @@ class DietModel:
             message = f"the changed model `{self.scene.name}` is not the one that was run"
             place = self.scene.model.source.span(0, 0)
             raise CannotError(diagnose("model-error", place, message))
-        written: list[str] = []
-        try:
-            for path, data in sorted(changed.items()):
-                write_atomic(self.root, path, data, expected=self.read(path))
-                written.append(path)
-        except EffectError:
-            for path in written:
-                write_atomic(self.root, path, self.read(path) or b"", expected=changed[path])
-            raise
+        changes = [FileChange(path, self.read(path), data) for path, data in changed.items()]
+        change_files(self.root, sorted(changes, key=lambda one: one.path))
         self._files.clear()
 
     def digest(self) -> str:
