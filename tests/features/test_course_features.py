@@ -25,7 +25,7 @@ SHOUT = '''"""Text in capitals."""
 from markupsafe import Markup, escape
 
 from coursebuild.core.features import Feature, FenceKind
-from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.model import FeatureBlock
 from coursebuild.core.text.rules import Rule
 
@@ -35,10 +35,7 @@ class Shout(FeatureBlock, frozen=True):
 
 
 def parse(fence, texts):
-    wrong = ()
-    if "?" in fence.body.text:
-        wrong = (diagnose("shout", fence.head, "nobody shouts a question"),)
-    return Parsed(Shout(fence.span, fence.body.text.strip()), wrong)
+    return Parsed(Shout(fence.span, fence.body.text.strip()))
 
 
 FEATURE = Feature(
@@ -85,15 +82,6 @@ def test_a_fence_of_a_feature_follows_its_code_and_the_map(course: Folder) -> No
     course.replace(MAP, 'features = ["features/shout.py"]\n', "")
     assert course.main("build").status == 0
     assert "LISTEN" not in course.text(PAGE), "a file that the map does not name is no feature"
-
-
-def test_a_mistake_in_a_fence_of_a_feature_has_its_rule_and_place(course: Folder) -> None:
-    course.replace("content/lessons/1.1-one.md", "listen <now>", "who?")
-    done = course.main("check")
-    assert done.status == 1
-    assert done.out.startswith(
-        "error[shout]: nobody shouts a question\n  --> content/lessons/1.1-one.md:3:1\n"
-    )
 
 
 BROKEN = {
@@ -147,7 +135,8 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
     for _ in range(2):  # the second time from what is kept
         assert "error[task-name]: two tasks are called A & B\n" in course.main("check").out
     course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\n```\n")
-    assert course.main("check").out.startswith("error[task-name]: this task has no name\n")
+    told = "error[task-name]: this task has no name\n  --> content/lessons/1.1-one.md:3:1\n"
+    assert course.main("check").out.startswith(told)
 
 
 def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:

@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-from coursebuild.core.model import Block, Inline, Paragraph, Text
+from coursebuild.core.model import document_blocks
+from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
-from coursebuild.core.text.source import Excerpt, Source
+from coursebuild.core.text.source import Source
 from coursebuild.features.lab.model import Lab
-from coursebuild.features.lab.parse import parse_lab
 from support.positioned_nodes import shown
 
 
-class Plain:
-    """A parser of texts to which all is text."""
-
-    def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
-        return Parsed((Paragraph(excerpt.span(), self.inlines(excerpt).value),))
-
-    def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
-        return Parsed((Text(excerpt.span(), excerpt.text),))
-
-
 def parse(body: str, kind: str = "simlab") -> Parsed[Lab | None]:
-    """The lab whose JSON begins in the second line."""
+    """The lab whose JSON begins in the second line of a lesson."""
     source = Source("content/lessons/4.2-x.md", f"```lab {kind}\n{body}\n```\n")
-    span = source.span(0, len(source.text) - 1)
-    start = source.text.index("\n") + 1
-    inner = Excerpt.of_span(source.span(start, start + len(body)))
-    return parse_lab(span, kind, source.span(7, 7 + len(kind)), inner, Plain())
+    parsed = parse_document(source, frozenset(), lesson=True)
+    labs = (block for block in document_blocks(parsed.value) if isinstance(block, Lab))
+    return Parsed(next(labs, None), parsed.diagnostics)
 
 
 def told(body: str, kind: str = "simlab") -> list[str]:

@@ -154,11 +154,3 @@ def test_tests_of_new_features_pass_as_made(make: Callable[..., Folder]) -> None
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     ran = subprocess.run(tests, cwd=folder.root, env=environment, capture_output=True, text=True)
     assert "6 passed" in ran.stdout, ran.stdout
-
-
-def test_file_that_cannot_be_written_is_told(make: Callable[..., Folder]) -> None:
-    folder = make(FIRST)
-    (folder.root / "models").write_text("a file where a folder is wanted")
-    done = folder.main("new", "model", "ball")
-    assert (done.status, done.out) == (1, "")
-    assert "models/ball.xml cannot be written: " in done.err

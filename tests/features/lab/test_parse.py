@@ -84,7 +84,7 @@ def test_a_complete_lab() -> None:
     goal = fields.goal
     assert goal is not None and (goal.expr, goal.hold) == ("up", 2)
     assert [entry.do for entry in goal.log] == [{"gain": 1, "mass": 2}, "Spin"]
-    assert [inline.span.text for inline in lab.child_inlines()] == ["Let it *fly*."]
+    assert [inline.span.text for inline in lab.child_inlines()] == ["Let it ", "*fly*", "."]
     assert (lab.verify.seconds, lab.verify.rtol, lab.verify.deep) == (3.0, 0.0, False)
 
 
@@ -122,6 +122,8 @@ def test_a_model_that_readers_edit() -> None:
     assert (lab.kind, lab.xml.text, lab.xml.span().line) == ("mjcf", "<mujoco/>\n", 2)
     assert (fields.title, fields.height, lab.is_docked()) == ("A ball", 100, True)
     assert (lab.verify, fields.expect) == (Verify(2.0, 1e-6, True), (Expect(3.0, diverges=True),))
+    wrong = parse("<mujoco/>", "mjcf height=\udc80").diagnostics
+    assert "fence-key-value" in {one.rule for one in wrong}, "half a character"
 
 
 @settings(max_examples=60)
