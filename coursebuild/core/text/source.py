@@ -174,8 +174,10 @@ class Excerpt(Struct, frozen=True):
 
     def offset(self, at: int) -> int:
         """Source offset of the character at text offset `at`."""
-        i = bisect_right(self.pieces, at, key=_text_offset) - 1
-        text_at, source_at = self.pieces[max(i, 0)]
+        text_at, source_at = self.pieces[-1]
+        if at < text_at:
+            i = bisect_right(self.pieces, at, key=_text_offset) - 1
+            text_at, source_at = self.pieces[max(i, 0)]
         return min(source_at + (at - text_at), len(self.source.text))
 
     def span(self, start: int = 0, end: int | None = None) -> Span:
@@ -188,10 +190,12 @@ class Excerpt(Struct, frozen=True):
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""
         end = len(self.text) if end is None else end
-        first = bisect_right(self.pieces, start, key=_text_offset)
-        last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
-        inner = ((t - start, s) for t, s in self.pieces[first:last])
-        return Excerpt(self.source, self.text[start:end], ((0, self.offset(start)), *inner))
+        pieces: tuple[tuple[int, int], ...] = ((0, self.offset(start)),)
+        if len(self.pieces) > 1:
+            first = bisect_right(self.pieces, start, key=_text_offset)
+            last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
+            pieces += tuple((t - start, s) for t, s in self.pieces[first:last])
+        return Excerpt(self.source, self.text[start:end], pieces)
 
     def lines(self) -> tuple[Excerpt, ...]:
         """The excerpt's lines, without their line ends."""
