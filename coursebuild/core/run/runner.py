@@ -44,7 +44,7 @@ from coursebuild.core.run.script_environment import (
 from coursebuild.core.run.script_process import Job
 from coursebuild.core.run.trace_records import read_records
 from coursebuild.core.run.watching import STDERR_KEPT
-from coursebuild.core.run.workers import Enclose, Worker
+from coursebuild.core.run.workers import ChildReport, Enclose, Worker
 
 Started: TypeAlias = Callable[[str], object]
 """Is told of the path of a script that begins."""
@@ -287,7 +287,7 @@ class _Work:
         report = worker.take_report()
         if report is None:
             return
-        run = _script_run(str(self.root), self.jobs[index], *report)
+        run = _script_run(str(self.root), self.jobs[index], report)
         if self.sandbox is not None and run.trace is not None:
             why = run.trace.opaque or difference(self.jobs[index], run.trace, self.shown)
             run = replace(run, trace=replace(run.trace, opaque=why))
@@ -334,14 +334,13 @@ def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
     return tuple(found)
 
 
-def _script_run(
-    root: str, job: ScriptJob, report: supervisor.ChildReport, parts: Sequence[bytes | None]
-) -> ScriptRun:
+def _script_run(root: str, job: ScriptJob, report: ChildReport) -> ScriptRun:
+    parts = (None if part is None else part.encode("latin-1") for part in report.parts)
     out, err, trace, *figures = parts
     if out is None or err is None:
         raise ValueError("a report without output")
     stdout = out.decode("utf-8", "backslashreplace")
-    outcome = Outcome(report["outcome"])
+    outcome = Outcome(report.outcome)
     if outcome is Outcome.OK and stdout.encode() != out:
         outcome = Outcome.ENCODING
     if len(err) == STDERR_KEPT:
@@ -350,11 +349,11 @@ def _script_run(
     return ScriptRun(
         job.path,
         outcome,
-        report["status"],
+        report.status,
         stdout.replace("\r\n", "\n"),
         err.decode("utf-8", "backslashreplace").replace("\r\n", "\n"),
-        report["seconds"],
-        missing=tuple(report["missing"]),
+        report.seconds,
+        missing=report.missing,
         trace=read_records(trace, root, job.path) if trace else None,
         figures=tuple((name, data) for name, data in drawn if data is not None),
     )

@@ -13,8 +13,8 @@ Importing NumPy and MuJoCo takes longer than most scripts. So this process impor
 scripts are copies of it. Where that cannot be, it starts this program anew for each script. It has
 one thread, so that it may fork.
 
-The protocol: from the tool JSON objects (`Job`), each after its length in 4 bytes; to it for each
-one JSON object (`ChildReport`) after its length, and then the bytes of which it has the lengths.
+The protocol: JSON objects, each after its length in 4 bytes; from the tool a `Job`, and to it for
+each one a `ChildReport` (see `workers`).
 """
 
 from __future__ import annotations
@@ -38,7 +38,6 @@ import sys
 import traceback
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TypedDict
 
 from coursebuild.core.run.script_process import (
     Job,
@@ -98,20 +97,6 @@ def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
     if supervisor.scratch and has_ended(tool):
         remove_folder(supervisor.scratch)
     os._exit(int(status or 0))
-
-
-class ChildReport(TypedDict):
-    """What happened."""
-
-    outcome: str
-    """The value of an `Outcome`."""
-    status: int
-    """Exit status; the signal's number where one ended it."""
-    seconds: float
-    missing: list[str]
-    lengths: list[int]
-    """In bytes: of its output, of the end of its error output, of its trace (empty where nobody
-    watched), of each figure of the job; -1 of one that it did not draw."""
 
 
 def _alone(job: Job, bare: Collection[str]) -> ScriptProcess:
@@ -371,16 +356,16 @@ def _report(
     missing: Sequence[str] = (),
     parts: Sequence[bytes | None] = (b"", b"", b""),
 ) -> bytes:
-    """A report as it is sent, with its parts."""
-    report: ChildReport = {
+    """A `ChildReport` as it is sent."""
+    report = {
         "outcome": outcome,
         "status": status,
         "seconds": seconds,
         "missing": list(missing),
-        "lengths": [-1 if part is None else len(part) for part in parts],
+        "parts": [None if part is None else part.decode("latin-1") for part in parts],
     }
-    header = json.dumps(report).encode()
-    return b"".join((LENGTH.pack(len(header)), header, *filter(None, parts)))
+    data = json.dumps(report, ensure_ascii=False).encode()
+    return LENGTH.pack(len(data)) + data
 
 
 def remove_folder(folder: str) -> None:

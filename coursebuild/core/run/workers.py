@@ -1,12 +1,11 @@
 """The processes that run scripts, seen from the tool.
 
-Entry point: `Worker`.
+Entry point: `Worker`, which gives `ChildReport`s.
 """
 
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import subprocess
 import time
@@ -15,6 +14,7 @@ from multiprocessing.connection import wait
 from typing import TypeAlias
 
 import msgspec
+from msgspec import Struct
 
 from coursebuild.core.run import supervisor
 
@@ -22,6 +22,20 @@ Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], list[str]]
 """Of a command and an environment, the command that runs that in a sandbox."""
 _MOST = 256 << 20
 """Bytes that a report may have."""
+
+
+class ChildReport(Struct, frozen=True):
+    """What a script did, as its supervisor says it."""
+
+    outcome: str
+    """The value of an `Outcome`."""
+    status: int
+    """Exit status; the signal's number where one ended it."""
+    seconds: float
+    missing: tuple[str, ...]
+    parts: tuple[str | None, ...]
+    """Bytes, as Latin-1: its output, the end of its error output, its trace (empty where nobody
+    watched), and each figure of the job; `None` for one that it did not draw."""
 
 
 class Worker:
@@ -99,8 +113,8 @@ class Worker:
         self._buffer += data
         return bool(data)
 
-    def take_report(self) -> tuple[supervisor.ChildReport, list[bytes | None]] | None:
-        """A whole report with its parts, if it is here.
+    def take_report(self) -> ChildReport | None:
+        """A whole report, if it is here.
 
         Raises:
             ValueError: it is none.
@@ -109,20 +123,13 @@ class Worker:
         if len(self._buffer) < size:
             return None
         (length,) = supervisor.LENGTH.unpack(self._buffer[:size])
-        at = size + length
-        if at > _MOST:
+        if length > _MOST:
             raise ValueError("too long")
-        if len(self._buffer) < at:
+        if len(self._buffer) < size + length:
             return None
-        report = msgspec.json.decode(self._buffer[size:at], type=supervisor.ChildReport)
-        whole = at + sum(max(length, 0) for length in report["lengths"])
-        if whole > _MOST:
-            raise ValueError("too long")
-        if len(self._buffer) < whole:
-            return None
-        rest = io.BytesIO(self._buffer[at:])
+        report = msgspec.json.decode(self._buffer[size:], type=ChildReport)
         self._buffer.clear()
-        return report, [None if length < 0 else rest.read(length) for length in report["lengths"]]
+        return report
 
     def status(self) -> int:
         """What ended it, once it is gone: minus a signal's number, or an exit status."""

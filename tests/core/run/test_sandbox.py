@@ -185,7 +185,7 @@ def test_speaking_for_another_script(confine: Confine) -> None:
         "        with open(path, 'wb', buffering=0) as pipe: pipe.write(%r)\n"
         "    except OSError: pass\n"
     )
-    texts = (b"\xff" * 64, b"\0\0\0\2{}", b'\0\0\0\x0e{"lengths":[]}' + b"x" * 9)
+    texts = (b"\xff" * 64, b"\0\0\0\2{}", b'\0\0\0\x0c{"parts":[]}' + b"x" * 9)
     *forged, last = confine(*(forge % text for text in texts), "print('mine')")
     assert all(run.outcome in (Outcome.KILLED, Outcome.OK) for run in forged)
     assert (last.outcome, last.stdout) == (Outcome.OK, "mine\n")
