@@ -119,10 +119,8 @@ class _Update:
         self.blocked: list[Blocked] = []
 
     def run(self) -> ExamplesReport:
-        for path in sorted(self.wanted):
-            self._plan_write(path)
-        for path in sorted(self.known.keys() - self.wanted.keys()):
-            self._plan_removal(path)
+        for path in sorted(self.wanted.keys() | self.known.keys()):
+            self._plan(path)
         (self.root / FOLDER).mkdir(exist_ok=True)
         folders = {FOLDER, *(path.rpartition("/")[0] for path in self.wanted)}
         remove_leftovers(self.root / folder for folder in folders)
@@ -144,35 +142,25 @@ class _Update:
             tuple(sorted(self.blocked, key=lambda b: b.path)),
         )
 
-    def _plan_write(self, path: str) -> None:
-        data = self.wanted[path]
-        digest = _hash(data)
+    def _plan(self, path: str) -> None:
+        """Say what is to be done about a script that a lesson has, or had."""
+        wanted, known = self.wanted.get(path), self.known.get(path)
         obstacle, current = self._look(path)
-        if obstacle is not None:
-            self._block(path, obstacle, None)
-        elif current == data:
-            self.unchanged.append(path)
-            self.manifest[path] = (digest,)
-        elif self._is_ours(path, current):
-            self.written.append(path)
-            self.current[path] = current
-            self.manifest[path] = (digest,)
-        else:
-            self._block(path, Obstacle.EDITED if path in self.known else Obstacle.FOREIGN, current)
-
-    def _plan_removal(self, path: str) -> None:
-        obstacle, current = self._look(path)
-        if obstacle is not None or current is None:
+        if wanted is None and (obstacle is not None or current is None):
             return  # gone, or no longer anything of ours
-        if self._is_ours(path, current):
-            self.removed.append(path)
-            self.current[path] = current
-        else:
-            self._block(path, Obstacle.ORPHAN, current)
-
-    def _is_ours(self, path: str, current: bytes | None) -> bool:
         # A power cut may make a file that was just written empty, and that holds nobody's work.
-        return not current or _hash(current) in self.known.get(path, ())
+        if current and current != wanted and _hash(current) not in (known or ()):
+            edited = Obstacle.FOREIGN if known is None else Obstacle.EDITED
+            obstacle = Obstacle.ORPHAN if wanted is None else edited
+        if obstacle is not None:
+            self._block(path, obstacle, current)
+            return
+        self.current[path] = current
+        if wanted is None:
+            self.removed.append(path)
+        else:
+            self.manifest[path] = (_hash(wanted),)
+            (self.unchanged if current == wanted else self.written).append(path)
 
     def _look(self, path: str) -> tuple[Obstacle | None, bytes | None]:
         """What stands at a path: an obstacle, or the bytes of a file, or nothing."""

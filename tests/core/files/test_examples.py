@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -177,14 +178,13 @@ def test_folder_that_leads_out_or_is_a_file(tmp_path: Path) -> None:
 class Scripts(dict[str, bytes]):
     """Scripts with which something happens once the disk was looked at."""
 
-    def __init__(self, scripts: list[tuple[str, bytes]], asked: int, happens: object) -> None:
+    def __init__(self, scripts: list[tuple[str, bytes]], happens: Callable[[], object]) -> None:
         super().__init__(scripts)
-        self.asked, self.happens = asked, happens
+        self.happens = happens
 
     def __getitem__(self, path: str) -> bytes:
-        self.asked -= 1
-        if self.asked == 0 and callable(self.happens):
-            self.happens()
+        happens, self.happens = self.happens, lambda: None
+        happens()
         return super().__getitem__(path)
 
 
@@ -195,7 +195,7 @@ def test_saved_while_we_work(tmp_path: Path) -> None:
         for path, _ in (A, B):
             (tmp_path / path).write_bytes(b"mine\n")
 
-    report = write_examples(tmp_path, Scripts([NEXT], 2, save))
+    report = write_examples(tmp_path, Scripts([NEXT], save))
     assert {b.path: b.obstacle for b in report.blocked} == {
         A[0]: Obstacle.EDITED,
         B[0]: Obstacle.ORPHAN,
@@ -207,7 +207,7 @@ def test_saved_while_we_work(tmp_path: Path) -> None:
 def test_two_runs_at_once_write_the_same(tmp_path: Path) -> None:
     """As they do where a file system has no locks: nobody edited anything."""
     other: list[Summary] = []
-    scripts = Scripts([A, B], 3, lambda: other.append(write(tmp_path, A, B)))
+    scripts = Scripts([A, B], lambda: other.append(write(tmp_path, A, B)))
     found = summary(write_examples(tmp_path, scripts))
     assert [found, *other] == [((A[0], B[0]), (), (), ())] * 2
     assert write(tmp_path, A, B) == ((), (A[0], B[0]), (), ())
