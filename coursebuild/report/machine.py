@@ -5,7 +5,6 @@ Entry points: `FORMATS`; `to_json`, `to_junit`, `to_sarif`, `to_annotations`.
 
 from __future__ import annotations
 
-import json
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -133,7 +132,7 @@ def to_sarif(report: Report) -> str:
         "version": "2.1.0",
         "runs": [run],
     }
-    return json.dumps(value, ensure_ascii=False, indent=2) + "\n"
+    return json_text(value)
 
 
 def _result(d: Diagnostic, rule: int) -> dict[str, Any]:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import signal
 import stat
 import subprocess
 
 import pytest
 
 from support.scratch_course import GOOD, HELD, Make, block, command, ended
-from support.waiting import wait_for_file, wait_until
+from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
 STALE = GOOD.replace("hello 3.14159\n", "OLD\n")
@@ -131,14 +129,3 @@ def test_build_and_update_begun_together_take_turns(make: Make) -> None:
     assert "1\n```" in folder.text(folder.lesson())
     assert folder.main("build").status == 0
     assert not [name for name in folder.beside() if "tmp" in name or ".new" in name]
-
-
-def test_a_build_does_not_wait_for_a_dead_one(make: Make) -> None:
-    folder = make("## One\n\n" + block("x.py", HELD + "print(1)", "1"))
-    first = folder.start("build", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    with ended(first):
-        wait_for_file(folder.root / ".coursebuild/lock")
-        os.kill(first.pid, signal.SIGKILL)
-        first.wait()
-    folder.write("go", "")
-    assert folder.main("build").status == 0

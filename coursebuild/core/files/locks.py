@@ -15,7 +15,6 @@ import contextlib
 import errno
 import fcntl
 import os
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,8 +22,6 @@ from pathlib import Path
 _BUSY = frozenset({errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES})
 _LONG_AGO = 3600.0
 """Seconds after which a temporary file is abandoned where there are no locks."""
-_held: dict[Path, int] = {}
-"""Lock files that this process holds, and the thread that took them."""
 
 
 def try_lock(fd: int) -> bool | None:
@@ -54,23 +51,13 @@ def project_lock(
         root: the course folder; the lock is `.coursebuild/lock` in it.
         on_wait: is called once with a message, in the case that another run has the lock.
         name: of the lock's file.
-
-    Raises:
-        RuntimeError: this thread holds it already and would wait for itself.
     """
-    path = root.resolve() / ".coursebuild" / name
-    if _held.get(path) == threading.get_ident():
-        raise RuntimeError(f"{path} is already locked by this thread")
-    fd = _take(path, on_wait)
-    if fd is None:
-        yield
-        return
-    _held[path] = threading.get_ident()
+    fd = _take(root.resolve() / ".coursebuild" / name, on_wait)
     try:
         yield
     finally:
-        _held.pop(path, None)
-        os.close(fd)
+        if fd is not None:
+            os.close(fd)
 
 
 @contextlib.contextmanager

@@ -75,11 +75,6 @@ def test_second_run_says_so_and_waits(tmp_path: Path, removed: bool) -> None:
             assert second.communicate()[0] == "done\n"
 
 
-def test_a_thread_does_not_wait_for_itself(tmp_path: Path) -> None:
-    with project_lock(tmp_path), pytest.raises(RuntimeError), project_lock(tmp_path):
-        pass
-
-
 def test_another_thread_waits(tmp_path: Path) -> None:
     order: list[str] = []
 

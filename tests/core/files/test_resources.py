@@ -11,7 +11,6 @@ import pytest
 from coursebuild.core.files import resources
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run import versions
-from support.run_code import run_code
 
 
 @pytest.mark.parametrize("ask", [resources.assets_dir, resources.templates_dir])
@@ -67,16 +66,3 @@ def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", ["/nowhere"])
     with pytest.raises(EffectError, match="MuJoCo is not installed"):
         versions.engine_version()
-
-
-@pytest.mark.site
-def test_importing_files_and_runners_loads_nothing_heavy() -> None:
-    code = (
-        "import sys\n"
-        "from coursebuild.core.files import examples, read, resources, write\n"
-        "from coursebuild.core.run import mjcf, runner, v8, versions\n"
-        "versions.engine_version()\n"
-        "print(sorted({'mujoco', 'numpy', 'py_mini_racer'} & set(sys.modules)))\n"
-    )
-    done = run_code(code)
-    assert done.stdout == "[]\n", done.stderr

@@ -136,16 +136,12 @@ def test_script_that_cannot_be_started_says_why(
 
 PROBE = """
 import json, os, sys, time
-print(json.dumps({
-    "argv": sys.argv, "path": sys.path[0], "cwd": os.getcwd(), "env": dict(os.environ),
-    "encoding": sys.stdout.encoding, "zone": time.tzname[0], "stdin": sys.stdin.read(),
-    "hash": hash("a"), "safe": sys.flags.safe_path, "session": os.getsid(0) == os.getpid(),
-    "tty": [os.isatty(i) for i in range(3)], "tmp": os.listdir(os.environ["TMPDIR"]),
-    "warn": sys.warnoptions, "open": sorted(os.listdir("/proc/self/fd")),
-}))
+open_ = sorted(os.listdir("/proc/self/fd"))
+print(json.dumps([dict(os.environ), sys.argv, time.tzname[0], hash("a"), sys.warnoptions, open_]))
 try: open("/dev/tty")
 except OSError: print("no terminal")
 """
+"""What else it finds is held against what a bare Python finds: see `test_forked_scripts`."""
 OUTER = {
     "PYTHONPATH": "/outer",
     "PYTHONSTARTUP": "/outer",
@@ -166,7 +162,7 @@ OUTER = {
 
 @both_ways
 def test_script_finds_the_course_and_nothing_of_who_runs_it(
-    run: Run, root: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in OUTER.items():
         monkeypatch.setenv(name, value)
@@ -174,28 +170,14 @@ def test_script_finds_the_course_and_nothing_of_who_runs_it(
     for end in pipe:
         os.set_inheritable(end, True)
     found = run(PROBE, args=["a b", "", "*", "é"])
-    again = json.loads(run(PROBE).stdout.splitlines()[0])
+    again = json.loads(run(PROBE).stdout.splitlines()[0])[3]
     for end in pipe:
         os.close(end)
     assert found.outcome is Outcome.OK, found.stderr
     seen, terminal = found.stdout.splitlines()
-    seen = json.loads(seen)
-    environment = seen.pop("env")
-    assert seen == {
-        "argv": ["examples/x.py", "a b", "", "*", "é"],
-        "path": str(root / "examples"),
-        "cwd": str(root),
-        "encoding": "utf-8",
-        "zone": "UTC",
-        "stdin": "",
-        "hash": again["hash"],
-        "safe": False,
-        "session": True,
-        "tty": [False] * 3,
-        "tmp": [],
-        "warn": [],
-        "open": ["0", "1", "2", "3"],  # 3 is the listing itself
-    }
+    environment, *others = json.loads(seen)
+    arguments = ["examples/x.py", "a b", "", "*", "é"]
+    assert others == [arguments, "UTC", again, [], ["0", "1", "2", "3"]]  # 3 is the listing itself
     assert terminal == "no terminal"
     assert not {"SECRET_TOKEN", "DISPLAY", "COLUMNS", "LC_NUMERIC"} & environment.keys()
     assert environment["MUJOCO_GL"] == "egl"
