@@ -140,17 +140,6 @@ def test_pages_without_a_document_as_markdown(files: dict[str, bytes]) -> None:
     assert "not written yet" in files["lessons/1.2-later.md"].decode()
 
 
-def test_llms_txt_lists_what_is_written(files: dict[str, bytes]) -> None:
-    text = files["llms.txt"].decode()
-    assert text.startswith('# Bodies & \\<axes>\n\n> A "short" course.\n\n')
-    assert (
-        "## Level 0: Start\n\n"
-        "- [0.1 Falling](https://example.org/course/lessons/0.1-falling.md): A body falls.\n"
-        in text
-    )
-    assert "1.2" not in text and "## Optional\n" in text
-
-
 # ----------------------------------------------------------------------------------- notebooks
 
 

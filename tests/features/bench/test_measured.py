@@ -140,16 +140,7 @@ def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     assert "coursebuild diet box --record" in told
 
 
-def test_what_was_not_measured_is_said_to_be_so(make: Make) -> None:
-    found = pages(make, Reports())
-    told = text(found["models/box.html"])
-    assert "Pairs of geoms that may touch not measured" in told
-    assert "The MJCF file 46 B Speed natively not measured" in told
-    assert "Speed in WebAssembly not measured" in told
-    first = "Not measured. This measures it: coursebuild"
-    assert f"Speed against error {first} bench box --record" in told
-    assert f"Scene diet {first} diet box --record" in told
-    assert "numerics/index.html" not in found and "numerics" not in found["index.html"]
+def test_what_was_measured_in_part(make: Make) -> None:
     half = pages(make, Reports({"box": box(None)}, {"box": diet()}))["models/box.html"]
     assert "Pairs of geoms that may touch not measured" in text(half)
     assert "Speed natively 100 × real time Speed in WebAssembly not measured" in text(half)

@@ -81,13 +81,6 @@ def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(built: Bui
     assert [lab["name"] for lab in only["labs"]] == ["1.3-lab-1"]
 
 
-def test_a_model_that_does_not_compile_is_told_once(tmp_path: Path, stores: Path) -> None:
-    folder = course(tmp_path / "course", stores, "## A\n\n" + fence('{"model": "ball"}'))
-    folder.write("models/ball.xml", "<mujoco><nonsense/></mujoco>")
-    report = checked(folder, status=1)
-    assert [d["rule"] for d in report["diagnostics"]] == ["model-error"]
-
-
 def test_a_page_shows_what_the_trial_recorded(built: Built) -> None:
     text = built.page("1.2")
     assert text.count('<svg class="lab-plot"') == 1

@@ -62,14 +62,6 @@ def test_a_course_without_questions_has_no_review(make: Make) -> None:
     assert "review" not in foot
 
 
-def test_what_is_kept_and_where_is_said_without_a_script(found: dict[str, str]) -> None:
-    html = found["progress/index.html"]
-    key = re.search(r'data-course="([^"]*)"', html)
-    assert key is not None
-    assert f"<code>coursebuild.progress.{key[1]}</code>" in html
-    assert "<noscript>" in html
-
-
 def test_each_page_carries_the_words_that_it_shows(found: dict[str, str]) -> None:
     words = {path: set(re.findall(r'data-key="([^"]+)"', html)) for path, html in found.items()}
 
