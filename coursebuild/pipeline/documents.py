@@ -19,7 +19,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course, Declarations, Document
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
-from coursebuild.core.text.source import Source
+from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import course_fingerprint
 from coursebuild.pipeline.load import Parser
@@ -64,7 +64,7 @@ class Documents(Parser):
         self._jobs = jobs
         self._texts: dict[str, SourceText] = {}
         self._summaries: dict[str, DocumentSummary] = {}
-        self._fingerprint: tuple[Course, str | None] | None = None
+        self._fingerprints: tuple[Course, str | None, str | None] | None = None
         self._readers: dict[str, int] = {}
         """Which copy has read a text, by its path."""
         self._reader = PageReader(store)
@@ -96,12 +96,20 @@ class Documents(Parser):
         found = (imported for summary in self._summaries.values() for imported in summary.imports)
         return {path: frozenset(modules) for path, modules in found}
 
-    def fingerprint(self, course: Course) -> str | None:
-        """That of a course whose documents these are; `None` for any other."""
-        if self._fingerprint is None or self._fingerprint[0] is not course:
-            known = ((s.document, s.fingerprint) for s in self._summaries.values())
-            self._fingerprint = course, course_fingerprint(course, known)
-        return self._fingerprint[1]
+    def fingerprint(self, course: Course, *, notes: bool = True) -> str | None:
+        """That of a course whose documents these are; `None` for any other.
+
+        `notes`: with what features note of its documents, which few pages show.
+        """
+        if self._fingerprints is None or self._fingerprints[0] is not course:
+            summaries = self._summaries
+            bare = course_fingerprint(
+                course, ((s.document, s.fingerprint) for s in summaries.values())
+            )
+            own = (summaries[d.source.path].notes_fingerprint for d in course.documents)
+            self._fingerprints = course, bare, None if bare is None else key_of(bare, *own)
+        _, bare, whole = self._fingerprints
+        return whole if notes else bare
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
         """What `check_course` finds; nothing where it found nothing in one of this fingerprint."""
@@ -141,7 +149,7 @@ class Documents(Parser):
     def _take(self, text: SourceText, summary: DocumentSummary | None) -> None:
         assert summary is not None, "what was just encoded can be decoded"
         self._texts[text.source.path] = text
-        self._summaries[text.source.path] = summary
+        self._summaries[text.source.path] = summary.noted()
 
     def document(
         self, source: Source, callouts: frozenset[str], *, lesson: bool

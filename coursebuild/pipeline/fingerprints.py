@@ -1,6 +1,7 @@
 """What of a document, a course or its results can be seen from elsewhere, without its places.
 
-Entry points: `document_fingerprint`, `course_fingerprint`, `results_fingerprint`; each is a hash.
+Entry points: `document_fingerprint` and `notes_fingerprint`, `course_fingerprint`,
+`results_fingerprint`; each is a hash.
 
 A sentence that is added moves all that follows it, and nothing else in the course: no page but the
 document's own shows where in its file something stands. So a value is hashed with its spans left
@@ -10,9 +11,10 @@ for other pages is that of before, and where nothing was found wrong nothing is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import tool_digest
@@ -39,10 +41,14 @@ _SHOWN: dict[type, Callable[[Any], object]] = {
 
 
 def document_fingerprint(document: Document) -> str:
-    """That of a document, by its summary."""
-    raw, known = tuple(_raw(document)), (document.equations, document.summaries)
-    parts = (document.blocks, document.footnotes, known, raw)
-    return fingerprint(parts, _SHOWN)
+    """That of a document, by its summary; without what features note of it."""
+    raw = tuple(_raw(document))
+    return fingerprint((document.blocks, document.footnotes, document.equations, raw), _SHOWN)
+
+
+def notes_fingerprint(notes: Mapping[str, Struct]) -> str:
+    """That of what features note of a document (`Feature.summary`)."""
+    return fingerprint(dict(notes), _SHOWN)
 
 
 def _raw(document: Document) -> Iterator[str]:

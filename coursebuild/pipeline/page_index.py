@@ -4,7 +4,7 @@ Entry point: `PageIndex`, of `SitePage`s.
 
 A page is the one of before where its key is, a hash of its inputs, of its document's text and of
 the tool. Inputs are made of the course as it looks to others, of what running it found, and of the
-page's own document: where all three are those of before the key is known without making them.
+page's own document: where this origin is that of before the key is known without making them.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
@@ -28,8 +29,8 @@ class SitePage(Struct, frozen=True, array_like=True):
 
     entry: PageEntry
     key: str
-    text_key: str
-    """That of its document's text; empty where it has none."""
+    origin: str
+    """A hash of all that its inputs are made of, and of its text; empty where that is not known."""
     indexed: bool
     """Whether search engines should list it."""
     notes: tuple[tuple[str, NotedPage], ...]
@@ -46,7 +47,7 @@ class SitePage(Struct, frozen=True, array_like=True):
     """Whether it has the anchors that it leads to itself."""
 
     @classmethod
-    def of(cls, entry: PageEntry, key: str, text_key: str, record: PageRecord) -> SitePage:
+    def of(cls, entry: PageEntry, key: str, origin: str, record: PageRecord) -> SitePage:
         """A page whose record is there."""
         head = record.head
         away = [(path, anchor) for path, anchor in record.references if path != entry.path]
@@ -55,7 +56,7 @@ class SitePage(Struct, frozen=True, array_like=True):
         return cls(
             entry,
             key,
-            text_key,
+            origin,
             head.indexed,
             tuple(
                 (name, NotedPage(head.path, head.kind, entry.id, head.title, digest))
@@ -70,35 +71,29 @@ class SitePage(Struct, frozen=True, array_like=True):
         )
 
 
-class _Kept(Struct, frozen=True, array_like=True):
-    around: str | None
-    pages: tuple[SitePage, ...]
-
-
 class PageIndex:
     """The pages of the last build."""
 
-    def __init__(self, store: Memo, around: str | None) -> None:
-        """`around`: a hash of all that inputs are made of besides documents, where it is known."""
+    def __init__(self, store: Memo) -> None:
         self._store = store
-        self._around = around
         self._name = step_key("index of pages")
-        self._kept = store.get_value(_KIND, self._name, _Kept) or _Kept(None, ())
-        self._pages = {page.entry.path: page for page in self._kept.pages}
+        self._kept = store.get_value(_KIND, self._name, tuple[SitePage, ...]) or ()
+        self._pages = {page.entry.path: page for page in self._kept}
 
-    def key(self, path: str, text_key: str) -> str | None:
+    def key(self, path: str, origin: str) -> str | None:
         """The key of the page at a site path, where it is known without its inputs."""
         page = self._pages.get(path)
-        same = self._around is not None and self._around == self._kept.around
-        return page.key if page is not None and same and page.text_key == text_key else None
+        return page.key if page is not None and origin and page.origin == origin else None
 
-    def page(self, entry: PageEntry, key: str) -> SitePage | None:
-        """What is known of the page that has this key."""
+    def page(self, entry: PageEntry, key: str, origin: str) -> SitePage | None:
+        """What is known of the page that has this key, with its origin now."""
         page = self._pages.get(entry.path)
-        return page if page is not None and page.key == key and page.entry == entry else None
+        if page is None or page.key != key or page.entry != entry:
+            return None
+        return page if page.origin == origin else replace(page, origin=origin)
 
     def save(self, pages: Iterable[SitePage]) -> None:
         """Keep what is known of all pages of this build for the next one."""
-        now = _Kept(self._around, tuple(pages))
+        now = tuple(pages)
         if now != self._kept:
             self._store.put_value(_KIND, self._name, now)

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import functools
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
@@ -57,7 +57,7 @@ class Pages:
         self._last_good = last_good or {}
         self._latest: tuple[str, DrawnPage] | None = None
         """The page that was asked for last: several files are made of it."""
-        index = PageIndex(store, self._around())
+        index = PageIndex(store)
         self._pages = self._made(page_list(library) if entries is None else entries, index)
         if entries is None:
             index.save(self._pages.values())
@@ -134,12 +134,19 @@ class Pages:
 
     # --- keys
 
-    def _around(self) -> str | None:
-        """A hash of all that inputs are made of, but for documents; `None` where it has none."""
-        course = self._documents.fingerprint(self._library.course)
-        if course is None:
-            return None
-        return key_of(course, results_fingerprint(self._library.results, self._library.reports))
+    def _origins(self) -> Callable[[PageEntry, str], str]:
+        """Gives a hash of all that a page is made of, by the key of its text; empty without one."""
+        library = self._library
+        results = results_fingerprint(library.results, library.reports)
+        bare, noted = (
+            self._documents.fingerprint(library.course, notes=notes) for notes in (False, True)
+        )
+
+        def origin(entry: PageEntry, text_key: str) -> str:
+            course = noted if entry.may_show_notes(library) else bare
+            return "" if course is None else key_of(course, results, text_key)
+
+        return origin
 
     # --- drawing
 
@@ -147,40 +154,41 @@ class Pages:
         """The pages by site path, in order; they are drawn where they are not kept."""
         found: dict[str, SitePage | None] = {}
         asked: deque[tuple[PageEntry, str, str]] = deque()
+        origin_of = self._origins()
 
         def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
             for entry in entries:
                 path, text = entry.path, text_of(entry, self._library)
-                text_key = "" if text is None else text.key
+                origin = origin_of(entry, "" if text is None else text.key)
                 stays = path in self._last_good
-                key = self._last_good[path] if stays else index.key(path, text_key)
+                key = self._last_good[path] if stays else index.key(path, origin)
                 request = None
                 if key is None:
                     request = page_request(entry, self._library, text)
                     key = request.key
-                page = index.page(entry, key) or self._kept(entry, key, text_key)
+                page = index.page(entry, key, origin) or self._kept(entry, key, origin)
                 if page is not None:
                     found[path] = page
                 elif not stays:  # else what it was is gone
                     found[path] = None
-                    asked.append((entry, key, text_key))
+                    asked.append((entry, key, origin))
                     yield request or page_request(entry, self._library, text)
 
         drawn: list[str] = []
         for data in self._documents.draw(missing()):
-            entry, key, text_key = asked.popleft()
+            entry, key, origin = asked.popleft()
             record = decode(data, PageRecord)
             assert record is not None
-            found[entry.path] = SitePage.of(entry, key, text_key, record)
+            found[entry.path] = SitePage.of(entry, key, origin, record)
             drawn.append(entry.path)
         self.drawn = tuple(drawn)
         """Site paths of the pages that were drawn just now."""
         return {path: page for path, page in found.items() if page is not None}
 
-    def _kept(self, entry: PageEntry, key: str, text_key: str) -> SitePage | None:
+    def _kept(self, entry: PageEntry, key: str, origin: str) -> SitePage | None:
         """A page that was drawn before the last build."""
         kept = self._store.get(PAGES, key, lambda data: decode(data, DrawnPage))
-        return None if kept is None else SitePage.of(entry, key, text_key, kept.record)
+        return None if kept is None else SitePage.of(entry, key, origin, kept.record)
 
     def _drawn(self, path: str) -> DrawnPage:
         """What was drawn of a page."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -23,6 +23,7 @@ from coursebuild.core.checks.formulas import document_formulas, formula_findings
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.engine.tool import step_key, typesetter_digest
+from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Document, Script, document_blocks
 from coursebuild.core.model.results import Formula, MathError
@@ -39,7 +40,7 @@ from coursebuild.core.registry import summarize
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
-from coursebuild.pipeline.fingerprints import document_fingerprint
+from coursebuild.pipeline.fingerprints import document_fingerprint, notes_fingerprint
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
@@ -75,15 +76,44 @@ class DocumentSummary(Struct, frozen=True):
     """A parsed text: what others than its own page look at, and what is wrong in it."""
 
     document: Document
-    """Without its prose; see `model.summary`."""
+    """Without its prose; see `model.summary`. What features note of it is in `notes`."""
     diagnostics: tuple[Diagnostic, ...]
     """Those of formulas among them."""
     imports: tuple[tuple[str, tuple[str, ...]], ...]
     """Paths of scripts, each with the modules that it imports."""
     lasting: bool
     """Whether the same text gives the same again."""
-    fingerprint: str = ""
+    fingerprint: str
     """Of what others than its own page can see of it; see `pipeline.fingerprints`."""
+    notes: dict[str, bytes]
+    """What features note of it (`Feature.summary`), by their names: each as `encode` gives it."""
+    notes_fingerprint: str
+
+    def noted(self) -> DocumentSummary:
+        """With a document that has its notes."""
+        notes = _Notes(self.notes, self.document.source)
+        return replace(self, document=replace(self.document, summaries=notes))
+
+
+class _Notes(Mapping[str, Struct]):
+    """What features note of a document, decoded when it is asked for: after an edit few are."""
+
+    def __init__(self, packed: Mapping[str, bytes], source: Source) -> None:
+        self._packed = packed
+        self._source = source
+
+    def __getitem__(self, feature: str) -> Struct:
+        found = decode(self._packed[feature], Struct, self._source)
+        if found is None:
+            help = "remove the folder `.coursebuild`"
+            raise EffectError(f"what is kept of {self._source.path} is damaged", help=help)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._packed)
+
+    def __len__(self) -> int:
+        return len(self._packed)
 
 
 class PageRequest(Struct, frozen=True):
@@ -190,13 +220,21 @@ class PageReader:
             known = summarize(whole.document, mathml)
             equations = equations_of(whole.document, mathml)
             bare = without_prose(whole.document)
-            bare = replace(bare, equations=equations, summaries=known.value)
+            bare = replace(bare, equations=equations, summaries={})
             wrong = (*whole.diagnostics, *found, *known.diagnostics)
             scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
             imports = tuple((s.path, tuple(sorted(imported(s.code.text)))) for s in scripts)
             lasting = not found  # that a formula took too long may not happen again
-            fingerprint = document_fingerprint(bare)
-            data = encode(DocumentSummary(bare, wrong, imports, lasting, fingerprint))
+            summary = DocumentSummary(
+                bare,
+                wrong,
+                imports,
+                lasting,
+                document_fingerprint(bare),
+                {feature: encode(note) for feature, note in known.value.items()},
+                notes_fingerprint(known.value),
+            )
+            data = encode(summary)
             if lasting:
                 self._store.put(SUMMARIES, text.key, data)
             self._keep(text, whole)

@@ -13,11 +13,11 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 from coursebuild.core.features import PageKind
-from coursebuild.core.model import Document
+from coursebuild.core.model import Document, FeatureBlock, document_blocks
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead, PageInputs
-from coursebuild.core.registry import page_kind
+from coursebuild.core.registry import kind_of_block, page_kind
 
 
 class PageEntry(Struct, frozen=True):
@@ -35,6 +35,15 @@ class PageEntry(Struct, frozen=True):
         """What it shows; summaries of documents are enough."""
         kind = page_kind(self.kind)
         return _course_inputs(self, library) if kind is None else _added_inputs(kind, library)
+
+    def may_show_notes(self, library: Library) -> bool:
+        """Whether its inputs may be made of what features note of documents (`Feature.summary`)."""
+        if self.kind not in ("level", "lesson", "page", "notfound"):
+            return True
+        document = self.document(library)
+        blocks = () if document is None else document_blocks(document)
+        ours = (block for block in blocks if isinstance(block, FeatureBlock))
+        return any(kind_of_block(block).values is not None for block in ours)
 
     def document(self, library: Library) -> Document | None:
         """The document that it shows, if any."""
