@@ -74,10 +74,7 @@ def find_course(directory: str | None) -> Path:
         start = Path.cwd()
     except OSError:
         raise UsageError("the working directory is not there any more") from None
-    try:
-        root = find_root(None if directory is None else Path(directory), start)
-    except EffectError as error:
-        raise UsageError(error.message, help=error.help) from None
+    root = find_root(None if directory is None else Path(directory), start)
     check_path(root)
     undo_changes(root)
     return root

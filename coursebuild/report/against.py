@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from msgspec import Struct
 
 from coursebuild.core.model.results import Change, DriftKind
+from coursebuild.core.scripts.diff import shortened
 from coursebuild.core.scripts.findings import closeness
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.report.terminal import (
@@ -160,8 +161,7 @@ def _change(change: Change, who: str) -> str:
 
 
 def _shown(text: str) -> str:
-    first = text.strip().split("\n")[0]
-    return first if len(first) <= _WIDTH else first[: _WIDTH - 1] + "…"
+    return shortened(text.strip().split("\n")[0], _WIDTH)
 
 
 def _sum(report: AgainstReport, lost: int) -> str:

@@ -27,7 +27,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 
@@ -277,12 +277,6 @@ def _short(name: str) -> str:
 # --- the limit
 
 
-class _File(NamedTuple):
-    used: float
-    path: str
-    size: int
-
-
 def prune(folder: Path, limit: int) -> None:
     """Remove entries until the rest takes at most `limit` bytes: those first that were used first.
 
@@ -292,18 +286,21 @@ def prune(folder: Path, limit: int) -> None:
     with os.scandir(folder) as found:
         kinds = [kind.path for kind in found if kind.is_dir(follow_symlinks=False)]
     files = sorted(file for kind in kinds for file in _entries(kind, time.time() - _USED))
-    total = sum(file.size for file in files)
+    total = sum(size for _, _, size in files)
     enough = limit if total <= limit else limit * _ROOM
-    for file in files:
+    for _, path, size in files:
         if total <= enough:
             break
-        total -= file.size
+        total -= size
         with contextlib.suppress(OSError):
-            os.unlink(file.path)  # noqa: PTH108 - ten thousand of them
+            os.unlink(path)  # noqa: PTH108 - ten thousand of them
 
 
-def _entries(folder: str, long_ago: float) -> Iterator[_File]:
-    """The entries in a folder; what a writer that was killed `long_ago` left there goes."""
+def _entries(folder: str, long_ago: float) -> Iterator[tuple[float, str, int]]:
+    """The entries in a folder: when each was used last, its path and its size.
+
+    What a writer that was killed `long_ago` left there goes.
+    """
     with contextlib.suppress(OSError), os.scandir(folder) as found:
         for entry in found:
             if entry.is_dir(follow_symlinks=False) and HASH.fullmatch(entry.name):
@@ -313,6 +310,6 @@ def _entries(folder: str, long_ago: float) -> Iterator[_File]:
             elif entry.is_file(follow_symlinks=False):
                 status = entry.stat(follow_symlinks=False)
                 if HASH.fullmatch(entry.name):
-                    yield _File(status.st_mtime, entry.path, status.st_size)
+                    yield status.st_mtime, entry.path, status.st_size
                 elif entry.name.startswith(TEMPORARY) and status.st_mtime < long_ago:
                     os.unlink(entry.path)  # noqa: PTH108

@@ -23,7 +23,7 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.core.files.course_root import MAP, find_course_root, is_dropping
-from coursebuild.core.files.errors import EffectError, OutsideProjectError, reason
+from coursebuild.core.files.errors import EffectError, OutsideProjectError, UsageError, reason
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.source import Source
@@ -57,19 +57,19 @@ def find_root(chosen: Path | None, start: Path) -> Path:
     """The course folder: the chosen one, or the nearest from `start` upwards that has a course map.
 
     Raises:
-        EffectError: the chosen one is no folder, or there is no course here.
+        UsageError: the chosen one is no folder, or there is no course here.
     """
     if chosen is not None:
         folder = start / chosen
         if not folder.is_dir():
-            raise EffectError(
+            raise UsageError(
                 f"{chosen} is not a folder" if folder.exists() else f"there is no folder {chosen}"
             )
         return folder.resolve()
     found = find_course_root(str(start))
     if found is not None:
         return Path(found)
-    raise EffectError(
+    raise UsageError(
         f"there is no {MAP} in this folder or one above it",
         help="go to a course, or name one with `-C DIR`",
     )

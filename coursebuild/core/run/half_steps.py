@@ -27,17 +27,17 @@ _OWN = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
 
 def install(mujoco: ModuleType, numpy: ModuleType) -> None:
     """Halve the steps of this process from now on."""
-    _HalfSteps(mujoco, numpy).install()
+    _HalfSteps(mujoco, numpy)
 
 
 class _HalfSteps:
+    """Is in the place of MuJoCo's functions once it is made."""
+
     def __init__(self, mujoco: Any, numpy: Any) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
         self._step, self._forward = mujoco.mj_step, mujoco.mj_forward
         self._lock = threading.RLock()  # threads may share a model
-
-    def install(self) -> None:
         self._replace("mj_step", self._whole)
         self._replace("mj_step1", lambda real, model, data: real(model, data))
         self._replace("mj_step2", self._second)

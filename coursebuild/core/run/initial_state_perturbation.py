@@ -63,7 +63,6 @@ def install(mujoco: ModuleType, numpy: ModuleType, run: int) -> None:
     """Move the initial states of this process from now on; the run's number counts from 1."""
     global _perturbation
     _perturbation = _Perturbation(mujoco, numpy, run)
-    _perturbation.install()
 
 
 def last_look(data: Any) -> None:
@@ -76,6 +75,8 @@ _perturbation: _Perturbation | None = None
 
 
 class _Perturbation:
+    """Is told of what MuJoCo computes once it is made."""
+
     def __init__(self, mujoco: Any, numpy: Any, run: int) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
@@ -85,9 +86,7 @@ class _Perturbation:
         self._plans: dict[int, tuple[Any, _Plan]] = {}
         self._count = 0
         self._numbers = 0
-
-    def install(self) -> None:
-        wrap, mujoco = mujoco_tracing.wrap_functions, self._mujoco
+        wrap = mujoco_tracing.wrap_functions
         wrap(mujoco, _COMPUTING, self._before, self._after)
         wrap(mujoco, _INTEGRATING, None, self._after)
         mujoco_tracing.replace_rollout(mujoco, self._rollout)

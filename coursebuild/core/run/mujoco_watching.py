@@ -51,7 +51,6 @@ def watch(mujoco: ModuleType) -> None:
     if "numpy" not in sys.modules or not all(hasattr(mujoco, name) for name in _NEEDED):
         return
     _watch = _Watch(mujoco)
-    _watch.install()
 
 
 def finish() -> None:
@@ -65,13 +64,14 @@ _watch: _Watch | None = None
 
 
 class _Watch:
+    """Hears of warnings, and of data that is made and reset, once it is made."""
+
     def __init__(self, mujoco: ModuleType) -> None:
         self._mujoco = mujoco
         self._numpy = sys.modules["numpy"]
         types = mujoco.mjtGeom
         self._flat = [int(types.mjGEOM_PLANE), int(types.mjGEOM_HFIELD)]
         """The types of geoms that have no inside to be deep in."""
-        self._warnings = Warnings(mujoco, self._heard)
         self._held: dict[int, Any] = {}
         self._enough = 2
         """How many are held before some are let go."""
@@ -79,18 +79,16 @@ class _Watch:
         self._looks = 0
         self._warned: set[str] = set()
         self._told: set[tuple[int, str]] = set()
-
-    def install(self) -> None:
-        """Hear of warnings, and of data that is made and reset."""
-        data, wrap = self._mujoco.MjData, mujoco_tracing.wrap_method
+        data, wrap = mujoco.MjData, mujoco_tracing.wrap_method
         for name in ("__init__", "__setstate__"):
             wrap(data, name, None, self._made_self)
         for name in ("__copy__", "__deepcopy__"):
             wrap(data, name, None, lambda args, keywords, made: self._made(made))
-        spec = getattr(self._mujoco, "MjSpec", None)  # there was none before MuJoCo 3.2
+        spec = getattr(mujoco, "MjSpec", None)  # there was none before MuJoCo 3.2
         wrap(spec, "recompile", None, lambda args, keywords, made: self._made(made[1]))
         resets = ("mj_resetData", "mj_resetDataKeyframe", "mj_resetDataDebug")
-        mujoco_tracing.wrap_functions(self._mujoco, resets, self._reset)
+        mujoco_tracing.wrap_functions(mujoco, resets, self._reset)
+        self._warnings = Warnings(mujoco, self._heard)  # which the library calls as long as it is
         self._warnings.install()
 
     def finish(self) -> None:

@@ -134,8 +134,8 @@ class ScriptServer:
         """
         if not jobs:
             return ()
-        work = _Work(root.resolve(), jobs, started, finished, place, self._sandbox)
-        with temporary_folder() as work.scratch:
+        with temporary_folder() as scratch:
+            work = _Work(root.resolve(), jobs, started, finished, place, self._sandbox, scratch)
             self._run(work, parallel, unwanted)
         return tuple(work.runs[i] for i in range(len(jobs)))
 
@@ -144,10 +144,6 @@ class ScriptServer:
     ) -> None:
         busy: dict[int, Worker] = {}
         """By the descriptors of their reports."""
-        if work.place is not None:  # `mjcourse` alone: what else is installed here is not for it
-            work.library = work.scratch
-            Path(work.scratch, "mjcourse").symlink_to(Path(library_folder(), "mjcourse"))
-        work.look_around()
         log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
@@ -216,6 +212,7 @@ class _Work:
         finished: Finished,
         place: OtherEnvironment | None,
         sandbox: Sandbox | None,
+        scratch: str,
     ) -> None:
         self.root = root
         self.jobs = jobs
@@ -226,11 +223,19 @@ class _Work:
         self.environment |= dict(jobs[0].environment)
         self.library = library_folder()
         self.place = place
+        self.scratch = scratch
+        if place is not None:  # `mjcourse` alone: what else is installed here is not for it
+            Path(scratch, "mjcourse").symlink_to(Path(self.library, "mjcourse"))
+            self.library = scratch
         self.sandbox = sandbox
         self.enclose: Enclose | None = None
         self.shown: dict[str, str] = {}
         self.copied: list[tuple[str, str]] = []
-        self.scratch = ""
+        if sandbox is not None:
+            self.shown = visible(str(root), self.library, place)
+            self.copied = copied_folders(str(root), jobs, scratch)
+            command = sandbox.command
+            self.enclose = functools.partial(command, shown=self.shown, copied=self.copied)
         self.runs: dict[int, ScriptRun] = {}
         self.waiting = list(range(len(jobs)))
         self.told: set[int] = set()
@@ -239,14 +244,6 @@ class _Work:
         files = [file for folder in folders for file in folder.rglob("*.py")]
         files += [self.root / job.path for job in jobs]
         self.packages = wanted_packages(files)
-
-    def look_around(self) -> None:
-        """Know what a sandbox is to show, now that there is a temporary folder."""
-        if self.sandbox is not None:
-            self.shown = visible(str(self.root), self.library, self.place)
-            self.copied = copied_folders(str(self.root), self.jobs, self.scratch)
-            command = self.sandbox.command
-            self.enclose = functools.partial(command, shown=self.shown, copied=self.copied)
 
     def next(self, worker: Worker) -> None:
         """Hand over the next job, if there is one."""

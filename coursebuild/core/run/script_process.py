@@ -82,8 +82,6 @@ class Preloaded:
         """Whether importing a package fails: then scripts have to fail on their own."""
         self._groups: dict[str, dict[str, ModuleType]] = {}
         """The modules that importing a package brings, without those of the standard library."""
-        self._package: dict[str, str] = {}
-        """Of a top-level module, the package whose import brings it."""
         self._tracer: Tracer | None = None
 
     def load(self, packages: Sequence[str]) -> None:
@@ -106,8 +104,6 @@ class Preloaded:
         new = {name: sys.modules[name] for name in names}
         needed = self._groups.get("numpy", {}) if package == "mujoco" else {}
         self._groups[package] = needed | new
-        for name in new:
-            self._package.setdefault(name.partition(".")[0], package)
         if package == "mujoco" and "mujoco" in sys.modules:
             mujoco_tracing.wrap(sys.modules["mujoco"])
             mujoco_watching.watch(sys.modules["mujoco"])
@@ -119,7 +115,11 @@ class Preloaded:
 
     def module(self, name: str) -> Any:
         """A module that was imported; `None` where there is no such."""
-        return next((g[name] for g in self._groups.values() if name in g), None)
+        return self._group(name).get(name)
+
+    def _group(self, name: str) -> dict[str, ModuleType]:
+        """All that was imported first with a module."""
+        return next((group for group in self._groups.values() if name in group), {})
 
     def offer(self, tracer: Tracer) -> None:
         """Hide the packages, and let this process have again what it imports from now on."""
@@ -159,7 +159,7 @@ class Preloaded:
     def exec_module(self, module: ModuleType) -> None:
         """Give the script all that importing the module brings."""
         module.__spec__ = self._spec
-        group = self._groups[self._package[module.__name__]]
+        group = self._group(module.__name__)
         sys.modules.update(group)
         for name in group:
             if "." not in name and group[name].__spec__ is not None and self._tracer is not None:

@@ -24,7 +24,7 @@ import time
 from collections.abc import Coroutine, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypedDict
+from typing import Any, NamedTuple, Self
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.resources import assets_dir
@@ -239,11 +239,6 @@ async def _end_tasks() -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-class _Failure(TypedDict):
-    message: str
-    position: int | None
-
-
 class MathEngine:
     """Typesets formulas; a context manager. May be used by several threads, one at a time."""
 
@@ -297,7 +292,7 @@ def _scripts() -> tuple[str, ...]:
     return tuple(path.read_text(encoding="utf-8") for path in paths)
 
 
-def _result(formula: Formula, reply: str | _Failure) -> str | MathError:
+def _result(formula: Formula, reply: str | dict[str, Any]) -> str | MathError:
     if isinstance(reply, str):
         return reply
     position = reply["position"]
