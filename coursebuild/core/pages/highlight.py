@@ -49,6 +49,9 @@ _CLASSES: tuple[tuple[_TokenType, str], ...] = (
 )
 """Kinds of token and their class, the special before the general."""
 _PYTHON = ("python", "py", "python3", "py3")
+_LONGEST = 20_000
+"""Characters of Python that tree-sitter reads. An absurd text, such as of backslashes alone, takes
+it time with the square of its length, and Pygments not; at this length that is a second."""
 _ALIASES = {"mjcf": "xml", "urdf": "xml"}
 _WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
 
@@ -67,7 +70,7 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
 
 
 def _runs(language: str, code: str) -> Iterable[Run]:
-    if language in _PYTHON:
+    if language in _PYTHON and len(code) <= _LONGEST:
         return python_runs(code)
     lexer = _lexer(_ALIASES.get(language, language))
     return [("", code)] if lexer is None else _lexed(lexer, code)

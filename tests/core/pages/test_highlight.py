@@ -27,6 +27,29 @@ def test_python_gets_classes_for_what_a_reader_looks_for() -> None:
     )
 
 
+def test_a_docstring_a_decorator_and_nested_fields_have_their_classes() -> None:
+    code = '"""Doc."""\n@cache\ndef f():\n    return f"{x!r:>{w}}"\n'
+    assert highlight("python", code) == (
+        '<span class="d">"""Doc."""</span>\n<span class="a">@cache</span>\n'
+        '<span class="k">def</span> <span class="f">f</span>():\n'
+        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>x'
+        '<span class="i">!r:</span><span class="s">&gt;</span><span class="i">{</span>w'
+        '<span class="i">}}</span><span class="s">"</span>\n'
+    )
+
+
+def test_python_that_does_not_parse_is_marked_as_far_as_it_can_be_read() -> None:
+    assert highlight("python", "def (:\n    x = 1  # ν\n") == (
+        '<span class="k">def</span> (:\n    x = <span class="n">1</span>'
+        '  <span class="c"># ν</span>\n'
+    )
+
+
+def test_a_very_long_script_is_marked_too() -> None:
+    for lines in (highlight_lines("python", "x = 1\n" * n) for n in (3000, 4000)):
+        assert {*lines[:-1]} == {'x = <span class="n">1</span>'}
+
+
 @pytest.mark.parametrize("language", ["", "no such language", "text", "jsön", "../x", "<b>"])
 def test_unknown_languages_are_plain_escaped_text(language: str) -> None:
     assert highlight(language, "a < b & c\n") == "a &lt; b &amp; c\n"
