@@ -45,10 +45,9 @@ def test_wheel_holds_packages_templates_and_scripts_and_nothing_beside_them(
     code = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in below(root / part)}
     templates = {f"coursebuild/templates/{path}" for path in below(root / "templates")}
     assert {name for name in names if name.startswith("coursebuild/templates/")} == templates
-    ends = (".py", "/py.typed")
-    there = {name for name in names if name.endswith(ends)}
+    ends, prefix = (".py", "/py.typed"), "coursebuild/assets/"
+    there = {name for name in names if name.endswith(ends) and prefix not in name}
     assert there == {name for name in code | templates if name.endswith(ends)}
-    prefix = "coursebuild/assets/"
     dist = root / "site" / "dist"
     assets = {name.removeprefix(prefix): archive.read(name) for name in names if prefix in name}
     bundled = below(dist) - {"stamp.json", "coursebuild.cdx.json"}
