@@ -13,7 +13,6 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.courses import FLAVORS, names_of, write_course  # noqa: E402
 from benchmarks.measure.building import make_site, remove  # noqa: E402
-from benchmarks.measure.report import BEGIN, END, put_into  # noqa: E402
 from benchmarks.measure.tools import Places, all_tools  # noqa: E402
 from support.scratch_course import Folder  # noqa: E402
 
@@ -95,25 +94,6 @@ def test_every_flavor_has_the_whole_lesson(tmp_path: Path, course: Path, flavor:
     if flavor != "coursebuild":
         assert "{out}" not in text
         assert "lesson:" not in text
-
-
-def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(FileExistsError, match="is not empty"):
-        write_course(tmp_path, 1)
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-
-
-def test_tables_are_put_between_the_markers(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text(f"before\n\n{BEGIN}\nold\n{END}\n\nafter\n")
-    put_into(page, "new")
-    put_into(page, "newer")
-    assert page.read_text() == f"before\n\n{BEGIN}\n\nnewer\n\n{END}\n\nafter\n"
-    page.write_text("no markers")
-    with pytest.raises(ValueError, match="does not have the markers"):
-        put_into(page, "new")
-    assert page.read_text() == "no markers"
 
 
 def test_a_cold_build_finds_nothing_but_the_results_of_scripts(tmp_path: Path) -> None:

@@ -53,6 +53,11 @@ def test_mul_is_the_plain_product() -> None:
     assert spatial.quat_mul([3, 0, 0, 0], [5e-324, 0, 1e300, 0]).tolist() == [1.5e-323, 0, 3e300, 0]
 
 
+def test_conj_turns_the_vector_part_and_makes_no_negative_zero() -> None:
+    assert spatial.quat_conj([1, 2, -3, 4]).tolist() == [1, -2, 3, -4]
+    assert not np.signbit(spatial.quat_conj([1, 0, 0, 0])).any()
+
+
 def test_rotate_to_six_ulp_at_any_length() -> None:
     vectors = ((1.0, 2.0, 3.0), (-1e-200, 1e-201, 0.0), (1e306, -1e306, 3e305), (0.0, 0.0, 7.0))
     errors = {}

@@ -143,6 +143,12 @@ def test_the_index_of_symbols(site: dict[str, str]) -> None:
     assert [item.split()[0] for item in symbols] == ["a", "I", "x", "z", "ρ"]
 
 
+def test_the_foot_has_both(site: dict[str, str]) -> None:
+    foot = site["glossary/index.html"].partition('class="site-more"')[2]
+    assert '<a href="index.html" aria-current="page">Glossary</a>' in foot
+    assert '<a href="../symbols/index.html">Symbols</a>' in foot
+
+
 # --- drawings
 
 

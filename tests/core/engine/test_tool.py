@@ -58,10 +58,6 @@ def test_it_depends_on_what_is_installed(tmp_path: Path, monkeypatch: pytest.Mon
         tool._installed.cache_clear()
 
 
-def test_typesetter_is_a_part_of_the_tool() -> None:
-    assert tool.tool_digest() != tool.typesetter_digest()
-
-
 def test_content_counts_and_times_do_not(tmp_path: Path) -> None:
     (tmp_path / "part" / "inner").mkdir(parents=True)
     module, other = tmp_path / "part" / "inner" / "a.py", tmp_path / "other.py"
@@ -76,8 +72,3 @@ def test_content_counts_and_times_do_not(tmp_path: Path) -> None:
     assert code_digest("part", "other.py", root=tmp_path) != both
     module.rename(tmp_path / "part" / "a.py")
     assert code_digest("part", root=tmp_path) != first
-
-
-def test_a_part_that_is_not_there_is_a_bug(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        code_digest("missing", root=tmp_path)

@@ -51,13 +51,6 @@ def test_bundle_and_templates_are_read_by_their_paths(
     assert len(bundle) == 3
 
 
-def test_versions() -> None:
-    assert versions.python_version() == ".".join(map(str, sys.version_info[:3]))
-    import mujoco
-
-    assert versions.engine_version() == mujoco.__version__
-
-
 def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
     def none(name: str) -> str:
         raise importlib.metadata.PackageNotFoundError(name)
