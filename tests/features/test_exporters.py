@@ -150,3 +150,19 @@ def test_full_disk_leaves_what_was_there(course: Folder, monkeypatch: pytest.Mon
     assert done.status == 1 and "cannot be written: no space left on device" in done.err
     assert course.read("course-scorm.zip") == once
     assert not [name for name in course.beside() if name.startswith(".course-scorm.zip")]
+
+
+@pytest.mark.engine
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "name"), [("qti", "quizzes-qti.zip"), ("scorm", "course-scorm.zip")]
+)
+def test_same_course_gives_the_same_package(
+    kind: str, name: str, request: pytest.FixtureRequest
+) -> None:
+    folder = request.getfixturevalue(kind).folder
+    once = folder.read(name)
+    for options in ((), ("--no-cache", "--jobs", "1")):
+        done = folder.main("export", kind, *options, "--out", "sub/other.zip")
+        assert done.status == 0, done.out + done.err
+        assert folder.read("sub/other.zip") == once, options

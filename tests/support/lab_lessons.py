@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from support.scratch_course import GOOD, Folder
-
-Make = Callable[..., Folder]
 
 BALL = """<mujoco><worldbody><body name="ball" pos="0 0 1"><freejoint/><geom size="0.1" mass="1"/>
 <site name="tip" pos="0.1 0 0"/></body></worldbody>

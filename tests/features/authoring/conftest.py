@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from support.scratch_course import Folder
+from support.scratch_course import Folder, Make
 
 
 @pytest.fixture
-def make(tmp_path: Path, stores: Path) -> Callable[..., Folder]:
+def make(tmp_path: Path, stores: Path) -> Make:
     """Makes a course of these lessons, in a folder with no simple name."""
 
     def make(*lessons: str | bytes) -> Folder:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 
 from support.formatting import check_formatting, formatted
 from support.random_lessons import markdown
-from support.scratch_course import Done, Folder
+from support.scratch_course import Done, Make
 
 ROOT = Path(__file__).parents[3]
 MAP = "content/course.toml"
@@ -122,7 +121,7 @@ def test_lines_of_the_course_stay() -> None:
 
 
 def test_command_formats_the_course_by_the_width_of_its_map(
-    make: Callable[..., Folder],
+    make: Make,
 ) -> None:
     course = make("## A\none two three four\n", "## B\n\ntext\n")
     course.write(MAP, course.text(MAP) + "\n[format]\nwidth = 10\n")
@@ -136,7 +135,7 @@ def test_command_formats_the_course_by_the_width_of_its_map(
     assert course.main("fmt", "--check") == Done(0, "", "")
 
 
-def test_command_leaves_what_it_cannot_read(make: Callable[..., Folder]) -> None:
+def test_command_leaves_what_it_cannot_read(make: Make) -> None:
     course = make('## A\n\n```quiz\n{ "id": "x"\n```\n', b"## B\ncaf\xe9\n", "## C\ntext\n")
     before = course.tree()
     done = course.main("fmt")

@@ -6,14 +6,13 @@ import os
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable
 
 import pytest
 
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.course_map import with_lesson
-from support.scratch_course import FIRST, ROOT, SECOND, Done, Folder
+from support.scratch_course import FIRST, ROOT, SECOND, Done, Make
 
 pytestmark = pytest.mark.site
 
@@ -62,7 +61,7 @@ def test_entry_is_put_where_it_belongs_and_all_else_stays() -> None:
             assert with_lesson(course, "1.4", "new", "New") == after.replace("\n", end), case
 
 
-def test_new_lesson_is_checked_and_built_as_it_is(make: Callable[..., Folder]) -> None:
+def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
     folder = make(FIRST, SECOND)
     for arguments, path in (
         (("1.10", 'Über "alles" \\ 50 %'), "content/lessons/1.10-uber-alles-50.md"),
@@ -96,7 +95,7 @@ REFUSED = [
 ]
 
 
-def test_what_cannot_be_added_changes_nothing(make: Callable[..., Folder]) -> None:
+def test_what_cannot_be_added_changes_nothing(make: Make) -> None:
     folder = make(FIRST)
     folder.write("content/lessons/1.7-there.md", "## There\n")
     folder.write("models/there.xml", "<mujoco/>")
@@ -123,14 +122,14 @@ def test_what_cannot_be_added_changes_nothing(make: Callable[..., Folder]) -> No
         assert (done.status, message in done.err, folder.text(MAP)) == (2, True, text)
 
 
-def test_new_model_compiles(make: Callable[..., Folder]) -> None:
+def test_new_model_compiles(make: Make) -> None:
     folder = make(FIRST + "\nThe [model](model:parts/falling-ball).\n")
     done = folder.main("new", "model", "parts/falling-ball")
     assert done == Done(0, "wrote models/parts/falling-ball.xml\n", "")
     assert folder.main("check").status == 0
 
 
-def test_new_template_is_the_one_of_the_tool_and_known_for_it(make: Callable[..., Folder]) -> None:
+def test_new_template_is_the_one_of_the_tool_and_known_for_it(make: Make) -> None:
     folder = make(FIRST)
     done = folder.main("new", "template", "blocks/code.html")
     assert done == Done(0, "wrote theme/templates/blocks/code.html\n", "")
@@ -142,7 +141,7 @@ def test_new_template_is_the_one_of_the_tool_and_known_for_it(make: Callable[...
     assert (done.status, "warning" in done.out) == (0, False), done.out
 
 
-def test_tests_of_new_features_pass_as_made(make: Callable[..., Folder]) -> None:
+def test_tests_of_new_features_pass_as_made(make: Make) -> None:
     folder = make(FIRST)
     for name, script in (("advice", ()), ("hint", ("--script",))):
         done = folder.main("new", "feature", name, *script)

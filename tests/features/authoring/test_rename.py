@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from support.scratch_course import FIRST, SECOND, Done, Folder, block
+from support.scratch_course import FIRST, SECOND, Done, Folder, Make, block
 
 pytestmark = pytest.mark.site
 
-Make = Callable[..., Folder]
 MAP = "content/course.toml"
 LINKS = """## Links
 

@@ -5,18 +5,15 @@ from __future__ import annotations
 import re
 import shutil
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from support.archives import told
 from support.built_sites import BuiltCourses
-from support.scratch_course import Folder
+from support.scratch_course import Folder, Make
 
 pytestmark = pytest.mark.site
-
-Make = Callable[..., Folder]
 
 
 def exported(folder: Folder, kind: str) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from urllib.parse import unquote
 
 import pytest
@@ -21,11 +20,10 @@ from support.hostile_html import HOSTILE, REFUSED
 from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
 from support.question_zoo import ANY, SCRIPT, SVG, quiz
-from support.scratch_course import GOOD, Done, Folder
+from support.scratch_course import GOOD, Done, Folder, Make
 
 pytestmark = pytest.mark.site
 
-Make = Callable[..., Folder]
 ZIP = "quizzes-qti.zip"
 SPACES = {"q": QTI, "m": MATHML}
 
@@ -259,12 +257,3 @@ def test_package_follows_edits_and_names_of_other_items_stay(make_course: Make) 
     assert files["files/lessons/sketch.svg"] == SVG.replace("4", "5").encode()
     [address] = shape(items(files)[-1], "//q:modalFeedback//q:a/@href")
     assert re.fullmatch(r"https://example\.org/c/lessons/1\.1-one\.html#a\.[0-9a-f]{8}", address)
-
-
-@pytest.mark.slow
-def test_same_course_gives_the_same_bytes(qti: Package) -> None:
-    once = qti.folder.read(ZIP)
-    export(qti.folder)
-    assert qti.folder.read(ZIP) == once, "from what is kept"
-    export(qti.folder, "--no-cache", "--jobs", "1", "--out", "sub/other.zip")
-    assert qti.folder.read("sub/other.zip") == once

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable
 from html.parser import HTMLParser
 from urllib.parse import unquote, urlsplit
 
@@ -15,11 +14,10 @@ from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.links import check_links
 from support.archives import Package, entries, mistakes, referred, scorm_schema
 from support.question_zoo import ANY, quiz
-from support.scratch_course import Folder
+from support.scratch_course import Folder, Make
 
 pytestmark = pytest.mark.engine
 
-Make = Callable[..., Folder]
 ZIP = "course-scorm.zip"
 CP = "{http://www.imsproject.org/xsd/imscp_rootv1p1p2}"
 KIND = "{http://www.adlnet.org/xsd/adlcp_rootv1p2}scormtype"
@@ -122,13 +120,6 @@ def test_package_with_hostile_titles_in_arabic_follows_edits(make_course: Make) 
     assert '<html lang="ar" dir="rtl"' in page
     folder.write(folder.lesson(), "## One\n\n" + quiz("a", ANY["zero"]))
     assert b"data-quiz" in package(folder)["lessons/1.1-one.html"]
-
-
-@pytest.mark.slow
-def test_package_is_the_same_without_what_is_kept(scorm: Package) -> None:
-    once = scorm.folder.read(ZIP)
-    assert scorm.folder.main("export", "scorm", "--no-cache", "--out", "b.zip").status == 0
-    assert scorm.folder.read("b.zip") == once
 
 
 def test_names_are_of_xml_and_apart(scorm: Package) -> None:
