@@ -81,8 +81,6 @@ class DocumentSummary(Struct, frozen=True):
     """Those of formulas among them."""
     imports: tuple[tuple[str, tuple[str, ...]], ...]
     """Paths of scripts, each with the modules that it imports."""
-    lasting: bool
-    """Whether the same text gives the same again."""
     fingerprint: str
     """Of what others than its own page can see of it; see `pipeline.fingerprints`."""
     notes: dict[str, bytes]
@@ -224,18 +222,16 @@ class PageReader:
             wrong = (*whole.diagnostics, *found, *known.diagnostics)
             scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
             imports = tuple((s.path, tuple(sorted(imported(s.code.text)))) for s in scripts)
-            lasting = not found  # that a formula took too long may not happen again
             summary = DocumentSummary(
                 bare,
                 wrong,
                 imports,
-                lasting,
                 document_fingerprint(bare),
                 {feature: encode(note) for feature, note in known.value.items()},
                 notes_fingerprint(known.value),
             )
             data = encode(summary)
-            if lasting:
+            if not found:  # that a formula took too long may not happen again
                 self._store.put(SUMMARIES, text.key, data)
             self._keep(text, whole)
             return data

@@ -125,15 +125,14 @@ def _scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
 
 
 def _check_names(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    scenarios = decoding.each(root.objects("scenario"), ScenarioTable)
-    names = [(table.name, node.place("name")) for node, table in scenarios]
-    yield from repeated(names, "field-value", "two scenarios have the name `{}`")
-    sweeps = decoding.each(root.objects("sweep"), SweepTable)
-    names = [(table.name, node.place("name")) for node, table in sweeps]
-    yield from repeated(names, "field-value", "two sweeps have the name `{}`")
-    keeps = decoding.each(root.objects("keep"), KeepTable)
-    findings = [(table.finding, node.place("finding")) for node, table in keeps]
-    yield from repeated(findings, "field-value", "the finding `{}` is kept twice")
+    for kind, table, field, message in (
+        ("scenario", ScenarioTable, "name", "two scenarios have the name `{}`"),
+        ("sweep", SweepTable, "name", "two sweeps have the name `{}`"),
+        ("keep", KeepTable, "finding", "the finding `{}` is kept twice"),
+    ):
+        found = decoding.each(root.objects(kind), table)
+        named = [(getattr(one, field), node.place(field)) for node, one in found]
+        yield from repeated(named, "field-value", message)
 
 
 def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:

@@ -23,6 +23,8 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
 )
 
+_SHORT = 40
+"""Characters of an author's text in a message."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
@@ -104,10 +106,10 @@ def accepts(type: inspect.Type, node: Node) -> bool:
     return isinstance(node, ArrayNode if kind == "array" else _SIMPLE[kind][2])
 
 
-def short(text: str, limit: int = 40) -> str:
+def short(text: str) -> str:
     """A stretch of the author's text that fits into a message."""
     line = " ".join(text.split())
-    return line if len(line) <= limit else line[: limit - 1] + "…"
+    return line if len(line) <= _SHORT else line[: _SHORT - 1] + "…"
 
 
 def named(name: str) -> str:
@@ -156,7 +158,7 @@ def type_help(node: Node, type: inspect.Type) -> str:
         return "leave the field out"
     if isinstance(node, ObjectNode) and "object" in items and raw.startswith("["):
         return f"write its header with two brackets: `[{node.mark.text}]`"
-    if len(raw) > 40 or "\n" in raw:
+    if len(raw) > _SHORT or "\n" in raw:
         return ""
     if isinstance(node, NumberNode | DateNode | BoolNode):
         plain = not isinstance(node, BoolNode) or kinds == {"string"}
