@@ -51,7 +51,7 @@ def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:
 
 def quantity_name(model: Any, scene: Scene) -> str:
     """What the scenario measures, with its unit in brackets; empty where nothing is declared."""
-    wanted = scene.declared.measured if scene.declared is not None else None
+    wanted = scene.declared.measured
     if wanted is None:
         return ""
     if wanted.kind != "sensor":
@@ -88,8 +88,8 @@ _UNITS = {
 
 def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     """What the scenario measures, at every sample: (n, d)."""
-    assert scene.declared is not None and scene.declared.measured is not None
     wanted = scene.declared.measured
+    assert wanted is not None
     data = initial_data(scene.scenario, model)
     found = []
     rows = zip(states.qpos, states.qvel, states.act, strict=True)

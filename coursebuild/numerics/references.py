@@ -105,25 +105,25 @@ def find_reference(model: Any, first: Pilot, *, quick: bool = False) -> KnownMot
     """
     wanted = first.scene.declared
     found, note = None, ""
-    if first.smooth and not (wanted and wanted.reference == "self"):
+    if first.smooth and wanted.reference != "self":
         try:
             found = _integrated(model, first, quick)
         except NoConvergenceError as error:
             note = f"no integration: {error}"
         if found is not None and not _tended(model, first, found):
             found, note = None, f"no integration: {_ELSEWHERE}"
-            if wanted and wanted.reference == "ode":
+            if wanted.reference == "ode":
                 raise _no_integration(_ELSEWHERE, wanted)
-    elif wanted and wanted.reference == "ode":
+    elif wanted.reference == "ode":
         raise _no_integration(f"there is {' and '.join(first.jumps)}", wanted)
     if found is None:
         found = replace(self_reference(model, first, quick=quick), note=note)
-    if wanted and wanted.closed:
+    if wanted.closed:
         problem, motion = closed_motion(model, first.scene, wanted, found.states.times)
         what, place = f"the closed form of `{wanted.closed}`", wanted.place("reference")
         source = problem.reference.source
         return _closed(model, found, motion, source, floor(problem), what, place)
-    exact = None if wanted and wanted.reference else first.scene.exact
+    exact = None if wanted.reference else first.scene.exact
     if exact is None:
         return found
     motion = _exact_motion(model, first, exact, found)
@@ -296,7 +296,7 @@ def find_conserved(model: Any, first: Pilot, known: KnownMotion) -> tuple[float 
     the angular momentum about the centre of mass is.
     """
     scenario = first.scene.scenario
-    declared = first.scene.declared.conserved if first.scene.declared is not None else None
+    declared = first.scene.declared.conserved
     data, other = initial_data(scenario, model), initial_data(scenario, model)
     states = [(data.qpos, data.qvel), *zip(known.states.qpos, known.states.qvel, strict=True)]
     table = np.array([invariants(model, other, qpos, qvel) for qpos, qvel in states])

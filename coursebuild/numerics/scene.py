@@ -77,13 +77,12 @@ class Scene(Struct, frozen=True):
     own: float
     """The model's own timestep, s."""
     bench: BenchTable
-    declared: DeclaredScenario | None
-    """`None` for a scenario that nobody wrote."""
+    declared: DeclaredScenario
     exact: ExactMotion | None = None
     """What the course knows of its motion."""
 
 
-def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) -> tuple[Scene, ...]:
+def scenes(model: Any, declared: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
     """The scenarios of a model (`mjModel`); none of one in which nothing can move.
 
     What they name is in the model, and states have as many numbers as it takes: that was checked.
@@ -91,24 +90,25 @@ def scenes(model: Any, declared: Declarations | None, *, quick: bool = False) ->
     Raises:
         SceneError: one does not fit the model.
     """
-    step = float(model.opt.timestep)
-    steps = [step * 2.0**power for power in (QUICK_LADDER if quick else LADDER)]
     if not model.nv:
-        if declared is not None and declared.scenarios:
+        if declared.scenarios:
             raise SceneError("nothing can move in the model", declared.scenarios[0].span)
         return ()
-    if declared is not None and declared.scenarios:
-        return tuple(_declared(model, one, declared.bench, steps) for one in declared.scenarios)
-    bench = BenchTable() if declared is None else declared.bench
-    scenario = _timed(step, None, None, None, ())
+    step = float(model.opt.timestep)
+    steps = [step * 2.0**power for power in (QUICK_LADDER if quick else LADDER)]
+    chosen = declared.scenarios or _by_keyframes(model, declared.source.span(0, 0))
+    return tuple(_scene(model, one, declared.bench, steps) for one in chosen)
+
+
+def _by_keyframes(model: Any, place: Span) -> tuple[DeclaredScenario, ...]:
+    """The scenarios of a model that declares none."""
     names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
-    found = []
-    for key in range(int(model.nkey)) or (-1,):
-        name = names[max(key, 0)]
-        title = "from the model's own state" if key < 0 else f"from the keyframe {name}"
-        one = replace(scenario, keyframe=key)
-        found.append(Scene(name, title, one, _ladder(one, step, steps), step, bench, None))
-    return tuple(found)
+    if not model.nkey:
+        return (DeclaredScenario(names[0], "from the model's own state", span=place),)
+    return tuple(
+        DeclaredScenario(name, f"from the keyframe {name}", key, span=place)
+        for key, name in enumerate(names)
+    )
 
 
 def thickness(model: Any) -> Array:
@@ -122,7 +122,7 @@ def thickness(model: Any) -> Array:
     return np.append(np.where(bottomless | (half == 0), np.inf, half), np.inf)
 
 
-def _declared(
+def _scene(
     model: Any, declared: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
 ) -> Scene:
     step = float(model.opt.timestep)

@@ -22,12 +22,13 @@ from msgspec import Struct
 
 from coursebuild.core.checks.compiled import broken_model, check_scenarios, scenarios_of_no_model
 from coursebuild.core.files.read import CourseFiles, read_course
-from coursebuild.core.model import BenchTable, Declarations, MjcfModel
+from coursebuild.core.model import Declarations, MjcfModel
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Parsed,
     did_you_mean,
     nearest,
     sort_diagnostics,
@@ -42,8 +43,8 @@ class CourseScene(Struct, frozen=True):
     """A model that can be measured."""
 
     model: MjcfModel
-    declared: Declarations | None
-    """What the file beside it says; `None` where there is none."""
+    declared: Declarations
+    """What the file beside it says."""
     facts: ModelFacts
     digest: str
     """Of all that its figures depend on in the course."""
@@ -54,18 +55,8 @@ class CourseScene(Struct, frozen=True):
         return self.model.name
 
 
-class Scenes(Struct, frozen=True):
-    """What was found."""
-
-    scenes: tuple[CourseScene, ...]
-    """By name."""
-    diagnostics: tuple[Diagnostic, ...]
-    names: tuple[str, ...]
-    """Every model of the course, also those that cannot be measured."""
-
-
-def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Scenes:
-    """The scenes that the names mean; all where there are none.
+def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseScene, ...]]:
+    """The scenes that the names mean, by name; all where there are none.
 
     A name is that of a file below `models/`, with or without its suffix and folder.
 
@@ -84,19 +75,17 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Scenes:
         if result.facts is None:
             found.append(broken_model(model, result, readable_error))
             continue
-        says = declared.get(model.name)
-        if says is not None:
-            wrong = list(check_scenarios(says, result.facts))
-            found += wrong
-            if wrong:
-                continue
-        elif model.name in declared:
+        says = declared.get(model.name, Declarations(model.name, model.source))
+        if says is None:
             continue  # what is beside it cannot be read, and was told
-        scenes.append(CourseScene(model, says, result.facts, scene_digest(root, model, says)))
-    return Scenes(tuple(scenes), sort_diagnostics(found), tuple(sorted(models)))
+        wrong = list(check_scenarios(says, result.facts))
+        found += wrong
+        if not wrong:
+            scenes.append(CourseScene(model, says, result.facts, scene_digest(root, model, says)))
+    return Parsed(tuple(scenes), sort_diagnostics(found))
 
 
-def scene_digest(root: Path, model: MjcfModel, declared: Declarations | None) -> str:
+def scene_digest(root: Path, model: MjcfModel, declared: Declarations) -> str:
     """Of a model with the files that it pulls in, and of its scenarios."""
     digest = hashlib.sha256()
 
@@ -126,14 +115,14 @@ def _content(file: Path) -> bytes:
         return b"unreadable"
 
 
-def _said(declared: Declarations | None) -> str:
+def _said(declared: Declarations) -> str:
     """All that is declared and changes a figure, wherever it stands in the file.
 
     Recorded reports hold the digest of this text: said otherwise, none of them would fit any more.
     """
-    bench = BenchTable() if declared is None else declared.bench
+    bench = declared.bench
     parts = [f"Visible(share={bench.visible}, angle={bench.visible_angle})"]
-    for one in () if declared is None else declared.scenarios:
+    for one in declared.scenarios:
         said = (
             *(one.name, one.title or "", one.keyframe, one.qpos, one.qvel, one.duration),
             *(one.sample, one.controls, one.hold, one.measured),
@@ -141,7 +130,7 @@ def _said(declared: Declarations | None) -> str:
             *(one.conserved, one.timesteps),
         )
         parts.append(repr(said))
-    for sweep in () if declared is None else declared.sweeps:
+    for sweep in declared.sweeps:
         vary = [(one.parameter, one.values, one.relative) for one in sweep.variations]
         parts.append(repr((sweep.name, sweep.title or "", sweep.scenario or "", vary, sweep.show)))
     return f"[{', '.join(parts)}]"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model import Course, MjcfModel
+from coursebuild.core.model import Course, Declarations, MjcfModel
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source
@@ -90,7 +90,7 @@ class _Reader:
         from coursebuild.pipeline.scenes import scene_digest
 
         if model.name not in self._digests:
-            declared = self._declared.get(model.name)
+            declared = self._declared.get(model.name, Declarations(model.name, model.source))
             self._digests[model.name] = scene_digest(self._root, model, declared)
         return self._digests[model.name]
 

@@ -10,6 +10,7 @@ import pytest
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.scene import SceneError, scenes
 from support.bench_runs import measured
+from support.surveys import NOTHING
 
 pytestmark = pytest.mark.site
 
@@ -63,7 +64,7 @@ def test_times_are_of_the_clock() -> None:
     """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
     ticks = iter(range(0, 10**15, 2_000_000))
     model = stiff(0.01, 0.1, 10)
-    (one,) = scenes(model, None, quick=True)
+    (one,) = scenes(model, NOTHING, quick=True)
     report = measure_scenario(model, one, quick=True, clock=lambda: next(ticks))
     for one in report.rows:
         assert one.cost is not None and one.seconds is not None and one.realtime is not None

@@ -11,6 +11,7 @@ import pytest
 from coursebuild.numerics.engine import EngineStates
 from coursebuild.numerics.observe import slip, sticking
 from coursebuild.numerics.scene import Scene, scenes
+from support.surveys import NOTHING
 
 BALL = """\
 <mujoco>
@@ -24,7 +25,7 @@ BALL = """\
 
 def ball() -> tuple[Any, Scene]:
     model = mujoco.MjModel.from_xml_string(BALL)
-    (scene,) = scenes(model, None)
+    (scene,) = scenes(model, NOTHING)
     return model, scene
 
 

@@ -16,6 +16,7 @@ from coursebuild.numerics.pilot import pilot
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.references import KnownMotion, find_reference
 from coursebuild.numerics.scene import SceneError, scenes
+from support.surveys import NOTHING
 
 pytestmark = pytest.mark.site
 
@@ -73,7 +74,7 @@ def test_a_smooth_scene_is_integrated_twice() -> None:
     ids=["contact", "limit", "friction"],
 )
 def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, why: str) -> None:
-    (scene,) = scenes(model, None, quick=True)
+    (scene,) = scenes(model, NOTHING, quick=True)
     first = pilot(model, scene)
     assert first.jumps == (why,)
     found = find_reference(model, first, quick=True)
@@ -92,7 +93,7 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     # `mj_forward` knows nothing of the clamp: both integrations agree, on another motion.
     model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
     model.key_ctrl[0, 0] = 1.0
-    (scene,) = scenes(model, None, quick=True)
+    (scene,) = scenes(model, NOTHING, quick=True)
     first = pilot(model, scene)
     assert first.jumps == ("an activation at its limit",)
     found = find_reference(model, first, quick=True)

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.core.model import Declarations
 from coursebuild.core.run.versions import engine_version
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
@@ -54,7 +55,8 @@ class Course:
     def bench(self, name: str = "box", **other: Any) -> SceneReport:
         course = load_course(self.folder.root)
         model = next(one for one in course.models if one.name == name)
-        declared = next((one for one in course.declarations if one.model == name), None)
+        nothing = Declarations(name, model.source)
+        declared = next((one for one in course.declarations if one.model == name), nothing)
         digest = scene_digest(self.folder.root, model, declared)
         here = replace(box().machine, engine=engine_version())
         return replace(box(), **{"model": name, "digest": digest, "machine": here, **other})

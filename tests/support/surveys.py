@@ -18,6 +18,8 @@ from coursebuild.numerics.timing import Clock
 from support.bench_reports import MACHINE
 
 PATH = "models/a.xml"
+NOTHING = Declarations("a", Source(PATH, ""))
+"""What a model declares that declares nothing."""
 SETTINGS = ("cone", "island", "sleep", "solver")
 PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
       <geom name="ball" size=".05" pos=".3 0 0"/></body>"""
@@ -74,7 +76,7 @@ def tried(
     lesson: str = "",
     keeps: Mapping[str, str] | None = None,
     has_commands: bool = False,
-    declared: Declarations | None = None,
+    declared: Declarations = NOTHING,
     quick: bool = True,
     clock: Clock | None = None,
 ) -> Survey:

@@ -131,11 +131,11 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):
-    """A scenario as its author wrote it."""
+    """A scenario as its author wrote it, or as a model has it that declares none."""
 
     span: Span
     """Its table."""
-    places: tuple[tuple[str, Span], ...]
+    places: tuple[tuple[str, Span], ...] = ()
     """Where each field that is given stands."""
 
     def place(self, name: str) -> Span:
@@ -207,12 +207,13 @@ class Keep(KeepTable, frozen=True, kw_only=True):
 
 
 class Declarations(Struct, frozen=True):
-    """A file `models/NAME.toml`."""
+    """A file `models/NAME.toml`, or what holds of a model that has none."""
 
     model: str
     """Its path below `models/`, without suffix, POSIX: the name of the model."""
     source: Source
-    scenarios: tuple[DeclaredScenario, ...]
-    keep: tuple[Keep, ...]
+    """The model's own where there is no such file."""
+    scenarios: tuple[DeclaredScenario, ...] = ()
+    keep: tuple[Keep, ...] = ()
     bench: BenchTable = BenchTable()
     sweeps: tuple[DeclaredSweep, ...] = ()

@@ -22,7 +22,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import BenchTable, Declarations
+from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.numerics.detector import Peaks, RunJudgement, judge, peaks
 from coursebuild.numerics.engine import advance, initial_data
 from coursebuild.numerics.problem import Scenario
@@ -39,9 +39,7 @@ _CONTACTS = 10
 """Steps from one look at the contacts to the next."""
 
 
-def pruning_scenes(
-    model: Any, declared: Declarations | None, *, quick: bool = False
-) -> tuple[Scene, ...]:
+def pruning_scenes(model: Any, declared: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
     """What happens to a model, declared or by default.
 
     Raises:
@@ -49,8 +47,9 @@ def pruning_scenes(
     """
     found = scenes(model, declared, quick=quick)
     if not found:  # nothing moves, but there are things to be without
-        step = float(model.opt.timestep)
-        return (Scene("start", "", Scenario(10 * step, step), (step,), step, BenchTable(), None),)
+        step, place = float(model.opt.timestep), declared.source.span(0, 0)
+        scenario, start = Scenario(10 * step, step), DeclaredScenario("start", span=place)
+        return (Scene("start", "", scenario, (step,), step, declared.bench, start),)
     return tuple(_shortened(scene) for scene in found) if quick else found
 
 

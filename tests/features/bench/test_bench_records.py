@@ -39,7 +39,7 @@ def test_what_is_recorded_is_checked(course: Path) -> None:
     )
     report = BENCH.decode((course / PATH).read_bytes())
     assert report.model == "box" and report.scenarios == (swing(),)
-    assert report.digest == find_scenes(course, ("box",)).scenes[0].digest
+    assert report.digest == find_scenes(course, ("box",)).value[0].digest
     fake = Fake()
     again = check(options(course), measuring=fake)
     assert again.ok

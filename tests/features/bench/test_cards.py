@@ -38,7 +38,7 @@ def root(tmp_path: Path) -> Path:
 
 
 def carded(root: Path, seconds: float = 60.0) -> SceneReport:
-    (scene,) = find_scenes(root, ("ball",)).scenes
+    (scene,) = find_scenes(root, ("ball",)).value
     report = SceneReport("ball", scene.digest, False, machine(), ())
     return with_card(root, scene, report, seconds)
 

@@ -44,7 +44,7 @@ def course(tmp_path: Path) -> Path:
 def report(course: Path, exact: str, toml: str = TOML) -> ScenarioReport:
     write(course / "models" / "ball.exact.py", exact)
     write(course / "models" / "ball.toml", toml)
-    (scene,) = find_scenes(course, ("ball",)).scenes
+    (scene,) = find_scenes(course, ("ball",)).value
     loaded = scenarios_of(course, scene, quick=True)
     return measured(loaded, 0, quick=True, timed=False, tell=lambda _: None)
 
@@ -81,5 +81,5 @@ def test_what_was_measured_depends_on_it(course: Path) -> None:
     for exact in (None, EXACT, EXACT + "\n"):
         if exact is not None:
             write(course / "models" / "ball.exact.py", exact)
-        digests.add(find_scenes(course, ("ball",)).scenes[0].digest)
+        digests.add(find_scenes(course, ("ball",)).value[0].digest)
     assert len(digests) == 3

@@ -61,7 +61,7 @@ def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: 
 
 def test_a_scenario_that_cannot_be_measured_is_told(course: Path) -> None:
     write(course / "models" / "arm.xml", BOX)
-    scene = find_scenes(course, ("box",)).scenes[0]
+    scene = find_scenes(course, ("box",)).value[0]
     wrong = diagnose("scenario-model", scene.model.source.span(0, 0), "no way")
     found = bench(options(course), ("box",), measuring=Fake(swing(), wrong))
     assert found.reports == () and [d.message for d in found.diagnostics] == ["no way"]

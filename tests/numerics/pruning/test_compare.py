@@ -8,13 +8,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.core.model.scenarios import BenchTable
+from coursebuild.core.model.scenarios import BenchTable, DeclaredScenario
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import compare, pruning_scenes
 from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
-from support.surveys import declared
+from support.surveys import NOTHING, declared
 
 DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
@@ -23,7 +23,8 @@ DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".
 
 def lasting(duration: float, keyframe: int = -1) -> Scene:
     scenario = Scenario(duration, 0.002, keyframe=keyframe)
-    return Scene("go", "go", scenario, (0.002,), 0.002, BenchTable(), None)
+    nobody = DeclaredScenario("go", span=NOTHING.source.span(0, 0))
+    return Scene("go", "go", scenario, (0.002,), 0.002, BenchTable(), nobody)
 
 
 CHAOS, SHORT = lasting(15.0, 0), lasting(1.0, 0)

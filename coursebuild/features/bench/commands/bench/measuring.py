@@ -116,8 +116,7 @@ def _told(scene: CourseScene) -> Iterator[None]:
         with silent():
             yield
     except SceneError as error:
-        beside = source if scene.declared is None else scene.declared.source
-        place = error.span or beside.span(0, 0)
+        place = error.span or scene.declared.source.span(0, 0)
         wrong = diagnose("scenario-model", place, error.message, help=error.help)
         raise CannotError(wrong) from None
     except mujoco.FatalError as error:  # such as a model that asks for less memory than it needs

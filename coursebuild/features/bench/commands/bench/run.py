@@ -18,7 +18,6 @@ from typing import Any, TypeVar
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench import measuring
@@ -60,7 +59,7 @@ def bench(
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
     run = SceneRun(options, scenes.diagnostics, measuring, quick=quick, cards=record)
-    found = run.each(scenes.scenes, run.measure)
+    found = run.each(scenes.value, run.measure)
     if not record:
         return found
     records = ((BENCH.path(one.model), BENCH.encode(one)) for one in found.reports)
@@ -85,13 +84,13 @@ def check(
     scenes = find_scenes(options.root, names)
     run = SceneRun(options, scenes.diagnostics, measuring, again=True)
     recorded: dict[str, SceneReport] = {}
-    for scene in scenes.scenes:
+    for scene in scenes.value:
         report = read_record(options.root, BENCH, scene.name)
         if isinstance(report, ReportFailure):
             run.failures.append(report)
         else:
             recorded[scene.name] = report
-    known = {scene.name: scene for scene in scenes.scenes if scene.name in recorded}
+    known = {scene.name: scene for scene in scenes.value if scene.name in recorded}
     found = run.each(tuple(known.values()), run.measure)
     checked = [_checked(recorded[one.model], one, known[one.model]) for one in found.reports]
     return replace(found, checked=tuple(checked))
@@ -110,8 +109,7 @@ def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -
     ):
         if before != now:
             remarks.append(f"recorded with {what}{before}, measured with {now}")
-    bench = BenchTable() if scene.declared is None else scene.declared.bench
-    departures = scene_departures(recorded, measured, bench)
+    departures = scene_departures(recorded, measured, scene.declared.bench)
     return Checked(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
 
 
@@ -173,7 +171,7 @@ class SceneRun(MeasuringRun):
                     SweepReport,
                     partial(self.measuring.swept, loaded, one, **how),
                 )
-                for one in (() if scene.declared is None else scene.declared.sweeps)
+                for one in scene.declared.sweeps
             ),
         )
         if self.cards and report.scenarios:

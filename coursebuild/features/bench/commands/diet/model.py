@@ -48,8 +48,7 @@ class DietModel:
         self.root = root
         self.scene = scene
         self.path = scene.model.source.path
-        kept = () if scene.declared is None else scene.declared.keep
-        self.keeps = {" ".join(one.finding.split()): one for one in kept}
+        self.keeps = {" ".join(one.finding.split()): one for one in scene.declared.keep}
         self.locked = _locked(root, files, self.path, scene.model.source.text)
         self.readers = _readers(root, files, course, scene)
         self._files: dict[str, bytes | None] = {}
@@ -94,7 +93,7 @@ class DietModel:
                 self.readers,
                 self.keeps,
                 self.locked,
-                declared is not None and any(one.controls for one in declared.scenarios),
+                any(one.controls for one in declared.scenarios),
                 time.thread_time_ns,
                 quick,
                 tell,
@@ -166,11 +165,9 @@ def _readers(
 ) -> tuple[Reader, ...]:
     """Everything in the course that may use a model, and what is to be measured on it."""
     found = list(readers_of(course, root, files, scene))
-    if scene.declared is not None:
-        declared = scene.declared.scenarios
-        names = frozenset(one.measured.name for one in declared if one.measured is not None)
-        fields = {"energy"} if any("energy" in (one.conserved or ()) for one in declared) else set()
-        if names or fields:
-            path = scene.declared.source.path
-            found.append(Reader(path, names=names, words=frozenset(fields)))
+    declared = scene.declared.scenarios
+    names = frozenset(one.measured.name for one in declared if one.measured is not None)
+    fields = {"energy"} if any("energy" in (one.conserved or ()) for one in declared) else set()
+    if names or fields:
+        found.append(Reader(scene.declared.source.path, names=names, words=frozenset(fields)))
     return tuple(found)

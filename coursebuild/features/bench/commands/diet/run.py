@@ -65,7 +65,7 @@ def diet(
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
     run = _DietRun(options, scenes.diagnostics, quick=quick, fix=fix)
-    found = run.each(scenes.scenes, run.look_at)
+    found = run.each(scenes.value, run.look_at)
     if not record:
         return found
     records = ((DIET.path(one.model), DIET.encode(one)) for one in found.reports)
@@ -135,8 +135,7 @@ class _DietRun(MeasuringRun):
     def _parts(self, look: DietModel) -> tuple[object, ...]:
         """All that what is found depends on; first the digest of the model."""
         parts: list[object] = [look.scene.digest, look.scene.name, self.quick, self.code, self.here]
-        declared = look.scene.declared
-        for one in () if declared is None else declared.keep:
+        for one in look.scene.declared.keep:
             place = one.finding_span
             parts.append((one.finding, one.reason, place.line, place.column))
         parts += look.locked.items()
