@@ -126,9 +126,8 @@ def _scene(
     model: Any, declared: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
 ) -> Scene:
     step = float(model.opt.timestep)
-    times = _timed(step, declared.duration, declared.sample, declared.hold, declared.controls)
     scenario = replace(
-        times,
+        _timed(step, declared),
         qpos=_unit(model, declared.qpos),
         qvel=declared.qvel,
         controls=declared.controls,
@@ -163,22 +162,18 @@ def _unit(model: Any, qpos: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(found.tolist())
 
 
-def _timed(
-    step: float,
-    duration: float | None,
-    sample: float | None,
-    hold: float | None,
-    controls: tuple[tuple[float, ...], ...],
-) -> Scenario:
+def _timed(step: float, declared: DeclaredScenario) -> Scenario:
     """The times of a scenario, as whole numbers of the model's timestep.
 
     Raises:
         SceneError: what is given is no whole number of timesteps.
     """
+    duration, sample, hold = declared.duration, declared.sample, declared.hold
     given = (("duration", duration), ("sample", sample), ("hold", hold))
     whole = {name: _steps(length, step, name) for name, length in given if length is not None}
     held, looks = whole.get("hold"), whole.get("sample")
-    last = held * len(controls) if held is not None and len(controls) > 1 else 0
+    count = len(declared.controls)
+    last = held * count if held is not None and count > 1 else 0
     total = whole.get("duration") or max(last, min(round(DURATION / step), MOST_STEPS), 1)
     if looks is None:
         basis = math.gcd(*(whole[name] for name in ("duration", "hold") if name in whole))

@@ -90,8 +90,7 @@ class CheckedCourse(Struct, frozen=True):
     @property
     def is_sound(self) -> bool:
         """Whether nothing is wrong but what warnings say."""
-        errors = (d for d in self.diagnostics if d.is_error)
-        return self.course is not None and not any(True for _ in errors)
+        return self.course is not None and not any(d.is_error for d in self.diagnostics)
 
     def report(self, more: Iterable[Diagnostic] = ()) -> Report:
         """The report; `more` is what else was found."""
