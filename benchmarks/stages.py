@@ -82,7 +82,7 @@ def parsing(root: Path, repeat: int) -> None:
     """Our parser beside the library that it stands on."""
     from markdown_it import MarkdownIt
 
-    course = load(root).course
+    course = load(root).value
     assert course is not None
     sources = [document.source for document in course.documents]
     kinds = frozenset(kind.name for kind in course.callouts)
@@ -130,7 +130,7 @@ def typing(root: Path, repeat: int) -> None:
 def scripts(root: Path, repeat: int) -> None:
     """Our runner beside bare Python."""
     options = Options(root, len(os.sched_getaffinity(0)), True)
-    course = load(root).course
+    course = load(root).value
     assert course is not None
     chosen = extract_scripts(course, options).runnable
 
@@ -154,7 +154,7 @@ def stages(course: Course, results: Results, root: Path, repeat: int) -> None:
 
     def put_together() -> None:
         with Documents(options.store, 1) as documents:
-            loaded = load(root, documents).course
+            loaded = load(root, documents).value
             assert loaded is not None
             for file in site_files(loaded, results, documents, options, Reports()).files:
                 file.make()
@@ -227,7 +227,7 @@ def main() -> None:
     parsing(root, arguments.repeat)
     typing(root, arguments.repeat)
     scripts(root, arguments.repeat)
-    course = load(root).course
+    course = load(root).value
     assert course is not None
     results = verify(course, Options(root, 1, True), Progress(quiet=True)).results
     results = replace(results, formulas=typeset(course))

@@ -45,7 +45,7 @@ root = pathlib.Path.cwd()
 with ScriptServer() as server:
     store = Memo(root, fresh=True)
     options = Options(root, int(sys.argv[1]), True, store, run_all=server.run)
-    chosen = extract_scripts(load(root).course, options).runnable
+    chosen = extract_scripts(load(root).value, options).runnable
     for _ in range(2):
         began = time.perf_counter()
         runs = run(chosen, options, Progress(quiet=True))

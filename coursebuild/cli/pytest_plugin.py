@@ -77,7 +77,7 @@ class CourseTests:
         from coursebuild.pipeline.load import load
 
         atexit.register(gc.freeze)  # as Python ends, what was read can crash its collector
-        course = load(root).course
+        course = load(root).value
         self.root = root
         self.tests: Mapping[str, Mapping[str, _Lines]] = _tests(course)
         """By path and name: where in the file the test's mistakes stand. The first test of a file

@@ -59,7 +59,7 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
     options.store.listen(progress.say)
     with project_lock(options.root, progress.say):
         loaded = load(options.root)
-        course = loaded.course
+        course = loaded.value
         if course is not None and course.python is not None:
             raise UsageError(
                 f"--against: scripts of this course run with {course.python.path}; to try another "

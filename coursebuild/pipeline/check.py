@@ -125,7 +125,7 @@ def read_and_verify(
     """
     began = time.monotonic()
     loaded = load(options.root, documents, trusted=options.sandbox is None)
-    course = loaded.course
+    course = loaded.value
     if course is None:
         return CheckedCourse(began, loaded.diagnostics, Selection((), (), None))
     chosen = select(course, names, options.root)

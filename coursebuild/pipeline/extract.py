@@ -35,7 +35,7 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
 def _extract(options: Options, *, adopt: bool) -> Report:
     began = time.monotonic()
     loaded = load(options.root)
-    course = loaded.course
+    course = loaded.value
     if course is None:
         return judge(None, loaded.diagnostics, began)
     extracted = extract_scripts(course, options)
@@ -45,7 +45,7 @@ def _extract(options: Options, *, adopt: bool) -> Report:
         adoptions, refused, read = _adopt(options, extracted)
         if read:
             loaded = load(options.root)
-            course = loaded.course or course
+            course = loaded.value or course
             _write_as_extracted(options, course, read)
             extracted = extract_scripts(course, options)
         remarks += [*adoptions, *_remarks(extracted)]

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import scenarios_of_no_model
@@ -44,13 +43,6 @@ from coursebuild.core.text.source import Source
 MAP = "content/course.toml"
 MAP_TEXT = 1_000_000
 """Characters of the course map, which says how long all other texts may be."""
-
-
-class Loaded(Struct, frozen=True):
-    """What the disk holds. `course` is `None` when the map cannot be used."""
-
-    course: Course | None
-    diagnostics: tuple[Diagnostic, ...]
 
 
 class Parser:
@@ -92,15 +84,17 @@ def load(
     open_texts: Mapping[str, str] = {},
     *,
     trusted: bool = True,
-) -> Loaded:
-    """Read and parse everything below `root`; `open_texts` as in `read_course`.
+) -> Parsed[Course | None]:
+    """Read and parse everything below `root`; no course where its map cannot be used.
+
+    `open_texts` is as for `read_course`.
 
     Raises:
         EffectError: the course brings code that would run here, and is not `trusted`.
     """
     loader = _Loader(root, Parser() if parser is None else parser, open_texts, trusted=trusted)
     course = loader.course()
-    return Loaded(course, tuple(loader.found))
+    return Parsed(course, tuple(loader.found))
 
 
 def load_course(root: Path) -> Course:
@@ -109,7 +103,7 @@ def load_course(root: Path) -> Course:
     Raises:
         UsageError: its map cannot be used.
     """
-    course = load(root).course
+    course = load(root).value
     if course is None:
         raise UsageError("the course map cannot be read; `coursebuild check` says why")
     return course

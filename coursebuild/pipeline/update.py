@@ -61,7 +61,7 @@ def _update(
 ) -> Report:
     began = time.monotonic()
     loaded = load(options.root)
-    course = loaded.course
+    course = loaded.value
     if course is None:
         return judge(None, loaded.diagnostics, began)
     options = options.for_course(course)
@@ -86,14 +86,14 @@ def _update(
     now = loaded if dry_run or not remarks else load(options.root)
     found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
     found += check_recorded_runs(scripts, options)
-    found += _afterwards(course, now.course or course, scripts, first, again)
-    if edits and not dry_run and now.course is not None:
+    found += _afterwards(course, now.value or course, scripts, first, again)
+    if edits and not dry_run and now.value is not None:
         changed = {
             r.script
             for r in recorded_outputs(course, chosen.documents)
             if _is_touched(r, edits, ())
         }
-        found += _noise(now.course, chosen, changed, first, options, progress)
+        found += _noise(now.value, chosen, changed, first, options, progress)
     if not remarks and all(not d.is_error for d in found):
         remarks = ("every recorded output is up to date",)
     return judge(

@@ -237,7 +237,7 @@ class Session:
             edits = self.edits
             with self._reading:
                 loaded = load(self.root, documents, self.open_texts)
-                course = loaded.course
+                course = loaded.value
                 reports = Parsed(Reports(), ())
                 if course is not None:
                     reports = shown_reports(self.root, course)
@@ -257,7 +257,7 @@ class Session:
             saved = read_sources(self.root, sorted(texts)).value
             if all(source.text == texts[source.path] for source in saved):
                 return self.course
-            return load(self.root, self._documents).course
+            return load(self.root, self._documents).value
 
     def _take_course(
         self, course: Course | None, diagnostics: Iterable[Diagnostic], reports: Reports

@@ -121,8 +121,8 @@ def test_links_lead_where_the_repository_is_read() -> None:
 def test_every_document_is_a_page_without_mistakes() -> None:
     """As pages, their links, anchors and all else are checked by the tool itself."""
     loaded = load(ROOT)
-    assert loaded.course is not None
-    pages = {page.path for page in loaded.course.pages}
+    assert loaded.value is not None
+    pages = {page.path for page in loaded.value.pages}
     documents = {path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.md")}
     assert documents - pages == set()
     assert [d for d in loaded.diagnostics if d.span.path in documents] == []

@@ -15,8 +15,9 @@ from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.load import Loaded, load
+from coursebuild.pipeline.load import load
 from support.scratch_course import GOOD, ROOT, Folder, block
 
 pytestmark = pytest.mark.site
@@ -27,9 +28,9 @@ FIXTURES = [
 ENTRY = '[[level.lesson]]\nid = "1.{0}"\nslug = "l"\ntitle = "L"\nstatus = "complete"\n'
 
 
-def known_of(loaded: Loaded) -> Iterator[object]:
+def known_of(loaded: Parsed[Course | None]) -> Iterator[object]:
     """What is known of a course by its documents, first what is wrong with it."""
-    course = loaded.course
+    course = loaded.value
     assert course is not None
     extracted = extract(course)
     runs = [
@@ -130,7 +131,7 @@ def test_fingerprint_changes_with_what_others_see_and_not_with_prose(
     def of(text: str) -> str | None:
         folder.write(folder.lesson(), text)
         with Documents(Memo(folder.root), 1) as documents:
-            course = load(folder.root, documents).course
+            course = load(folder.root, documents).value
             assert isinstance(course, Course)
             return documents.fingerprint(course)
 

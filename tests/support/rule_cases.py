@@ -197,13 +197,13 @@ class Workshop:
     ) -> tuple[Diagnostic, ...]:
         """What is found in a course whose scripts are not run; the browser engine is `changed`."""
         loaded = load(root)
-        assert loaded.course is not None
+        assert loaded.value is not None
         options = self.options(root)
-        models, wrong = compile_models(loaded.course, options, Progress(quiet=True))
+        models, wrong = compile_models(loaded.value, options, Progress(quiet=True))
         engines = copy.copy(self._engines)
         engines.browser = changed(engines.browser)
         # What labs did is not shared: it would not be tried by another engine.
         own = replace(options, cache=Memo(root))
-        _, found = try_labs(loaded.course, own, engines, dict(models), wrong)
+        _, found = try_labs(loaded.value, own, engines, dict(models), wrong)
         diagnostics = [*loaded.diagnostics, *wrong, *found]
-        return judge(loaded.course, diagnostics).diagnostics
+        return judge(loaded.value, diagnostics).diagnostics

@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
     """Run each script and write into the lessons what that showed; what fences got, in words."""
-    course = load(options.root).course
+    course = load(options.root).value
     if course is None:
         return ()
     recordings = recorded_outputs(course)

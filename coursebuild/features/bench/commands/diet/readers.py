@@ -118,7 +118,7 @@ class Reruns:
             self._copy(root)
             for path, data in files.items():
                 (root / path).write_bytes(data)
-            course = load(root).course
+            course = load(root).value
             if course is None:
                 return "the course"
             options = replace(self.options, root=root, cache=Memo(root))

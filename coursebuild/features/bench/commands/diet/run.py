@@ -90,7 +90,7 @@ class _DietRun(MeasuringRun):
         self.quick = quick
         self.fix = fix
         self.files = read_course(options.root).value
-        self.course = load(options.root).course
+        self.course = load(options.root).value
         self.here = machine()
         self.code = code_digest(*_CODE)
 
