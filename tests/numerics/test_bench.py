@@ -7,12 +7,11 @@ import functools
 import mujoco
 import pytest
 
-from coursebuild.core.syntax.scenarios import parse_declarations
-from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.scene import scenes
 from support.bench_runs import FAMILY, MODELS, orders, row
+from support.surveys import declared
 
 pytestmark = pytest.mark.site
 
@@ -21,9 +20,8 @@ pytestmark = pytest.mark.site
 def of_box() -> ScenarioReport:
     """The first flip of the tumbling box."""
     text = (MODELS / "tumbling_box.toml").read_text(encoding="utf-8")
-    declared = parse_declarations(Source("models/tumbling_box.toml", text)).value
     model = mujoco.MjModel.from_xml_path(str(MODELS / "tumbling_box.xml"))
-    (scene,) = (one for one in scenes(model, declared) if one.name == "first-flip")
+    (scene,) = (one for one in scenes(model, declared(text)) if one.name == "first-flip")
     return measure_scenario(model, scene, clock=None)
 
 

@@ -10,13 +10,11 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
-from coursebuild.core.syntax.scenarios import parse_declarations
-from coursebuild.core.text.source import Source
 from coursebuild.numerics.pilot import pilot
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.references import KnownMotion, find_reference
 from coursebuild.numerics.scene import SceneError, scenes
-from support.surveys import NOTHING
+from support.surveys import NOTHING, declared
 
 pytestmark = pytest.mark.site
 
@@ -44,9 +42,7 @@ def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str
 
 
 def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') -> KnownMotion:
-    parsed = parse_declarations(Source("models/m.toml", "[[scenario]]\n" + text))
-    assert parsed.value is not None, parsed.diagnostics
-    (scene,) = scenes(model, parsed.value, quick=True)
+    (scene,) = scenes(model, declared("[[scenario]]\n" + text), quick=True)
     return find_reference(model, pilot(model, scene), quick=True)
 
 

@@ -9,12 +9,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import Declarations
 from coursebuild.core.model.scenarios import is_multiple
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.scene import Scene, SceneError, scenes
-from support.surveys import NOTHING
+from support.surveys import NOTHING, declared
 
 ARM = """\
 <mujoco>
@@ -37,12 +36,6 @@ ARM = """\
 
 def arm(step: float = 0.002) -> Any:
     return mujoco.MjModel.from_xml_string(ARM.format(step=step))
-
-
-def declared(text: str) -> Declarations:
-    parsed = parse_declarations(Source("models/arm.toml", text))
-    assert parsed.value is not None, parsed.diagnostics
-    return parsed.value
 
 
 def only(text: str, model: Any = None) -> Scene:

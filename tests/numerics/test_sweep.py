@@ -10,8 +10,6 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import BenchTable
-from coursebuild.core.syntax.scenarios import parse_declarations
-from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.departures import scene_departures
 from coursebuild.numerics.reports.sweep import SweepReport, SweepRow, shown_figures
@@ -19,6 +17,7 @@ from coursebuild.numerics.reports.sweep_plot import sweep_svg
 from coursebuild.numerics.scene import SceneError, scenes
 from coursebuild.numerics.sweep import measure_sweep
 from support.bench_reports import scene
+from support.surveys import declared
 
 BALL = """\
 <mujoco>
@@ -45,13 +44,12 @@ measure = "body:ball"
 
 def swept(lines: str, mjcf: str = BALL, *, toml: str = TOML, timed: bool = False) -> SweepReport:
     text = f'{toml}\n[[sweep]]\nname = "s"\n{lines}\n'
-    declared = parse_declarations(Source("models/m.toml", text)).value
-    assert declared is not None
-    (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), declared)
+    said = declared(text)
+    (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), said)
     ticks = iter(range(0, 10**12, 2_000_000))
     clocks = (lambda: next(ticks), lambda: next(ticks)) if timed else None
     spec = mujoco.MjSpec.from_string(mjcf)
-    return measure_sweep(spec, scene, declared.sweeps[0], clocks, quick=True)
+    return measure_sweep(spec, scene, said.sweeps[0], clocks, quick=True)
 
 
 def test_a_spring_gives_back_what_it_takes_and_a_damper_does_not() -> None:

@@ -7,22 +7,19 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.core.syntax.scenarios import parse_declarations
-from coursebuild.core.text.source import Source
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.scene import scenes
+from support.surveys import declared
 
 MODELS = Path(__file__).parents[2] / "models"
 FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
 
 
 def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
-    parsed = parse_declarations(Source("models/m.toml", text))
-    assert parsed.value is not None, parsed.diagnostics
     return tuple(
         measure_scenario(model, one, quick=quick, clock=None)
-        for one in scenes(model, parsed.value, quick=quick)
+        for one in scenes(model, declared(text), quick=quick)
     )
 
 

@@ -18,8 +18,6 @@ from coursebuild.numerics.timing import Clock
 from support.bench_reports import MACHINE
 
 PATH = "models/a.xml"
-NOTHING = Declarations("a", Source(PATH, ""))
-"""What a model declares that declares nothing."""
 SETTINGS = ("cone", "island", "sleep", "solver")
 PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
       <geom name="ball" size=".05" pos=".3 0 0"/></body>"""
@@ -68,6 +66,9 @@ def declared(text: str) -> Declarations:
     parsed = parse_declarations(Source("models/a.toml", text))
     assert parsed.value is not None, parsed.diagnostics
     return parsed.value
+
+
+NOTHING = declared("")
 
 
 def tried(
