@@ -51,7 +51,7 @@ from coursebuild.numerics.problem import (
     SecondReference,
     Sizes,
 )
-from coursebuild.numerics.problems import problem_named
+from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.reports.bench import Errors, OrderRow
 from coursebuild.numerics.reports.cases import (
     CaseReport,
@@ -213,7 +213,7 @@ def closed_motion(
     Raises:
         SceneError: the scene begins otherwise than the hard case, but for the place of free bodies.
     """
-    problem, place = problem_named(declared.closed), declared.place("reference")
+    problem, place = all_problems()[declared.closed], declared.place("reference")
     there = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     if (there.jnt_type.tolist(), there.nq) != (model.jnt_type.tolist(), model.nq):
         message = f"the model has other joints than the hard case `{declared.closed}`"

@@ -14,7 +14,7 @@ from coursebuild.numerics.cases import measure
 from coursebuild.numerics.detector import RunStatus, driving_force, judge
 from coursebuild.numerics.engine import advance, compile_model, simulate
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
-from coursebuild.numerics.problems import problem_named
+from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.stability import attempt
 
 SPRING = """
@@ -66,7 +66,7 @@ def test_a_state_that_is_no_number() -> None:
 
 
 def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
-    sunk = problem_named("stack-10000")
+    sunk = all_problems()["stack-10000"]
     soft = replace(sunk, mjcf=sunk.mjcf.replace('solref="0.004 1"', 'solref="0.04 1"'))
     soft = replace(soft, scenario=replace(soft.scenario, qpos=(0.0, 0.0)))
     run = simulate(soft, compile_model(soft.mjcf, Integrator.EULER, 1e-3))
@@ -76,7 +76,7 @@ def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
 
 
 def test_no_error_is_given_for_a_run_that_was_lost() -> None:
-    problem = problem_named("damped-spring-0")
+    problem = all_problems()["damped-spring-0"]
     fast = replace(problem, mjcf=problem.mjcf.replace('stiffness="100"', 'stiffness="1e6"'))
     found = measure(fast, Integrator.RK4, 0.02)
     assert (found.status, found.position, found.velocity) == ("diverged", None, None)
@@ -114,7 +114,7 @@ def test_where_energy_can_be_judged() -> None:
 
 def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
     # A rod's transverse velocity grows to 1e6 rad/s, turns the axial one down, and decays again.
-    problem = problem_named("thin-rod")
+    problem = all_problems()["thin-rod"]
     assert problem.limit is not None
     limit = problem.limit(Integrator.RK4)
     assert limit is not None

@@ -7,11 +7,11 @@ import numpy as np
 
 from coursebuild.numerics.engine import compile_model, refsafe_active, simulate
 from coursebuild.numerics.problem import Integrator
-from coursebuild.numerics.problems import problem_named
+from coursebuild.numerics.problems import all_problems
 
 
 def test_measuring_does_not_disturb_the_run() -> None:
-    problem = problem_named("stack-10")
+    problem = all_problems()["stack-10"]
     run = simulate(problem, compile_model(problem.mjcf, Integrator.EULER, 1e-3))
     model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     data = mujoco.MjData(model)
@@ -22,7 +22,7 @@ def test_measuring_does_not_disturb_the_run() -> None:
 
 
 def test_commands_are_those_of_their_hold() -> None:
-    problem = problem_named("stiff-servo-1")
+    problem = all_problems()["stiff-servo-1"]
     run = simulate(problem, compile_model(problem.mjcf, Integrator.IMPLICIT, 1e-4))
     model = compile_model(problem.mjcf, Integrator.IMPLICIT, 1e-4)
     data = mujoco.MjData(model)
@@ -43,7 +43,7 @@ def test_refsafe_is_told() -> None:
         ("tumbling-box", 1.0, False),  # contact is off
         ("damped-spring-1", 1.0, False),
     ):
-        model = compile_model(problem_named(name).mjcf, Integrator.EULER, timestep)
+        model = compile_model(all_problems()[name].mjcf, Integrator.EULER, timestep)
         assert refsafe_active(model) is active, (name, timestep)
     for attributes in ('limited="true" range="-1 1"', 'frictionloss="1"'):
         joint = f"<joint type='slide' {attributes}/>"

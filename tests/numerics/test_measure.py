@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from coursebuild.numerics.cases import measure, orders
 from coursebuild.numerics.measure import errors, fitted_order
 from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Sizes
-from coursebuild.numerics.problems import double_pendulum, impact, problem_named, scales
+from coursebuild.numerics.problems import all_problems, double_pendulum, impact, scales
 from coursebuild.numerics.reports.cases import ErrorLine
 
 FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)
@@ -22,13 +22,13 @@ FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)
 
 @functools.cache
 def measured(name: str, integrator: Integrator) -> tuple[ErrorLine, ...]:
-    problem = problem_named(name)
+    problem = all_problems()[name]
     return tuple(measure(problem, integrator, h) for h in problem.timesteps)
 
 
 def slopes(name: str, integrator: Integrator) -> dict[str, float]:
     """The orders that could be fitted, by what they are of."""
-    found = orders(problem_named(name), measured(name, integrator))
+    found = orders(all_problems()[name], measured(name, integrator))
     parts = {"position": found.position, "attitude": found.attitude, "velocity": found.velocity}
     return {part: one.value for part, one in parts.items() if one is not None}
 
@@ -97,7 +97,7 @@ def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
 
 
 def test_a_timestep_that_misses_the_end_is_refused() -> None:
-    problem = problem_named("projectile")
+    problem = all_problems()["projectile"]
     with pytest.raises(ValueError, match=r"the sampling interval \(0\.1 s\) is no multiple"):
         measure(problem, Integrator.EULER, 0.03)
     longer = replace(problem, scenario=replace(problem.scenario, duration=1.05))
@@ -107,13 +107,13 @@ def test_a_timestep_that_misses_the_end_is_refused() -> None:
 
 def test_energy_belongs_to_the_moment_it_is_given_for() -> None:
     # The energy that MuJoCo gives after a step is that of before: it would seem to oscillate.
-    found = measure(problem_named("pendulum-hinge-90"), Integrator.RK4, 0.1 / 160)
+    found = measure(all_problems()["pendulum-hinge-90"], Integrator.RK4, 0.1 / 160)
     assert found.energy_drift is not None
     assert abs(found.energy_drift) < 1e-11
 
 
 def test_energy_may_hold_where_attitude_does_not() -> None:
-    found = measure(problem_named("tumbling-box"), Integrator.RK4, 0.01)
+    found = measure(all_problems()["tumbling-box"], Integrator.RK4, 0.01)
     assert found.attitude is not None
     assert found.energy_drift is not None
     assert abs(found.energy_drift) < 1e-7
@@ -158,13 +158,13 @@ OTHERWISE = (
 def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
     wrong = []
     for name, part, integrators, room in AS_THEORY_SAYS:
-        for check, one in itertools.product(problem_named(name).checks, integrators):
+        for check, one in itertools.product(all_problems()[name].checks, integrators):
             if part in check.name and one in check.integrators:
                 found, exact = check.measure(one), check.expected(one)
                 if not abs(found - exact) <= room:
                     wrong.append((name, check.name, one, found, exact))
     for name, part, one, known, room in OTHERWISE:
-        (check,) = (check for check in problem_named(name).checks if part in check.name)
+        (check,) = (check for check in all_problems()[name].checks if part in check.name)
         if not abs(check.measure(one) - known) <= room:
             wrong.append((name, check.name, one, check.measure(one), known))
     assert wrong == []

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from coursebuild.numerics.cases import DisagreementError, floor
 from coursebuild.numerics.engine import compile_model
 from coursebuild.numerics.problem import Integrator, Problem
-from coursebuild.numerics.problems import all_problems, problem_named, problem_names
+from coursebuild.numerics.problems import all_problems
 
 OFF = 1 + 1e-6
 DIRECTIONS = ("axis", "zaxis", "condim", "iterations")
@@ -59,14 +59,13 @@ IMMATERIAL = {
 
 
 def test_all_thirteen_cases_are_there() -> None:
-    assert {problem.case for problem in all_problems()} == set(range(1, 14))
-    assert len(set(problem_names())) == len(all_problems())
-    assert problem_named("tumbling-box").case == 1
+    assert {problem.case for problem in all_problems().values()} == set(range(1, 14))
+    assert len(all_problems()) == 44, "each has a name of its own"
 
 
 @pytest.mark.site
 def test_both_references_agree() -> None:
-    assert [problem.name for problem in all_problems() if not said_to_be_known(problem)] == []
+    assert [name for name, one in all_problems().items() if not said_to_be_known(one)] == []
 
 
 def said_to_be_known(problem: Problem) -> bool:
@@ -81,7 +80,7 @@ def said_to_be_known(problem: Problem) -> bool:
 def test_each_number_of_each_problem_that_is_off_by_a_millionth_is_noticed() -> None:
     """Of the model, the scenario and the solution, one after the other."""
     wrong = {}
-    for problem in all_problems():
+    for problem in all_problems().values():
         if problem.name == "chain-heavy-tip":  # an integration of seconds, forty times
             problem = replace(problem, scenario=replace(problem.scenario, duration=0.003))
         found = {name for name, other in variants(problem) if said_to_be_known(other)}
@@ -125,7 +124,7 @@ def test_problems_are_small_models_that_timesteps_divide(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)  # where MuJoCo would write what it warns of
-    for problem in all_problems():
+    for problem in all_problems().values():
         assert all(problem.scenario.steps(step) for step in problem.timesteps)
         assert not re.search("timestep|integrator|file=", problem.mjcf), problem.name
         assert compile_model(problem.mjcf, Integrator.RK4, 1e-3).nbody <= 12

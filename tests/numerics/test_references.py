@@ -47,7 +47,7 @@ def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') 
 
 
 def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
-    closed = [p.name for p in all_problems() if p.reference.kind == "closed"]
+    closed = [p.name for p in all_problems().values() if p.reference.kind == "closed"]
     assert list(CLOSED_FORMS) == closed
 
 

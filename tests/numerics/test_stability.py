@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
-from coursebuild.numerics.problems import all_problems, problem_named
+from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
 from coursebuild.numerics.reports.bench import StableRow
 from coursebuild.numerics.stability import (
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.site
 def test_limits_are_those_of_theory() -> None:
     """What is beyond by δ grows by 2δ in a step or more: it shows after a growth of exp 9."""
     wrong = []
-    limited = [one for one in all_problems() if one.limit is not None]
+    limited = [one for one in all_problems().values() if one.limit is not None]
     problems = [with_energy_bound(replace(one, span=1.0)) for one in limited]
     for problem, integrator in itertools.product(problems, Integrator):
         theory = problem.limit(integrator) if problem.limit else None
@@ -48,7 +48,7 @@ def test_limits_are_those_of_theory() -> None:
 
 
 def test_a_boundary_is_found_beside_theory() -> None:
-    problem = replace(problem_named("damped-spring-0.1"), search=(0.1, 1.0), span=200.0)
+    problem = replace(all_problems()["damped-spring-0.1"], search=(0.1, 1.0), span=200.0)
     found_all = {one.integrator: one for one in boundaries(problem)}
     assert {one.value for one in Integrator} == set(found_all), "joints with damping know eulerdamp"
     for integrator in (Integrator.EULER, Integrator.EULER_EXPLICIT, Integrator.RK4):
@@ -62,13 +62,13 @@ def test_a_boundary_is_found_beside_theory() -> None:
 
 
 def test_where_all_or_none_is_stable() -> None:
-    problem = replace(problem_named("damped-spring-1"), search=(0.05, 0.5))
+    problem = replace(all_problems()["damped-spring-1"], search=(0.05, 0.5))
     found = boundary(problem, Integrator.DISCRETE)
     assert (found.largest, found.searched, found.steps) == (None, (0.05, 0.5), 1000)
     found = boundary(replace(problem, search=(0.6, 2.0)), Integrator.EULER)
     assert (found.largest, found.difference, found.tried) == (0.0, None, 0)
     assert boundaries(replace(problem, search=None)) == ()
-    free = replace(problem_named("damped-spring-0"), search=(0.1, 0.3), span=10.0)
+    free = replace(all_problems()["damped-spring-0"], search=(0.1, 0.3), span=10.0)
     assert Integrator.EULER_EXPLICIT.value not in {one.integrator for one in boundaries(free)}
 
 
@@ -104,21 +104,21 @@ def test_the_largest_is_below_everything_that_is_lost(
 
 def test_energy_that_cannot_be_is_instability() -> None:
     """Of all that a swinging chain has, 0.25 J, it had 300 J after 2,000 steps of 7.5 ms."""
-    chain = with_energy_bound(problem_named("chain-balls"))
+    chain = with_energy_bound(all_problems()["chain-balls"])
     rest = 6 * 7 / 2 * 0.1 * 9.81 * 0.1  # J below the pivot when it hangs
     assert chain.energy_bound + rest == pytest.approx(11 * 0.26, rel=0.1)
     found = attempt(chain, Integrator.EULER, 7.5e-3)
     assert found.status is RunStatus.SLOW_GROWTH
     assert found.growth > 1
     assert attempt(chain, Integrator.EULER, 2e-3).stable
-    servo = with_energy_bound(problem_named("stiff-servo-1"))
+    servo = with_energy_bound(all_problems()["stiff-servo-1"])
     assert servo.energy_bound == math.inf, "a motor drives it"
 
 
 def test_all_timesteps_run_for_the_same_time() -> None:
     """A body that leaves its bounds at the end of that time, whatever divides it."""
     free = replace(
-        problem_named("damped-spring-0"),
+        all_problems()["damped-spring-0"],
         mjcf="<mujoco><option gravity='0 0 0'/><worldbody><body><joint type='slide'/>"
         "<geom size='.1'/></body></worldbody></mujoco>",
         scenario=Scenario(0.4, 0.1, (0.0,), (1.0,)),
@@ -131,7 +131,7 @@ def test_all_timesteps_run_for_the_same_time() -> None:
 
 
 def test_growth_beyond_the_boundary_is_that_of_theory() -> None:
-    problem = problem_named("damped-spring-10")
+    problem = all_problems()["damped-spring-10"]
     # −z² − 2ζz + … : the larger root of λ² − (2 − 2ζz − z²) λ + (1 − 2ζz) at z = hω
     z = 1.01 * 2 * (math.sqrt(101) - 10)
     half = 1 - 10 * z - z * z / 2

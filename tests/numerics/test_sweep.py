@@ -118,7 +118,7 @@ def test_what_is_no_parameter_is_told(vary: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:
         swept(f"vary = {vary}")
     assert message in caught.value.message
-    assert caught.value.span is not None and caught.value.span.path == "models/m.toml"
+    assert caught.value.span is not None and caught.value.span.path == "models/a.toml"
 
 
 def test_costs_and_threads_have_intervals() -> None:

@@ -1,6 +1,6 @@
 """The hard cases, one module each.
 
-Entry points: `all_problems()`, `problem_names()`, `problem_named(name)`.
+Entry point: `all_problems()`.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from coursebuild.numerics.problems import (
 
 
 @cache
-def all_problems() -> tuple[Problem, ...]:
-    """Every hard case, by its number."""
+def all_problems() -> dict[str, Problem]:
+    """Every hard case by its name, in the order of their numbers."""
     found = (
         tumbling_box.problem(),
         *pendulum.problems(),
@@ -39,18 +39,4 @@ def all_problems() -> tuple[Problem, ...]:
         *oscillators.problems(),
         *scales.problems(),
     )
-    return tuple(sorted(found, key=lambda problem: problem.case))
-
-
-def problem_names() -> tuple[str, ...]:
-    """Their names, in that order."""
-    return tuple(problem.name for problem in all_problems())
-
-
-def problem_named(name: str) -> Problem:
-    """The problem of this name.
-
-    Raises:
-        KeyError: there is none.
-    """
-    return {problem.name: problem for problem in all_problems()}[name]
+    return {problem.name: problem for problem in sorted(found, key=lambda one: one.case)}

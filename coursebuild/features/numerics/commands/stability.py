@@ -101,10 +101,10 @@ class _CaseRun(MeasuringRun):
 
     def _measured(self, name: str) -> CaseReport | None:
         from coursebuild.numerics.cases import DisagreementError, measure_case
-        from coursebuild.numerics.problems import problem_named
+        from coursebuild.numerics.problems import all_problems
 
         try:
-            return measure_case(problem_named(name), self.here, time.thread_time_ns)
+            return measure_case(all_problems()[name], self.here, time.thread_time_ns)
         except DisagreementError as error:
             why = "neither can be told to be right: no error against them means anything"
             self.failures.append(ReportFailure(str(error), why))
@@ -112,9 +112,9 @@ class _CaseRun(MeasuringRun):
 
 
 def _known() -> tuple[str, ...]:
-    from coursebuild.numerics.problems import problem_names
+    from coursebuild.numerics.problems import all_problems
 
-    return problem_names()
+    return tuple(all_problems())
 
 
 def _chosen(names: tuple[str, ...]) -> list[str]:
