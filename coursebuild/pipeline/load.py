@@ -348,7 +348,7 @@ def _refuse_code(root: Path, course: Course) -> None:
 
 def _check_engine(course: Course, place: OtherEnvironment | None) -> list[Diagnostic]:
     installed = engine_version() if place is None else place.engine
-    if course.engine is None or course.engine_span is None or course.engine == installed:
+    if course.engine in (None, installed):
         return []
     where = "" if course.python is None else f" for `{course.python.path}`"
     message = f"the course is written for MuJoCo {course.engine}, and {installed} is installed"

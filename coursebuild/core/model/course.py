@@ -181,7 +181,10 @@ class Course(Struct, frozen=True):
     licence: str
     engine: str | None
     """The MuJoCo version that the course is written for."""
-    engine_span: Span | None
+    engine_span: Span
+    truth: float | None
+    """Which share of the numbers in the text must be proven."""
+    truth_span: Span
     comparison: Comparison
     filters: tuple[Filter, ...]
     callouts: tuple[CalloutKind, ...]
@@ -203,9 +206,6 @@ class Course(Struct, frozen=True):
     """The interpreter of the scripts, where it is not the one that runs this tool."""
     id: str = ""
     """Names the course where its title may change; see `key`."""
-    truth: float | None = None
-    """Which share of the numbers in the text must be proven."""
-    truth_span: Span | None = None
     pace: Pace | None = None
     width: int = 0
     """Columns of a line of text as `fmt` wraps it; 0: it leaves the author's lines."""

@@ -95,7 +95,7 @@ def test_a_complete_map(newline: str) -> None:
     assert (course.language, course.licence, course.engine) == ("pt-BR", "CC-BY-4.0", "3.14.0")
     assert course.base_url == "https://example.org/course/"
     assert course.repository == "https://example.org/course.git"
-    assert course.engine_span is not None and course.engine_span.text == '"3.14.0"'
+    assert course.engine_span.text == '"3.14.0"'
     assert course.comparison == Comparison(Mode.TOLERANCE, Decimal("1e-6"), Decimal(0), True)
     assert course.filters == (Filter(r"took (\d+) s", r"took \1"),)
     assert course.silences == (
