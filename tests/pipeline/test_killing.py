@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from support.mortal_commands import Mortals, mortal_commands
+from support.published_sites import SPARE
 from support.scratch_course import GOOD, Folder, Make, block
 
 pytestmark = pytest.mark.site
@@ -87,7 +88,7 @@ class Trials:
             name
             for name in (path.relative_to(root).as_posix() for path in root.rglob("*"))
             if any(part in name for part in parts)
-            and (name.startswith(".coursebuild/published/") or not name.startswith(".coursebuild/"))
+            and (name.startswith(f"{SPARE}/") or not name.startswith(".coursebuild/"))
         ]
 
 
