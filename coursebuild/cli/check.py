@@ -87,12 +87,16 @@ def run(arguments: argparse.Namespace) -> int:
         )
 
     # Machines are told how long it took.
-    parts = arguments.shard or arguments.timings or arguments.write_timings
-    more = arguments.sensitivity or arguments.truth or arguments.long
-    if arguments.format != "text" or parts or more:
+    if arguments.format != "text" or arguments.long or _special(arguments):
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
     return run_unless_unchanged(arguments, ("examples",), work)
+
+
+def _special(arguments: argparse.Namespace) -> list[str]:
+    """Those of the options by which it does another work than to verify all, or more."""
+    names = ("shard", "timings", "write_timings", "sensitivity", "truth")
+    return [f"--{name.replace('_', '-')}" for name in names if getattr(arguments, name)]
 
 
 def _against(arguments: argparse.Namespace) -> int:
@@ -100,17 +104,11 @@ def _against(arguments: argparse.Namespace) -> int:
     from coursebuild.pipeline.against import against
     from coursebuild.report.against import against_json, against_text
 
-    for given, what in (
-        (arguments.format not in ("text", "json"), f"--format {arguments.format}"),
-        (arguments.shard, "--shard"),
-        (arguments.timings, "--timings"),
-        (arguments.write_timings, "--write-timings"),
-        (arguments.sensitivity, "--sensitivity"),
-        (arguments.truth, "--truth"),
-        (arguments.sandbox, "--sandbox"),
-    ):
-        if given:
-            raise UsageError(f"--against cannot be combined with {what}")
+    others = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
+    others += _special(arguments)
+    others += ["--sandbox"] if arguments.sandbox else []
+    if others:
+        raise UsageError(f"--against cannot be combined with {others[0]}")
     options = options_of(arguments)
     try:
         report = against(options, tuple(arguments.lessons), arguments.against)

@@ -76,7 +76,7 @@ class FolderWatcher:
             EffectError: changes cannot be watched.
         """
         try:
-            found = self._events.get(timeout=seconds) if seconds > 0 else self._events.get_nowait()
+            found = self._events.get(timeout=max(seconds, 0.0))
         except queue.Empty:
             return frozenset()
         if isinstance(found, OSError):

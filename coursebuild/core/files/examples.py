@@ -165,31 +165,17 @@ class _Update:
     def _look(self, path: str) -> tuple[Obstacle | None, bytes | None]:
         """What stands at a path: an obstacle, or the bytes of a file, or nothing."""
         folders = [at for at, c in enumerate(path) if c == "/"][1:]  # not `examples` itself
-        for end in folders:
-            mode = self._mode(path[:end])
-            if mode is not None and stat.S_ISLNK(mode):
-                return Obstacle.LINK, None
-            if mode is not None and not stat.S_ISDIR(mode):
-                return Obstacle.FOLDER, None
-        mode = self._mode(path)
-        if mode is None:
-            return None, None
-        if stat.S_ISLNK(mode):
-            return Obstacle.LINK, None
-        if not stat.S_ISREG(mode):
-            return Obstacle.FOLDER, None
         try:
+            for end in (*folders, len(path)):
+                mode = os.lstat(f"{self.root}/{path[:end]}").st_mode
+                if stat.S_ISLNK(mode):
+                    return Obstacle.LINK, None
+                if not (stat.S_ISREG if end == len(path) else stat.S_ISDIR)(mode):
+                    return Obstacle.FOLDER, None
             with open(f"{self.root}/{path}", "rb", buffering=0) as file:  # noqa: PTH123
                 return None, file.read()
-        except FileNotFoundError:
-            return None, None
-
-    def _mode(self, path: str) -> int | None:
-        """What stands at a path itself, where a link is a link; `None` for nothing."""
-        try:
-            return os.lstat(f"{self.root}/{path}").st_mode
         except (FileNotFoundError, NotADirectoryError):
-            return None
+            return None, None
 
     def _write(self, path: str) -> None:
         try:

@@ -82,21 +82,20 @@ def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
     os.set_inheritable(reports, False)
     tool = os.getppid()
     supervisor = _Supervisor(jobs, reports, may_fork=bool(fork))
+    status = 0
     try:
         script = supervisor.work()
+        if script is not None:
+            return script
     except SystemExit as end:
-        script, status = None, end.code
+        status = int(end.code or 0)
     except Exception:  # a bug: the tool shows it as what the script has said
         _send(reports, _unstartable(traceback.format_exc()))
-        script, status = None, 70
-    else:
-        status = 0
-    if script is not None:
-        return script
+        status = 70
     # While the tool lives the folder is its own: another supervisor may be about to use it.
     if supervisor.scratch and has_ended(tool):
         remove_folder(supervisor.scratch)
-    os._exit(int(status or 0))
+    os._exit(status)
 
 
 def _alone(job: Job, bare: Collection[str]) -> ScriptProcess:
