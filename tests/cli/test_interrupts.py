@@ -43,7 +43,7 @@ def test_signal_is_heard_where_python_drops_what_is_raised(number: signal.Signal
 
     def refer() -> None:
         one = Referred()
-        one.reference = weakref.ref(one, lambda _: None)  # type: ignore[attr-defined]
+        one.reference = weakref.ref(one, lambda _: None)
         references.append(weakref.ref(one, lambda _: signal.raise_signal(number)))
 
     references: list[weakref.ref[Referred]] = []
@@ -103,7 +103,7 @@ def test_signal_waits_while_a_module_is_imported_or_a_lock_is_held(
     names = {"signal": signal, "number": number, "passed": passed}
     for file in ("<frozen importlib._bootstrap>", "/lib/logging/__init__.py"):
         locked = compile("signal.raise_signal(number)\npassed.append(1)", file, "exec")
-        heard(number, lambda locked=locked: exec(locked, names))  # type: ignore[misc]
+        heard(number, lambda locked=locked: exec(locked, names))
     assert len(passed) == 2
     # Where the tool lies, and who has called it, does not matter.
     for place in ("msgspec/venv/tool.py", "<frozen importlib._bootstrap>"):

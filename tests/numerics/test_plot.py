@@ -164,10 +164,10 @@ def test_steps_stand_in_for_times_that_are_not_there() -> None:
 
 def test_which_error_is_shown() -> None:
     still = [row(position=(1e-11, 1e-11), attitude=(1e-3, 1e-3))]
-    assert telling(scenario(still)).name == "attitude"  # type: ignore[union-attr]
+    assert telling(scenario(still)).name == "attitude"
     report = scenario([row(figure=(1.0, 1.0))], figure="energy (J)")
     assert [one.name for one in quantities(report)] == ["figure", "position", "velocity"]
-    assert telling(report).label == "energy (J)"  # type: ignore[union-attr]
+    assert telling(report).label == "energy (J)"
     assert "error: energy (J)" in texts(drawn(report))
 
 

@@ -1,7 +1,8 @@
-"""The glossary, the index of symbols, backlinks and drawings of lessons, in built sites."""
+"""The glossary, the indexes of symbols and of the search, and drawings, in built sites."""
 
 from __future__ import annotations
 
+import json
 import re
 from html import unescape
 from pathlib import Path
@@ -147,6 +148,14 @@ def test_the_foot_has_both(site: dict[str, str]) -> None:
     foot = site["glossary/index.html"].partition('class="site-more"')[2]
     assert '<a href="index.html" aria-current="page">Glossary</a>' in foot
     assert '<a href="../symbols/index.html">Symbols</a>' in foot
+
+
+def test_the_search_lists_lessons_in_the_order_of_the_course(make: Make) -> None:
+    folder = make("## Swing\n", "## Fall\n", "## Spin\n")
+    assert folder.main("build", "--quiet").status == 0
+    listing = folder.text("public/search/index.js").partition(',"",')[2].rstrip()
+    pages = json.loads(listing[:-1])["pages"]
+    assert [id for _, _, _, id, _ in pages if id] == ["1.1", "1.2", "1.3"]
 
 
 # --- drawings

@@ -82,7 +82,7 @@ FORGOTTEN: list[tuple[Outcome, dict[str, object], str]] = [
 def test_runs_that_another_may_not_repeat_are_not_remembered(desk: Desk) -> None:
     for outcome, fields, why in FORGOTTEN:
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
-        desk.run(outcome=outcome, **fields)  # type: ignore[arg-type]
+        desk.run(outcome=outcome, **fields)
         assert (desk.recall(), desk.why()) == (None, why)
         last = desk.memory().last(PATH)
         assert last is not None and last.kept.outcome is outcome
@@ -94,7 +94,7 @@ def test_another_text_option_or_environment_is_another_result(
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     desk.run()
     for fields in ({"args": ("-v",)}, {"timeout": 20.0}, {"requires": ("numpy",)}):
-        assert desk.recall(replace(JOB, **fields)) is None, fields  # type: ignore[arg-type]
+        assert desk.recall(replace(JOB, **fields)) is None, fields
     assert desk.recall(text=SCRIPT + b"#\n") is None
     monkeypatch.setenv("MUJOCO_GL", "egl")
     assert desk.recall() is None

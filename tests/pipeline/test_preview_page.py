@@ -220,7 +220,7 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
                 page = context.new_page()
                 page.goto(url)
                 (frame,) = page.main_frame.child_frames
-                comes(page, lambda frame=frame: frame.url.startswith("chrome-error:"))  # type: ignore[misc]
+                comes(page, lambda frame=frame: frame.url.startswith("chrome-error:"))
                 said = page.evaluate(STEAL, address)
                 assert set(said.values()) == {"refused"}, said
                 assert page.evaluate("window.draft") == "nothing"
@@ -244,6 +244,6 @@ def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> Non
             see(page.get_by_role("region", name="Problems"))
             page.evaluate(axe)
             for scheme in ("light", "dark"):
-                page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+                page.emulate_media(color_scheme=scheme)
                 found = page.evaluate("rules => axe.run({ runOnly: rules })", rules)
                 assert [(v["id"], v["nodes"][0]["html"]) for v in found["violations"]] == []

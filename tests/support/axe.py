@@ -26,6 +26,6 @@ def violations(page: Page, where: str | None = None) -> list[Any]:
         ("dark", {"runOnly": _CONTRAST}),
         ("light", {"rules": {"color-contrast-enhanced": {"enabled": True}}}),
     ):
-        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.emulate_media(color_scheme=scheme)
         found += [[scheme, *one] for one in page.evaluate(_RUN, [where, options])]
     return found

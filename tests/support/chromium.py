@@ -57,5 +57,5 @@ def launch(playwright: Playwright, *arguments: str) -> Browser:
         context.set_default_timeout(SLOW)
         return context
 
-    browser.new_context = new_context  # type: ignore[method-assign]
+    browser.new_context = new_context
     return browser

@@ -75,7 +75,7 @@ class Desk:
             self.settle()
             during()
         made = ScriptRun(job.path, Outcome.OK, 0, "hello\n", "", 0.5, trace=trace)
-        memory.keep(memory.inputs(job, text), replace(made, **fields))  # type: ignore[arg-type]
+        memory.keep(memory.inputs(job, text), replace(made, **fields))
         memory.store.close()
         return memory
 

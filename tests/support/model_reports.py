@@ -54,7 +54,7 @@ def finding(kind: str = "sensor-unread", **other: object) -> Finding:
         "doubt": "",
         **other,
     }
-    return Finding(**fields)  # type: ignore[arg-type]
+    return Finding(**fields)
 
 
 def diet(*findings: Finding) -> DietReport:
@@ -86,7 +86,7 @@ def run(**other: object) -> ErrorLine:
         **dict.fromkeys(("position", "attitude", "velocity", "energy_drift", "momentum_drift")),
         **other,
     }
-    return ErrorLine(**fields)  # type: ignore[arg-type]
+    return ErrorLine(**fields)
 
 
 def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
@@ -123,7 +123,7 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
         "costs": (StepCost("Euler", Interval(1e-6, 0.9e-6, 1.1e-6)),),
         **other,
     }
-    return CaseReport(**fields)  # type: ignore[arg-type]
+    return CaseReport(**fields)
 
 
 def reports() -> Reports:

@@ -15,7 +15,7 @@ class Open:
     """A page of a preview, and what its console said."""
 
     def __init__(self, browser: Browser, preview: Preview, path: str, **options: object) -> None:
-        self.context = browser.new_context(**options)  # type: ignore[arg-type]
+        self.context = browser.new_context(**options)
         self.page = self.context.new_page()
         self.said: list[str] = []
         self.page.on("console", lambda message: self.said.append(message.text))

@@ -226,7 +226,7 @@ def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Re
                 made.append(runs.get(block.path, ran))
             elif isinstance(block, Recording):
                 comparison = block.comparison or course.comparison
-                verdicts.append(Verdict(block, comparison, status))  # type: ignore[arg-type]
+                verdicts.append(Verdict(block, comparison, status))
             elif isinstance(block, MathBlock):
                 formulas[Formula(block.tex.text, True)] = mathml(block.tex.text, "display")
         for inline in document_inlines(document):

@@ -144,7 +144,7 @@ def test_a_place_that_cannot_be_written(held_back: Path) -> None:
     held_back.chmod(0o500)
     for root in (in_the_way, held_back):
         for text in (b"made", b"made again"):
-            assert Memo(root).get_or_create("kind", KEY, lambda text=text: text) == text  # type: ignore[misc]
+            assert Memo(root).get_or_create("kind", KEY, lambda text=text: text) == text
     assert list(held_back.iterdir()) == [in_the_way]
     held_back.chmod(0o700)
 

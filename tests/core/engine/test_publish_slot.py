@@ -155,7 +155,7 @@ def test_many_files_are_written_as_by_one_process_whatever_becomes_of_the_others
 
     def files(last: bytes) -> list[SiteFile]:
         found: list[SiteFile] = [OutputFile(f"a/{n}", b"%d" % n) for n in range(150)]
-        found += [CachedFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]  # type: ignore[misc]
+        found += [CachedFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]
         found += [CachedFile(f"died {n}", "k", die) for n in range(2)]
         return [*found, OutputFile("last", last)]
 

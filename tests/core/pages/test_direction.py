@@ -73,7 +73,7 @@ def test_finding_quantities_loses_no_character(text: str) -> None:
     assert 0 <= unit_length(text) <= len(text)
 
     for way in ("ltr", "rtl"):
-        html = str(text_html(text, way))  # type: ignore[arg-type]
+        html = str(text_html(text, way))
         assert unescape(re.sub("</?bdi[^>]*>", "", html)) == joined(text)
 
 

@@ -45,7 +45,7 @@ def run(root: Path, server: ScriptServer) -> Run:
     def run_one(code: str | bytes, **options: object) -> ScriptRun:
         data = code if isinstance(code, bytes) else code.encode()
         (root / "examples/x.py").write_bytes(data)
-        (result,) = server.run(root, [job(**options)], parallel=1)  # type: ignore[arg-type]
+        (result,) = server.run(root, [job(**options)], parallel=1)
         return result
 
     return run_one

@@ -53,7 +53,7 @@ def confine(root: Path, home: Path) -> Confine:
         jobs = []
         for number, code in enumerate(codes):
             (root / f"examples/x{number}.py").write_text(TRY + code)
-            jobs.append(ScriptJob(f"examples/x{number}.py", (), 60.0, (), **options))  # type: ignore[arg-type]
+            jobs.append(ScriptJob(f"examples/x{number}.py", (), 60.0, (), **options))
         with ScriptServer(sandbox=require_sandbox(root)) as server:
             return list(server.run(root, jobs, parallel=1))
 

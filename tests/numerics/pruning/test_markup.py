@@ -45,7 +45,7 @@ def test_places_in_an_odd_text() -> None:
     assert found.position(elements[4].start) == (7, 21)
     assert found.data[elements[4].start : elements[4].end].decode().startswith("<geom\tname=")
     assert found.position(found.root.start) == (3, 1)
-    start, end = elements[4].attribute("name").inner  # type: ignore[union-attr]
+    start, end = elements[4].attribute("name").inner
     assert found.data[start:end].decode() == "🎈"
 
 
