@@ -161,7 +161,7 @@ SweepFigure: TypeAlias = Literal[
     "change", "figure", "penetration", "slip", "restitution",
     "residual", "iterations", "cost", "throughput",
 ]  # fmt: skip
-SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
+_SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
 """How a sweep names a share of what the model has."""
 
 
@@ -173,7 +173,7 @@ class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
         dict[
             str,
             tuple[float | str | tuple[float, ...], ...]
-            | Annotated[str, fields.matching(SHARE, "values, or a share: `±1 %`")],
+            | Annotated[str, fields.matching(_SHARE, "values, or a share: `±1 %`")],
         ],
         Meta(description="values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
     ]
