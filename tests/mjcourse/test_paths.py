@@ -250,15 +250,11 @@ def test_modules_code_and_prompts(course: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.site
-def test_code_outside_any_course_says_where_it_looked(tmp_path: Path) -> None:
+def test_code_in_a_folder_that_is_gone_is_in_no_course(tmp_path: Path) -> None:
     code = (
         "from mjcourse import model_path\n"
         "try: model_path('box')\n"
         "except FileNotFoundError as error: print(error)\n"
-    )
-    assert run("-c", code, cwd=tmp_path) == (
-        f"no course for model 'box': no folder at or above {tmp_path} has content/course.toml, "
-        "nor models/ beside examples/"
     )
     gone = f"import os; os.mkdir('x'); os.chdir('x'); os.rmdir({str(tmp_path / 'x')!r})\n"
     assert "no course for model 'box'" in run("-c", gone + code, cwd=tmp_path)

@@ -1,4 +1,4 @@
-"""Links, mentions and images: each leads somewhere."""
+"""Links and mentions that `fixtures/rules` and `fixtures/mistakes` do not show."""
 
 from __future__ import annotations
 
@@ -19,16 +19,13 @@ def findings(first: str, second: str = f"## There {{#there}}\n\n{SCRIPT}") -> li
 
 
 GOOD = (
-    *("lesson:1.2", "lesson:1.2#there", "lesson:1.3", "page:about", "model:box"),
-    *("model:box#facts", "model:box#file", "model:box#box.xml", "model:box#box.L3"),
-    *("model:box#box.L1-L3", "examples/a_b.py", "#here", "#", "1.2-second.md#there"),
-    *("plot.svg", "../lessons/plot.svg#x", "/content/lessons/plot.svg", "../data/a%20b.csv?x"),
-    *("https://example.org/x#y", "mailto:a@example.org", "//example.org/x"),
+    *("model:box#facts", "model:box#file", "model:box#box.xml", "model:box#box.L3", "#"),
+    *("../lessons/plot.svg#x", "../data/a%20b.csv?x", "//example.org/x"),
     *("lesson:1.2#a_b.py", "lesson:1.2#a_b.L2", "lesson:1.2#a_b.L1-L2", "lesson:1.2#a_b.out"),
 )
 BAD = {
-    "link-lesson": ("lesson:4.3", "lesson:4.3#x"),
-    "link-file": ("table.csv", "1.2-scond.md", "../plot.svg", "box.xml"),
+    "link-lesson": ("lesson:4.3#x",),
+    "link-file": ("table.csv", "../plot.svg", "box.xml"),
     "link-anchor": (
         *("#nowhere", "#Here", "lesson:1.2#here", "lesson:1.3#x", "page:about#x"),
         *("1.2-second.md#x", "lesson:1.2#a_b.L3", "lesson:1.2#a_b.L2-L1", "lesson:1.2#a_b.out-2"),
@@ -51,9 +48,7 @@ def test_links_that_lead_nowhere_are_told_at_their_targets(rule: str) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("See Lesson 4.3 and Level 7.\n", ["link-lesson: 4.3", "link-level: 7"]),
         ("See Lessons 1.1, 1.2 and 1.9.\n", ["link-lesson: 1.9"]),
-        ("See Lesson 1.2 and Level 1, and `Lesson 9.9`.\n", []),
         ("> [!note] See Level 7\n> Text.\n", ["link-level: 7"]),
         ("| a |\n| - |\n| Lesson 4.3 |\n", ["link-lesson: 4.3"]),
         ("[a][r]\n\n[r]: lesson:4.3\n", ["link-lesson: lesson:4.3"]),
