@@ -10,9 +10,11 @@ is something to draw.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib
 import threading
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -51,9 +53,9 @@ SUMMARIES, PAGES = "summaries", "pages"
 _MATHML = "mathml"
 """Likewise. One has the formulas of a text: one for each formula would take as long to write as to
 make."""
-ROOM = 6_000_000
-"""Characters of documents that wait to be drawn, some eight bytes each. Further ones are parsed
-again, so that memory does not grow with the course."""
+ROOM = 1_500_000
+"""Characters of documents that wait to be drawn as they are, some twenty bytes each. Further ones
+wait packed, in one byte each: to unpack one takes less time than to parse it again."""
 
 
 class SourceText(Struct, frozen=True):
@@ -190,8 +192,9 @@ class PageReader:
         self._store = store
         self._lock = threading.RLock()
         self._engine: MathEngine | None = None
-        self._waiting: dict[str, tuple[SourceText, _Whole]] = {}
-        """Documents that were read and not drawn yet, by path."""
+        self._waiting: dict[str, tuple[str, _Whole | bytes]] = {}
+        """Documents that were read and not drawn yet, by path, each with the key of its text;
+        packed, where there was no room."""
         self._room = ROOM
         self._renderers: dict[tuple[str, Texts], Renderer] = {}
 
@@ -237,19 +240,24 @@ class PageReader:
             return data
 
     def _keep(self, text: SourceText, whole: _Whole) -> None:
-        """Keep a document until it is drawn, as far as there is room."""
+        """Keep a document until it is drawn."""
         size = len(text.source.text)
         if size <= self._room:
-            self._waiting[text.source.path] = text, whole
+            self._waiting[text.source.path] = text.key, whole
             self._room -= size
+        else:
+            with contextlib.suppress(TypeError):  # a feature's block holds something else
+                self._waiting[text.source.path] = text.key, zlib.compress(encode(whole), 1)
 
     def _whole(self, text: SourceText) -> _Whole:
         """A document with its formulas."""
-        known = self._waiting.pop(text.source.path, None)
-        if known is not None:
-            self._room += len(known[0].source.text)
-            if known[0].key == text.key:
-                return known[1]
+        key, known = self._waiting.pop(text.source.path, ("", None))
+        if isinstance(known, _Whole):
+            self._room += len(known.document.source.text)
+        elif known is not None and key == text.key:
+            known = decode(zlib.decompress(known), _Whole, text.source)
+        if isinstance(known, _Whole) and key == text.key:
+            return known
         from coursebuild.core.syntax.document import parse_document
 
         parsed = parse_document(text.source, text.callouts, lesson=text.lesson)

@@ -19,9 +19,10 @@ pytestmark = pytest.mark.slow
 FEW, MANY = 20, 50
 TEXT = 20_000
 """Bytes of prose in a lesson."""
-SLOPE = 45_000
+SLOPE = 60_000
 """Bytes that a further lesson may take: its text, what others look at in it, names and keys of its
-files; no tree of its prose, of which both courses hold as much as there is room for."""
+files, its packed tree; no tree of its prose, of which both courses hold as much as there is room
+for."""
 
 
 def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
