@@ -26,7 +26,6 @@ from coursebuild.core.pages.folding import imported
 from coursebuild.core.pages.library import Library
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.packages import distributions, module_files
-from coursebuild.core.text.source import text_digest
 from coursebuild.pipeline.documents import Documents
 
 _DIGEST = hashlib.sha256().digest_size * 2
@@ -109,12 +108,11 @@ def _surroundings(
 def _imports(library: Library, documents: Documents) -> Callable[[str], frozenset[str]]:
     """What Python texts import: those of lessons are known."""
     scripts, known = library.scripts, documents.imports
-    found = {scripts[path][0].code.digest: known[path] for path in scripts.keys() & known}
+    found = {scripts[path][0].code.text: known[path] for path in scripts.keys() & known}
 
     def imports(text: str) -> frozenset[str]:
-        digest = text_digest(text)
-        if digest not in found:
-            found[digest] = imported(text)
-        return found[digest]
+        if text not in found:
+            found[text] = imported(text)
+        return found[text]
 
     return imports

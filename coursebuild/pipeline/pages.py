@@ -93,7 +93,7 @@ class Pages:
 
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
-        ids = {path: frozenset(page.ids) for path, page in self._pages.items()}
+        ids = {path: page.ids for path, page in self._pages.items()}
 
         def leads(path: str, anchor: str) -> bool:
             return anchor == "" or has(ids[path], anchor) if path in ids else path in files

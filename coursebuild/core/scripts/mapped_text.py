@@ -23,8 +23,9 @@ from coursebuild.core.model import Filter
 from coursebuild.core.text.patterns import replacements
 
 _LINE_END = re.compile(r"\r\n?|\n")
-# Possessive, and only at the start of a run, so that long runs of white space take linear time.
-_END_OF_LINE = re.compile(r"(?<![^\S\r\n])[^\S\r\n]*+(?:\r\n?|\n|\Z)")
+# Possessive, and only at the start of a run, so that long runs of white space take linear time; not
+# where a line ends in LF alone, as nearly all do.
+_END_OF_LINE = re.compile(r"(?<![^\S\r\n])(?!\n)[^\S\r\n]*+(?:\r\n?|\n|\Z)")
 _EMPTY_LINES = re.compile(r"(?:\A|(?<=[^\n]\n))\n++\Z")
 
 
@@ -76,9 +77,7 @@ class MappedText(Struct, frozen=True):
 
     def substituted(self, pattern: re.Pattern[str], text: str) -> MappedText:
         """The text with another in place of each match."""
-        found = pattern.finditer(self.text)
-        places = {one.span(): text for one in found if one.group() != text}
-        return self.edited(places) if places else self
+        return self.edited({found.span(): text for found in pattern.finditer(self.text)})
 
     def edited(self, places: Mapping[tuple[int, int], str]) -> MappedText:
         """The text with others in places of it, given in order by where they start and end."""
