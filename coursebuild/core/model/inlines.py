@@ -5,6 +5,7 @@ Entry points: the union `Inline`; `plain_text`, `without_links`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -274,18 +275,23 @@ def plain_text(inlines: tuple[Inline, ...]) -> str:
     return "".join(parts)
 
 
-def without_links(inlines: tuple[Inline, ...]) -> tuple[Inline, ...]:
+def without_links(
+    inlines: tuple[Inline, ...], reference: Callable[[Target], str] = lambda target: ""
+) -> tuple[Inline, ...]:
     """Inlines as they may stand inside a link, or on another page than their own.
 
-    Without links, terms, footnotes, raw HTML and pictures, in one line.
+    Without links, terms, footnotes, raw HTML and pictures, in one line. `reference` gives what
+    stands for a link without a text.
     """
     kept: list[Inline] = []
     for inline in inlines:
         match inline:
+            case Link(children=()):
+                kept.append(Text(inline.span, reference(inline.target)))
             case Link() | Term():
-                kept += without_links(inline.children)
+                kept += without_links(inline.children, reference)
             case Emphasis() | Strong() | Strikethrough():
-                kept.append(type(inline)(inline.span, without_links(inline.children)))
+                kept.append(type(inline)(inline.span, without_links(inline.children, reference)))
             case Image():
                 kept.append(Text(inline.span, inline.alt))
             case SoftBreak() | HardBreak():

@@ -2,12 +2,14 @@
 
 Entry point: `document_terms`. Each term gets the sentence that defines it and the next one, as
 HTML. Where they run on into a formula on a line of its own, the formula comes with them. Links lose
-their addresses: the glossary stands elsewhere.
+their addresses, since the glossary stands elsewhere; those to formulas of the document leave their
+numbers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from urllib.parse import unquote
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -20,12 +22,15 @@ from coursebuild.core.model import (
     Math,
     MathBlock,
     Paragraph,
+    Target,
     Term,
+    UrlTarget,
     sibling_groups,
     walk_inlines,
     without_links,
 )
 from coursebuild.core.pages import formulas
+from coursebuild.core.pages.equations import numbered
 from coursebuild.core.pages.html_context import Context
 from coursebuild.core.pages.markup import render_inlines
 from coursebuild.core.text.diagnostics import Parsed
@@ -77,9 +82,14 @@ class _Excerpt(Context):
 
 def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     context = _Excerpt(mathml)
+    equations = numbered(document, mathml).values()
+    names = {f"#{one.id}": f"({one.number})" for one in equations if one.number}
+
+    def reference(target: Target) -> str:
+        return names.get(unquote(target.url), "") if isinstance(target, UrlTarget) else ""
 
     def html(inlines: tuple[Inline, ...]) -> Markup:
-        return render_inlines(without_links(inlines), context)
+        return render_inlines(without_links(inlines, reference), context)
 
     for siblings in sibling_groups(document):
         for number, block in enumerate(siblings):
