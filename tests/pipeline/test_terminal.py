@@ -188,7 +188,7 @@ def test_ctrl_c_ends_a_preview_whatever_it_does(make: Make) -> None:
     folder = make("## One\n\n" + slow("slow.py") + f"```lab\n{json.dumps(lab)}\n```\n")
     ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
     folder.write("models/ball.xml", ball)
-    with terminal(folder, "serve", "--port", "0") as shown:
+    with terminal(folder, "serve", "--port", "0", **SILENT) as shown:
         shown.read("running scripts 0/1")
         shown.type(b"\x03\x03\x03\x03")
         text = shown.read()
