@@ -12,7 +12,8 @@ There are places that such an exception must not come to, or where it is lost:
 3. What Python calls by itself, when an object goes or a process was forked: it drops what is raised
    there, and goes on.
 
-From there the signal comes again a moment later.
+From there the signal comes again a moment later. And a library in C, such as MuJoCo's, may make
+another exception of it, which is made into the one that it was.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ _NOT_IN = "logging/__init__.py"
 
 _own: list[FrameType] = []
 """The caller of `heeded`; what has called that does not matter."""
+_raised: list[type[KeyboardInterrupt]] = []
+"""What was raised since."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -68,9 +71,14 @@ def heeded(*, alone: bool = False) -> Iterator[None]:
     sys.unraisablehook = dropped
     try:
         yield
+    except Exception as error:
+        if _raised:
+            raise _raised[-1] from error
+        raise
     finally:
         sys.unraisablehook = drop
         _own.clear()
+        _raised.clear()
         if alone:
             _hear_no_more(before)
         else:
@@ -82,7 +90,8 @@ def _hear(number: int, frame: FrameType | None) -> None:
     if _must_wait(frame):
         _come_again(number)
     else:
-        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+        _raised.append(Terminated if number == signal.SIGTERM else KeyboardInterrupt)
+        raise _raised[-1]
 
 
 def _hear_no_more(numbers: Iterable[signal.Signals]) -> None:

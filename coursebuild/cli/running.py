@@ -42,6 +42,10 @@ def run(directory: str | None, words: Sequence[str], *, alone: bool) -> int:
     try:
         with heeded(alone=alone):
             return _run(directory, words)
+    except Terminated:
+        return say(TERMINATED, "terminated")
+    except KeyboardInterrupt:
+        return say(INTERRUPTED, "interrupted")
     finally:
         if not alone:
             gc.set_threshold(*collected)
@@ -65,7 +69,3 @@ def _run(directory: str | None, words: Sequence[str]) -> int:
         if lack is None:
             raise
         return fail(WRONG, lack.message, lack.help)
-    except Terminated:
-        return say(TERMINATED, "terminated")
-    except KeyboardInterrupt:
-        return say(INTERRUPTED, "interrupted")

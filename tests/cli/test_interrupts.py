@@ -66,6 +66,19 @@ def test_signal_is_heard_where_python_drops_what_is_raised(number: signal.Signal
 
 
 @numbers
+def test_signal_is_heard_of_which_a_library_makes_another_exception(
+    number: signal.Signals,
+) -> None:
+    def load() -> None:
+        try:
+            signal.raise_signal(number)
+        except KeyboardInterrupt:
+            raise RuntimeError("this error is not expected ever to occur") from None
+
+    heard(number, load)
+
+
+@numbers
 def test_signal_waits_while_msgspec_looks_at_a_type(number: signal.Signals) -> None:
     """What is raised where its C code calls Python would end the process."""
     asked: list[int] = []
