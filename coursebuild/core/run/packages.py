@@ -20,6 +20,8 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import OutputFile
@@ -116,12 +118,17 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
 def _provided(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
     """The distributions, with versions, of each top-level module in these folders."""
     key = _signature(folders)
-    found = None if key is None else store.get_value("installed", key, dict[str, str])
+    # It is no result, so that it holds though all is to be made again.
+    found = None if key is None else store.peek("installed", key, _read)
     if found is None:
         found = _scan(folders)
         if key is not None:
             store.put_value("installed", key, found)
     return found
+
+
+def _read(data: bytes) -> dict[str, str]:
+    return msgspec.json.decode(data, type=dict[str, str])
 
 
 def _signature(folders: Sequence[str]) -> str | None:
