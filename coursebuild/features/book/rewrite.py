@@ -16,8 +16,11 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement
 
 _DROPPED = frozenset(
-    "button form template script style dialog iframe object embed audio video source track".split()
+    "button form template script style dialog iframe object embed audio video source track"
+    " noembed noframes".split()
 )
+_WITHOUT_MARKUP = frozenset(("plaintext", "xmp"))
+"""Elements in which all is text; the first has no end, and would take what follows into it."""
 _NOT_PRINTED = frozenset(("anchor", "bar-tools", "plot-wide", "figure-dark", "qr"))
 """Classes of what is left out: links of headings to themselves, downloads, QR codes; of two
 drawings of a plot the one that small screens cannot show, or that is for dark pages."""
@@ -76,6 +79,8 @@ def _element(element: HtmlElement, rules: Rules) -> HtmlContent:
     }
     if name == "details" and not element.classes & rules.closed:
         attributes["open"] = ""
+    if name in _WITHOUT_MARKUP:
+        name = "pre"
     if len(name) == 2 and name[0] == "h" and name[1] in "123456":
         name = f"h{min(int(name[1]) + rules.lowered, 6)}"
     return HtmlElement(name, attributes, list(rewritten(element.children, rules)))

@@ -45,7 +45,9 @@ def test_of_a_table_the_cells_that_changed() -> None:
     assert found == [("-", "2.5"), ("+", "3.5")]
 
 
-LINES = st.lists(st.text("ab1 ", max_size=6).map(str.rstrip), min_size=1, max_size=6)
+# No digits beside spaces: `1` and ` 1` are the same number, shown as it was recorded.
+LINE = st.text("ab1", max_size=6) | st.text("ab ", max_size=6).map(str.rstrip)
+LINES = st.lists(LINE, min_size=1, max_size=6)
 
 
 @settings(max_examples=50)
