@@ -10,8 +10,9 @@ Entry point: `Documents`, a context manager and the `Parser` of a course, which 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
@@ -149,7 +150,14 @@ class Documents(Parser):
     def _take(self, text: SourceText, summary: DocumentSummary | None) -> None:
         assert summary is not None, "what was just encoded can be decoded"
         self._texts[text.source.path] = text
-        self._summaries[text.source.path] = summary.noted()
+        self._summaries[text.source.path] = summary.noted(partial(self._notes_again, text))
+
+    def _notes_again(self, text: SourceText) -> Mapping[str, bytes]:
+        """The notes of a text of which the store has damaged ones."""
+        self._store.peek(SUMMARIES, text.key, lambda _: None)  # which tells of it
+        summary = decode(self._reader.read(text), DocumentSummary, text.source)
+        assert summary is not None, "what was just encoded can be decoded"
+        return summary.notes
 
     def document(
         self, source: Source, callouts: frozenset[str], *, lesson: bool

@@ -15,7 +15,7 @@ import hashlib
 import importlib
 import threading
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -25,7 +25,6 @@ from coursebuild.core.checks.formulas import document_formulas, formula_findings
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.engine.tool import step_key, typesetter_digest
-from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Document, Script, document_blocks
 from coursebuild.core.model.results import Formula, MathError
@@ -89,24 +88,31 @@ class DocumentSummary(Struct, frozen=True):
     """What features note of it (`Feature.summary`), by their names: each as `encode` gives it."""
     notes_fingerprint: str
 
-    def noted(self) -> DocumentSummary:
-        """With a document that has its notes."""
-        notes = _Notes(self.notes, self.document.source)
+    def noted(self, again: Callable[[], Mapping[str, bytes]]) -> DocumentSummary:
+        """With a document that has its notes; `again` makes them, where some cannot be decoded."""
+        notes = _Notes(self.notes, self.document.source, again)
         return replace(self, document=replace(self.document, summaries=notes))
 
 
 class _Notes(Mapping[str, Struct]):
     """What features note of a document, decoded when it is asked for: after an edit few are."""
 
-    def __init__(self, packed: Mapping[str, bytes], source: Source) -> None:
+    def __init__(
+        self,
+        packed: Mapping[str, bytes],
+        source: Source,
+        again: Callable[[], Mapping[str, bytes]],
+    ) -> None:
         self._packed = packed
         self._source = source
+        self._again = again
 
     def __getitem__(self, feature: str) -> Struct:
         found = decode(self._packed[feature], Struct, self._source)
         if found is None:
-            help = "remove the folder `.coursebuild`"
-            raise EffectError(f"what is kept of {self._source.path} is damaged", help=help)
+            self._packed = self._again()
+            found = decode(self._packed[feature], Struct, self._source)
+        assert found is not None, "what was just encoded can be decoded"
         return found
 
     def __iter__(self) -> Iterator[str]:
