@@ -30,23 +30,26 @@ def examples() -> list[Example]:
     if not SPECIFICATION.is_file():
         pytest.fail(f"no {SPECIFICATION.relative_to(ROOT)}: run `npm ci` in {ROOT / 'site'}")
     text = SPECIFICATION.read_text(encoding="utf-8").replace("→", "\t")
-    found = EXAMPLE.findall(text)
-    return [Example(i, markdown, ended(html)) for i, (markdown, html) in enumerate(found, start=1)]
+    matches = EXAMPLE.findall(text)
+    return [
+        Example(i, markdown, normalize_tags(html))
+        for i, (markdown, html) in enumerate(matches, start=1)
+    ]
 
 
 @pytest.fixture(scope="module")
 def differences() -> dict[int, str]:
     text = (Path(__file__).parent / "differences.toml").read_text(encoding="utf-8")
-    listed: dict[str, str] = tomllib.loads(text)["examples"]
-    return {int(number): reason for number, reason in listed.items()}
+    reasons: dict[str, str] = tomllib.loads(text)["examples"]
+    return {int(number): reason for number, reason in reasons.items()}
 
 
-def rendered(markdown: str) -> str:
+def render(markdown: str) -> str:
     source = Source("spec.md", markdown)
-    return ended(plain_html(parse_document(source, frozenset(), lesson=True).value))
+    return normalize_tags(plain_html(parse_document(source, frozenset(), lesson=True).value))
 
 
-def ended(html: str) -> str:
+def normalize_tags(html: str) -> str:
     """HTML whose tags without content end as ours do."""
     return html.replace(" />", ">")
 
@@ -61,19 +64,19 @@ def test_examples_stay_the_same_when_formatted(examples: list[Example]) -> None:
 
 
 def test_examples(examples: list[Example], differences: dict[int, str]) -> None:
-    wrong = [
-        f"example {e.number}: {e.markdown!r}\n  wanted {e.html!r}\n  got {rendered(e.markdown)!r}"
+    failures = [
+        f"example {e.number}: {e.markdown!r}\n  wanted {e.html!r}\n  got {render(e.markdown)!r}"
         for e in examples
-        if e.number not in differences and rendered(e.markdown) != e.html
+        if e.number not in differences and render(e.markdown) != e.html
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not failures, "\n".join(failures)
 
 
 def test_line_ends_make_no_difference(examples: list[Example]) -> None:
     for line_end in ("\r\n", "\r"):
         for e in examples:
-            html = rendered(e.markdown.replace("\n", line_end))
-            assert html == rendered(e.markdown), f"example {e.number} with {line_end!r}"
+            html = render(e.markdown.replace("\n", line_end))
+            assert html == render(e.markdown), f"example {e.number} with {line_end!r}"
 
 
 def test_listed_differences_differ_and_have_reasons(
@@ -82,4 +85,4 @@ def test_listed_differences_differ_and_have_reasons(
     for number, reason in differences.items():
         assert len(reason) > 20, f"example {number} is listed without a reason"
         example = examples[number - 1]
-        assert rendered(example.markdown) != example.html, f"example {number} does not differ"
+        assert render(example.markdown) != example.html, f"example {number} does not differ"

@@ -17,7 +17,7 @@ from coursebuild.core.syntax.fence import Fence, is_ours
 from coursebuild.core.syntax.info import FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
-from coursebuild.core.text.patterns import matches_nothing, pattern_mistake
+from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
 from coursebuild.core.text.source import Span
 
 FIGURE = "Figure:"
@@ -181,7 +181,7 @@ def _pattern(word: Word | None, diagnostics: list[Diagnostic]) -> str:
         return ""
     pattern = word.value_text.text
     mistake = pattern_mistake(pattern) or pattern_mistake(volatile_pattern(pattern))
-    if mistake is None and not matches_nothing(pattern):
+    if mistake is None and not matches_empty_text(pattern):
         return pattern
     message = "the pattern matches where there is nothing"
     if mistake is not None:

@@ -1,1 +1,1 @@
-"""Texts, places in them, and what is wrong there: sources and spans, rules and diagnostics."""
+"""Sources, spans of their text, the catalogue of rules, and diagnostics."""

@@ -1,4 +1,4 @@
-"""How wide text is where characters stand in columns: on a terminal, in an editor.
+"""The width of text in columns, as on a terminal or in an editor.
 
 Entry point: `cells`.
 """
@@ -11,7 +11,7 @@ TAB = 4
 
 
 def cells(text: str) -> int:
-    """Columns that a text takes."""
+    """The number of columns that a text takes."""
     return sum(map(_cells, text))
 
 

@@ -1,4 +1,4 @@
-"""What the author is told: diagnostics, notes, edits, and the `Parsed` values that carry them.
+"""Messages to the author: diagnostics, their notes and edits, and the `Parsed` values with them.
 
 Entry point: `diagnose(rule, span, message, …)`. A rule is a member of the closed catalogue
 `RULES`; its severity comes from there, so that a rule means the same wherever it
@@ -27,7 +27,7 @@ class Note(Struct, frozen=True):
 
 
 class Edit(Struct, frozen=True):
-    """Replace what stands in `span` by `text`."""
+    """A replacement of the text of `span` by `text`."""
 
     span: Span
     text: str
@@ -42,16 +42,16 @@ class Diagnostic(Struct, frozen=True):
     """The smallest stretch of text that is wrong."""
     message: str
     label: str = ""
-    """What is written beside the marked text."""
+    """A remark beside the marked text."""
     help: str = ""
     """How to mend it."""
     notes: tuple[Note, ...] = ()
     edits: tuple[Edit, ...] = ()
-    """What would mend it, where that is certain enough to be offered."""
+    """A correction, where one is certain enough to be offered."""
 
     @property
     def severity(self) -> Severity:
-        """The rule's."""
+        """The severity of its rule."""
         return RULES[self.rule].severity
 
     @property
@@ -89,14 +89,14 @@ def diagnose(
 
 
 class Parsed(Struct, Generic[T_co], frozen=True):
-    """What a stage made of its input, and what it has to say about it."""
+    """The value that a stage made of its input, and its diagnostics."""
 
     value: T_co
     diagnostics: tuple[Diagnostic, ...] = ()
 
 
-def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
-    """The known name that is most like `name`, if any is alike enough; of several the first.
+def nearest(name: str, names: Iterable[str], *, cutoff: float = 0.6) -> str | None:
+    """The one of `names` that is most like `name`, if any is alike enough; of several the first.
 
     Numbers are never alike: `1.3` is another lesson than `1.2`, not a misspelt one.
     """
@@ -104,25 +104,25 @@ def nearest(name: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
 
     if not any(map(str.isalpha, name)):
         return None
-    found = difflib.get_close_matches(name, sorted(set(known)), n=1, cutoff=cutoff)
-    return found[0] if found else None
+    matches = difflib.get_close_matches(name, sorted(set(names)), n=1, cutoff=cutoff)
+    return matches[0] if matches else None
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A help text that proposes the nearest known name, or lists the names when they are few.
+def did_you_mean(name: str, known_names: Iterable[str]) -> str:
+    """A help text that proposes the nearest known name, or lists the names if they are few.
 
-    May be empty.
+    Empty where they are many and none is near.
     """
-    names = sorted(set(known))
-    near = nearest(name, names)
-    if near is not None:
-        return f"did you mean `{near}`?"
+    names = sorted(set(known_names))
+    likely = nearest(name, names)
+    if likely is not None:
+        return f"did you mean `{likely}`?"
     if names and len(names) <= 12:
         return "known: " + ", ".join(f"`{n}`" for n in names)
     return ""
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """In their total order, each once."""
+    """The diagnostics in their total order, each once."""
     unique = {(d.order, d.help): d for d in diagnostics}
     return tuple(sorted(unique.values(), key=lambda d: d.order))

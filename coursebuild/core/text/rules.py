@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 from msgspec import Struct
 
 HELP = "https://github.com/OWNER/coursebuild/blob/main/docs/reference/rules.md#{}"
-"""Where a rule is explained."""
+"""The address at which a rule is explained."""
 
 
 Severity: TypeAlias = Literal["error", "warning"]
@@ -24,7 +24,7 @@ class Rule(Struct, frozen=True):
     name: str
     severity: Severity
     summary: str
-    """What it means, one sentence, for the catalogue's page."""
+    """Its meaning in one sentence, for the catalogue's page."""
 
 
 _SUMMARIES = {
@@ -214,7 +214,7 @@ _SUMMARIES = {
     "quiz-gate": "A prediction has nothing to hide below it, or no lab to run.",
     "package-reduced": "A QTI package cannot hold a question as its page shows it.",
 }
-"""What each rule means, one sentence."""
+"""The meaning of each rule in one sentence."""
 _WARNINGS = frozenset(
     """
     no-scripts theme-contrast template-outdated heading-skip fence-kind-near fence-unread

@@ -1,4 +1,4 @@
-"""Text with addresses: where a character of a course file stands.
+"""Text with positions: where each character of a course file stands.
 
 Entry points: `Source` (a file's path and text), `Span` (a stretch of it), `Excerpt` (text taken out
 of a source, of which every character still knows its place). Everything else keeps offsets; this is
@@ -33,7 +33,7 @@ def text_digest(text: str) -> bytes:
 
 
 def key_of(*texts: str) -> str:
-    """A name for what is made from these texts: SHA-256, in hexadecimal digits."""
+    """The SHA-256 of some texts in hexadecimal digits: a name for what is made from them."""
     return text_digest("\0".join(texts)).hex()
 
 
@@ -79,11 +79,11 @@ class Source(Struct, frozen=True, dict=True):
         return Span(self, start, len(self.text) if end is None else end)
 
     def excerpt(self, line_end: str = r"\r\n|\r") -> Excerpt:
-        """The whole text, in which line ends that match become LF."""
+        """The whole text, with LF in place of each match of `line_end`."""
         whole = Excerpt.of_span(self.span())
-        ends = [end.span() for end in re.finditer(line_end, self.text)]
-        starts, stops = (0, *(b for _, b in ends)), (*(a for a, _ in ends), len(self.text))
-        return Excerpt.join([whole.slice(a, b) for a, b in zip(starts, stops, strict=True)], "\n")
+        breaks = [match.span() for match in re.finditer(line_end, self.text)]
+        starts, ends = (0, *(b for _, b in breaks)), (*(a for a, _ in breaks), len(self.text))
+        return Excerpt.join([whole.slice(a, b) for a, b in zip(starts, ends, strict=True)], "\n")
 
 
 class Span(Struct, frozen=True):
@@ -95,7 +95,7 @@ class Span(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """What stands there."""
+        """The text of the span."""
         return self.source.text[self.start : self.end]
 
     @property
@@ -115,26 +115,26 @@ class Span(Struct, frozen=True):
 
     @property
     def end_line(self) -> int:
-        """Line of the end."""
+        """Line of the end, from 1."""
         return self.source.position(self.end)[0]
 
     @property
     def end_column(self) -> int:
-        """Column just past the last character."""
+        """Column just past the last character, from 1."""
         return self.source.position(self.end)[1]
 
-    def to(self, other: Span) -> Span:
+    def to(self, last: Span) -> Span:
         """The span from the start of this one to the end of another."""
-        return Span(self.source, self.start, max(self.end, other.end))
+        return Span(self.source, self.start, max(self.end, last.end))
 
     def first_line(self) -> Span:
         """The part of this span that lies on its first line (for messages about long blocks)."""
         end = self.start + len(_NEWLINE.split(self.text, maxsplit=1)[0])
         return Span(self.source, self.start, end)
 
-    def contains(self, other: Span) -> bool:
-        """Whether the other span lies inside this one."""
-        return self.source is other.source and self.start <= other.start and other.end <= self.end
+    def contains(self, inner: Span) -> bool:
+        """Whether another span lies inside this one."""
+        return self.source is inner.source and self.start <= inner.start and inner.end <= self.end
 
 
 def _text_offset(piece: tuple[int, int]) -> int:
@@ -160,7 +160,7 @@ class Excerpt(Struct, frozen=True):
         return cls(span.source, span.text, ((0, span.start),))
 
     @classmethod
-    def join(cls, parts: Sequence[Excerpt], between: str = "") -> Excerpt:
+    def join(cls, parts: Sequence[Excerpt], separator: str = "") -> Excerpt:
         """Excerpts of one source, at least one, put together."""
         pieces: list[tuple[int, int]] = []
         at, shift = 0, None
@@ -169,8 +169,8 @@ class Excerpt(Struct, frozen=True):
                 if offset - at - start != shift:
                     shift = offset - at - start
                     pieces.append((at + start, offset))
-            at += len(part.text) + len(between)
-        return cls(parts[0].source, between.join([part.text for part in parts]), tuple(pieces))
+            at += len(part.text) + len(separator)
+        return cls(parts[0].source, separator.join([part.text for part in parts]), tuple(pieces))
 
     def offset(self, at: int) -> int:
         """Source offset of the character at text offset `at`."""
@@ -199,9 +199,9 @@ class Excerpt(Struct, frozen=True):
 
     def lines(self) -> tuple[Excerpt, ...]:
         """The excerpt's lines, without their line ends."""
-        out: list[Excerpt] = []
-        at = 0
+        lines: list[Excerpt] = []
+        start = 0
         for text in self.text.split("\n"):
-            out.append(self.slice(at, at + len(text)))
-            at += len(text) + 1
-        return tuple(out)
+            lines.append(self.slice(start, start + len(text)))
+            start += len(text) + 1
+        return tuple(lines)

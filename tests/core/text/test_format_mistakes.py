@@ -1,9 +1,9 @@
-"""Mistakes whose place only a whole course shows; and the good cases beside them.
+"""Mistakes that only a whole course shows, and good cases that resemble them.
 
 The cases are fixtures in `tests/fixtures/mistakes/`. Where a mistake is expected its place is
 marked in the input by `‸`, which is taken out before the course is written; the expected text is
-the rule. A case whose expected text is empty must be found good. Words are tested elsewhere: those
-of each rule in `fixtures/rules`, those of each parser in `tests/core/syntax`.
+the rule. A case whose expected text is empty must give no diagnostic. The wording is tested
+elsewhere: of each rule in `fixtures/rules`, of each parser in `tests/core/syntax`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
         yield workshop
 
 
-def marked(layout: Layout) -> list[tuple[str, int, int]]:
+def take_marks(layout: Layout) -> list[tuple[str, int, int]]:
     """Take the marks out of the files, and give their places."""
     places = []
     for path, data in layout.files.items():
@@ -44,23 +44,26 @@ def marked(layout: Layout) -> list[tuple[str, int, int]]:
     return sorted(places)
 
 
-def expected(case: Case, marks: list[tuple[str, int, int]]) -> list[str]:
-    """The rules of a case, those of a mark in a line; `rule PATH:LINE:COLUMN` needs no mark."""
-    places, left = [], list(marks)
+def expected_rules(case: Case, marks: list[tuple[str, int, int]]) -> list[str]:
+    """The rules that a case expects, with their places.
+
+    Each line has the rules of one mark. A line `rule PATH:LINE:COLUMN` needs no mark.
+    """
+    places, unused_marks = [], list(marks)
     for line in case.expected.splitlines():
         if ":" in line:
             places.append(line)
         else:
-            path, row, column = left.pop(0)
+            path, row, column = unused_marks.pop(0)
             places += [f"{rule} {path}:{row}:{column}" for rule in line.split()]
-    assert not left, f"{case.title}: a mark without a rule"
+    assert not unused_marks, f"{case.title}: a mark without a rule"
     return places
 
 
-def compared(case: Case, root: Path, workshop: Workshop) -> str | None:
-    """How what is found differs from what is expected, if it does."""
+def compare(case: Case, root: Path, workshop: Workshop) -> str | None:
+    """How the rules found in a case differ from those expected, if they do."""
     layout = Layout.of(case.input)
-    wanted = expected(case, marked(layout))
+    expected = expected_rules(case, take_marks(layout))
     layout.write(root)
     if layout.later:
         check(workshop.options(root))
@@ -69,15 +72,15 @@ def compared(case: Case, root: Path, workshop: Workshop) -> str | None:
         diagnostics = workshop.try_labs(root)
     else:
         diagnostics = check(workshop.options(root)).diagnostics
-    found = [f"{d.rule} {d.span.path}:{d.span.line}:{d.span.column}" for d in diagnostics]
-    # What stands at one place is told in any order.
-    if sorted(found) == sorted(wanted) and [*map(place, found)] == [*map(place, wanted)]:
+    rules = [f"{d.rule} {d.span.path}:{d.span.line}:{d.span.column}" for d in diagnostics]
+    # The diagnostics of one place may come in any order.
+    if sorted(rules) == sorted(expected) and [*map(place_of, rules)] == [*map(place_of, expected)]:
         return None
-    return f"line {case.line}, {case.title}: {found}, not {wanted}"
+    return f"line {case.line}, {case.title}: {rules}, not {expected}"
 
 
-def place(told: str) -> str:
-    return told.partition(" ")[2]
+def place_of(rule: str) -> str:
+    return rule.partition(" ")[2]
 
 
 @pytest.mark.parametrize(
@@ -87,5 +90,5 @@ def test_mistakes_are_told_once_at_their_places(
     path: Path, workshop: Workshop, tmp_path: Path
 ) -> None:
     cases = read_cases(path)
-    wrong = [compared(case, tmp_path / str(case.line), workshop) for case in cases]
-    assert [one for one in wrong if one is not None] == []
+    failures = [compare(case, tmp_path / str(case.line), workshop) for case in cases]
+    assert [failure for failure in failures if failure is not None] == []

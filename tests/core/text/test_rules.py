@@ -1,9 +1,9 @@
 """What an author sees of each rule: `tests/fixtures/rules/<rule>.md`, compared to the letter.
 
-A case names a smallest course that breaks the rule (see `support.rule_cases`) and all diagnostics
+A case holds a smallest course that breaks the rule (see `support.rule_cases`) and all diagnostics
 that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
-command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 1 s]` say which
-engine tries the labs, for what no course can bring about, or not in time.
+command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 1 s]` change
+the engine that tries the labs, for mistakes that no course can make happen, or not soon enough.
 `pytest tests/core/text --rewrite-fixtures` writes the expected parts and
 `docs/reference/rules.md` anew.
 """
@@ -31,7 +31,7 @@ from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop, parts
 from support.rule_catalogue import Example, ExampleFile, catalogue_page
 
-installed_features()  # which bring rules of their own
+installed_features()  # they add their own rules
 
 ROOT = Path(__file__).parents[3]
 FIXTURES = ROOT / "tests/fixtures/rules"
@@ -39,9 +39,9 @@ PAGE = ROOT / "docs/reference/rules.md"
 FILES = {path.stem: path for path in sorted(FIXTURES.glob("*.md"))}
 CASES = {name: read_cases(path) for name, path in FILES.items()}
 SENTENCE = re.compile(r"(?!MuJoCo|JavaScript|Markdown|Python)[A-Z][a-z]")
-TOLD = re.compile(r"^(error|warning)\[([a-z-]+)\]: ", re.MULTILINE)
+MESSAGE = re.compile(r"^(error|warning)\[([a-z-]+)\]: ", re.MULTILINE)
 RUN = re.compile(r"file=examples/|models/|```mjcf|```lab")
-"""In a course of which something is run or compiled."""
+"""Marks of a course with something to run or compile."""
 
 
 class ChangedEngine:
@@ -60,10 +60,10 @@ class ChangedEngine:
         return {**reply, "version": self._version[1]} if self._version else reply
 
 
-def command(case: Case) -> str:
+def command_of(case: Case) -> str:
     """The command that a case is for."""
-    found = re.search(r"\[((?:check|update|build|export)[\w -]*)\]", case.title)
-    return found[1] if found else "check"
+    match = re.search(r"\[((?:check|update|build|export)[\w -]*)\]", case.title)
+    return match[1] if match else "check"
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +72,9 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
         yield workshop
 
 
-def told(case: Case, root: Path, workshop: Workshop) -> str:
-    """All that the tool says of a case, without colours."""
-    diagnostics = found_in(case, root, workshop)
+def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:
+    """All that the tool prints of a case, without colours."""
+    diagnostics = run_case(case, root, workshop)
     text = "\n\n".join(diagnostic_text(d, Style()) for d in diagnostics)
     assert str(root) not in text, "a message names a folder of this machine"
     # Which part of a line a traceback underlines is different in each version of Python.
@@ -82,16 +82,16 @@ def told(case: Case, root: Path, workshop: Workshop) -> str:
     return without_page_lines(text) + "\n"
 
 
-def found_in(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ...]:
+def run_case(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ...]:
     layout = Layout.of(case.input)
     layout.write(root)
     options = workshop.options(root)
     if layout.later:
         check(options)
         layout.write_later(root)
-    if "```lab" in case.input and command(case) == "check":
+    if "```lab" in case.input and command_of(case) == "check":
         return workshop.try_labs(root, lambda engine: ChangedEngine(engine, case.title))
-    match command(case):
+    match command_of(case):
         case "check":
             return check(options).diagnostics
         case "check --truth":
@@ -104,12 +104,12 @@ def found_in(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ..
             return build(options, Path("public")).diagnostics
         case "export qti":
             return export(options, "qti", None).diagnostics
-        case other:
-            raise ValueError(f"no command {other!r}")
+        case name:
+            raise ValueError(f"no command {name!r}")
 
 
 def without_page_lines(text: str) -> str:
-    """Lines of a built page depend on its template, which is not what these fixtures are about."""
+    """Replace line numbers of built pages: they depend on templates, which are not tested here."""
     text = re.sub(r"(?<= public/)(\S+\.html):\d+:\d+", r"\1:LINE:COLUMN", text)
     if ":LINE:COLUMN" in text:
         text = re.sub(r"^ *\d+ \| ", "LINE | ", text, flags=re.MULTILINE)
@@ -118,7 +118,7 @@ def without_page_lines(text: str) -> str:
 
 
 def tier(name: str) -> tuple[pytest.MarkDecorator, ...]:
-    """The mark of a rule whose cases need an engine, or run something."""
+    """The pytest marks of a rule whose cases need an engine, or run something."""
     text = "".join(case.title + case.input for case in CASES[name])
     if "```lab" in text:
         return (pytest.mark.engine,)
@@ -129,14 +129,16 @@ def tier(name: str) -> tuple[pytest.MarkDecorator, ...]:
 def test_what_the_author_sees(
     name: str, workshop: Workshop, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    found = []
+    new_cases = []
     for number, case in enumerate(CASES[name]):
-        found.append(replace(case, expected=told(case, tmp_path / str(number), workshop)))
+        new_cases.append(
+            replace(case, expected=print_diagnostics(case, tmp_path / str(number), workshop))
+        )
     if request.config.getoption("--rewrite-fixtures"):
-        rewrite(FILES[name], found)
-        CASES[name] = found
-    for case, now in zip(CASES[name], found, strict=True):
-        assert now.expected == case.expected, f"{FILES[name].name}:{case.line}: {case.title}"
+        rewrite(FILES[name], new_cases)
+        CASES[name] = new_cases
+    for case, new_case in zip(CASES[name], new_cases, strict=True):
+        assert new_case.expected == case.expected, f"{FILES[name].name}:{case.line}: {case.title}"
 
 
 def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
@@ -144,27 +146,28 @@ def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
 
 
 def test_each_case_of_a_fixture_shows_its_rule() -> None:
-    shown = {name for name, cases in CASES.items() if any(case.expected.strip() for case in cases)}
-    assert sorted(CASES.keys() - shown) == [], "they show nothing"
+    names = {name for name, cases in CASES.items() if any(case.expected.strip() for case in cases)}
+    assert sorted(CASES.keys() - names) == [], "they show nothing"
     # A case without a message is one that looks like the mistake and is none.
-    wrong = [
+    failures = [
         f"{name}:{case.line}: {case.title}"
         for name, cases in CASES.items()
         for case in cases
-        if case.expected.strip() and (RULES[name].severity, name) not in TOLD.findall(case.expected)
+        if case.expected.strip()
+        and (RULES[name].severity, name) not in MESSAGE.findall(case.expected)
     ]
-    assert wrong == []
+    assert failures == []
 
 
 def test_messages_keep_the_style_of_the_house() -> None:
     """Lower case, no full stop; help too."""
-    wrong = []
+    failures = []
     for name, cases in CASES.items():
         for line in "".join(case.expected for case in cases).splitlines():
-            said = re.match(r"(?:(?:error|warning)\[[a-z-]+\]| *= help): (.*)", line)
-            if said and (SENTENCE.match(said[1]) or re.search(r"(?<!\.)\.$", said[1])):
-                wrong.append(f"{name}: {line}")
-    assert wrong == []
+            text = re.match(r"(?:(?:error|warning)\[[a-z-]+\]| *= help): (.*)", line)
+            if text and (SENTENCE.match(text[1]) or re.search(r"(?<!\.)\.$", text[1])):
+                failures.append(f"{name}: {line}")
+    assert failures == []
 
 
 def test_the_page_of_rules_is_in_step(request: pytest.FixtureRequest) -> None:
@@ -178,13 +181,13 @@ def test_the_page_of_rules_is_in_step(request: pytest.FixtureRequest) -> None:
 def example(case: Case) -> Example:
     """A case as the page of rules shows it."""
     return Example(
-        command(case),
-        tuple(shown(kind, path, body) for kind, path, body in parts(case.input)),
+        command_of(case),
+        tuple(example_file(kind, path, body) for kind, path, body in parts(case.input)),
         case.expected.rstrip("\n"),
     )
 
 
-def shown(kind: str, path: str, body: str) -> ExampleFile:
+def example_file(kind: str, path: str, body: str) -> ExampleFile:
     """A file of an input as the page of rules shows it."""
     match kind:
         case "later":

@@ -13,13 +13,13 @@ SELDOM = "sec metres ft psi eV Å rev/min rpm turn Nm µm \u2126 ‰".split()
 WRONG = ("(m", "m//s", "m^", "m**2", "2 m", "9**9**9 m", "m^99999999", "$", "m" * 200, "1/", "/")
 
 
-def told(unit: str) -> list[str]:
+def messages(unit: str) -> list[str]:
     source = Source("lesson.md", unit)
     return [f"{d.span.text}: {d.help}" for d in check_unit(Excerpt.of_span(source.span()))]
 
 
 def test_units_that_there_are() -> None:
-    assert {unit: told(unit) for unit in (*USUAL, *SELDOM) if told(unit)} == {}
+    assert {unit: messages(unit) for unit in (*USUAL, *SELDOM) if messages(unit)} == {}
 
 
 def test_what_is_no_unit_is_told_with_the_likely_one() -> None:
@@ -27,7 +27,7 @@ def test_what_is_no_unit_is_told_with_the_likely_one() -> None:
         **{"mtr": "m", "metr": "m", "radd/s": "rad", "rads": "rad", "KG": "kg", "hz": "Hz"},
         **{"kgm²": "kg m", "secnd": "s", "Newtons": "N"},
     }
-    for unit, meant in likely.items():
-        assert [one.partition(": ")[2] for one in told(unit)] == [f"did you mean `{meant}`?"], unit
-    assert told("strides") == ["strides: leave it out, and say in words what is counted"]
-    assert [unit for unit in WRONG if not told(unit)] == []
+    for word, unit in likely.items():
+        assert [m.partition(": ")[2] for m in messages(word)] == [f"did you mean `{unit}`?"], word
+    assert messages("strides") == ["strides: leave it out, and say in words what is counted"]
+    assert [unit for unit in WRONG if not messages(unit)] == []
