@@ -1,6 +1,6 @@
 """Fences, directives and callouts of other tools as Markdown of coursebuild.
 
-Entry point: `block_text`.
+Entry point: `convert_segment`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.marks import fence, quoted
 from coursebuild.core.registry import CORE_FENCES, fence_names
-from coursebuild.features.importer.cells import shown_text
+from coursebuild.features.importer.cells import code_for_readers
 from coursebuild.features.importer.context import LessonContext
-from coursebuild.features.importer.prose import displayed, rewrite
+from coursebuild.features.importer.prose import display_formula, rewrite_prose
 from coursebuild.features.importer.segments import read_markdown
 from coursebuild.features.importer.values import Segment, read_yaml
 
@@ -30,7 +30,7 @@ _CALLOUTS = {
     **dict.fromkeys(("answer", "success"), "solution"),
 }
 _TITLED = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
-"""Directives whose argument is a title, and not the first line."""
+"""Directives whose argument is a title; that of others is their first line."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
 _TITLE = re.compile(r"title=(?:\"([^\"]*)\"|'([^']*)')")
 _OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
@@ -39,69 +39,75 @@ _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
 _QUOTED_KIND = re.compile(r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(\])", re.MULTILINE)
 
 
-def block_text(segment: Segment, context: LessonContext) -> str:
-    """A segment that is no cell, as Markdown."""
+def convert_segment(segment: Segment, context: LessonContext) -> str:
+    """Return a segment outside cells, or a cell within another block, as Markdown."""
     if segment.kind == "prose":
-        text = rewrite(segment.text, context, segment.place)
-        return _QUOTED_KIND.sub(lambda m: m[1] + _kind(m[2], context) + m[3], text)
+        text = rewrite_prose(segment.text, context, segment.place)
+        return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
     if segment.kind == "cell":
-        context.leave(segment.place, "a cell inside another block is shown and not run")
-        return fence("python fragment", shown_text(segment))
+        context.add_leftover(segment.place, "a cell inside another block is shown and not run")
+        return fence("python fragment", code_for_readers(segment))
     directive = _DIRECTIVE.fullmatch(segment.head)
     if directive is not None:
-        return _directive(directive["name"], directive["argument"], segment, context)
+        return _convert_directive(directive["name"], directive["argument"], segment, context)
     match segment.mark[0]:
         case ":":
-            return _div(segment, context)
+            return _convert_div(segment, context)
         case "!" | "?":
             name, _, title = segment.head.partition(" ")
-            return _callout(name, title.strip().strip('"'), segment.text, segment, context)
+            return _write_callout(name, title.strip().strip('"'), segment.text, segment, context)
         case _:
-            return _fence(segment, context)
+            return _convert_fence(segment, context)
 
 
-def _inside(text: str, segment: Segment, context: LessonContext) -> str:
+def _convert_nested(text: str, segment: Segment, context: LessonContext) -> str:
     parts = read_markdown(text, place=segment.place)
-    return "\n\n".join(block_text(part, context).strip("\n") for part in parts)
+    return "\n\n".join(convert_segment(part, context).strip("\n") for part in parts)
 
 
-def _kind(kind: str, context: LessonContext) -> str:
-    known = _CALLOUTS.get(kind.lower())
-    if known is None:
+def _callout_kind(kind: str, context: LessonContext) -> str:
+    callout_kind = _CALLOUTS.get(kind.lower())
+    if callout_kind is None:
         context.callouts[kind.lower()] = kind.replace("-", " ").capitalize()
-    return known or kind.lower()
+    return callout_kind or kind.lower()
 
 
-def _callout(
-    kind: str, title: str, text: str, segment: Segment, context: LessonContext, *, folded: str = ""
+def _write_callout(
+    kind: str,
+    title: str,
+    text: str,
+    segment: Segment,
+    context: LessonContext,
+    *,
+    fold_mark: str = "",
 ) -> str:
-    title = rewrite(title, context, segment.place)
-    head = f"[!{_kind(kind, context)}]{folded} {title}".rstrip()
-    return quoted(f"{head}\n{_inside(text, segment, context)}".rstrip("\n"))
+    title = rewrite_prose(title, context, segment.place)
+    head = f"[!{_callout_kind(kind, context)}]{fold_mark} {title}".rstrip()
+    return quoted(f"{head}\n{_convert_nested(text, segment, context)}".rstrip("\n"))
 
 
-def _div(segment: Segment, context: LessonContext) -> str:
-    """What stands between lines of colons."""
+def _convert_div(segment: Segment, context: LessonContext) -> str:
+    """Convert a block between lines of colons: a callout of Quarto, or a plain division."""
     kind = re.search(r"callout-(\w+)", segment.head)
     text = segment.text
     if kind is None:
-        return _inside(text, segment, context)
-    titled = _TITLE.search(segment.head)
-    title = (titled[1] or titled[2] or "") if titled else ""
+        return _convert_nested(text, segment, context)
+    attribute = _TITLE.search(segment.head)
+    title = (attribute[1] or attribute[2] or "") if attribute else ""
     heading = re.match(r"\s*#{1,6}[ \t]+(.*)\n?", text)
     if not title and heading is not None:
         title, text = heading[1].strip(), text[heading.end() :]
-    folded = "-" if re.search(r"collapse=\"?true", segment.head) else ""
-    return _callout(kind[1], title, text, segment, context, folded=folded)
+    fold_mark = "-" if re.search(r"collapse=\"?true", segment.head) else ""
+    return _write_callout(kind[1], title, text, segment, context, fold_mark=fold_mark)
 
 
-def _options_of(text: str) -> tuple[Mapping[str, str], str]:
-    """The options at the beginning of a directive (`:name: value`, or YAML), and the rest."""
+def _split_options(text: str) -> tuple[Mapping[str, str], str]:
+    """Return the options that begin a directive (`:name: value`, or YAML), and its other lines."""
     if text.startswith("---\n") and "\n---" in text[4:]:
         head, _, rest = text[4:].partition("\n---")
-        found = read_yaml(head)
-        options = found if isinstance(found, dict) else {}
-        return {str(key): str(value) for key, value in options.items()}, rest.lstrip("-\n")
+        value = read_yaml(head)
+        options = value if isinstance(value, dict) else {}
+        return {str(name): str(option) for name, option in options.items()}, rest.lstrip("-\n")
     options, lines = {}, text.split("\n")
     while lines and (option := _OPTION.fullmatch(lines[0].strip())) is not None:
         options[option[1]] = option[2]
@@ -109,56 +115,56 @@ def _options_of(text: str) -> tuple[Mapping[str, str], str]:
     return options, "\n".join(lines)
 
 
-def _directive(name: str, argument: str, segment: Segment, context: LessonContext) -> str:
-    options, text = _options_of(segment.text)
+def _convert_directive(name: str, argument: str, segment: Segment, context: LessonContext) -> str:
+    options, text = _split_options(segment.text)
     place = segment.place
     match name:
         case "math":
             tex = "\n".join(part for part in (argument, text) if part.strip())
-            return displayed(tex, options.get("label", options.get("name", "")))
+            return display_formula(tex, options.get("label", options.get("name", "")))
         case "figure" | "image":
-            caption = "\n\n" + _inside(text, segment, context) if text.strip() else ""
+            caption = "\n\n" + _convert_nested(text, segment, context) if text.strip() else ""
             alt = options.get("alt", "")
-            return rewrite(f"![{alt}]({argument.strip()})", context, place) + caption
+            return rewrite_prose(f"![{alt}]({argument.strip()})", context, place) + caption
         case "code" | "code-block" | "sourcecode":
             return fence(argument or "text", text)
         case "tableofcontents" | "toctree" | "contents":
             return ""  # the map says it
         case "epigraph" | "pull-quote" | "blockquote":
-            return quoted(_inside(text, segment, context))
+            return quoted(_convert_nested(text, segment, context))
         case "div" | "container" | "card" | "grid" | "grid-item" | "tab-set" | "tab-item":
-            return _inside(text, segment, context)
+            return _convert_nested(text, segment, context)
         case _ if name in _CALLOUTS:
-            folded = "-" if "dropdown" in options.get("class", name) else ""
+            fold_mark = "-" if "dropdown" in options.get("class", name) else ""
             title = argument if name in _TITLED else ""
             text = text if title else f"{argument}\n{text}"
-            return _callout(name, title, text, segment, context, folded=folded)
-        case _ if name in _languages():
-            context.leave(place, f"a block of `{name}` is shown and not run")
+            return _write_callout(name, title, text, segment, context, fold_mark=fold_mark)
+        case _ if name in _highlighted_languages():
+            context.add_leftover(place, f"a block of `{name}` is shown and not run")
             return fence(name, text)
         case _:
-            what = f"the directive `{{{name}}}`, whose text is shown as it was written"
-            context.leave(place, what)
+            message = f"the directive `{{{name}}}`, whose text is shown as it was written"
+            context.add_leftover(place, message)
             return fence("text", f"{argument}\n{text}".strip("\n"))
 
 
 @functools.cache
-def _languages() -> frozenset[str]:
-    """Names of languages that are highlighted."""
+def _highlighted_languages() -> frozenset[str]:
+    """The names of the languages that can be highlighted."""
     from pygments.lexers import get_all_lexers
 
     return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)
 
 
-def _fence(segment: Segment, context: LessonContext) -> str:
+def _convert_fence(segment: Segment, context: LessonContext) -> str:
     head, text = segment.head, segment.text
     kind = head.partition(" ")[0]
     if kind == "lab" and context.camera_is_position:
-        text = _CAMERA.sub(_directed, text)
+        text = _CAMERA.sub(_reverse_camera, text)
     if kind not in (*CORE_FENCES, *fence_names()):
         head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
         if head != "json" and _is_json(text):
-            context.leave(segment.place, f"a block `{head}`, which is shown as JSON")
+            context.add_leftover(segment.place, f"a block `{head}`, which is shown as JSON")
             head = "json"
     return fence(head, text)
 
@@ -170,11 +176,11 @@ def _is_json(text: str) -> bool:
         return False
 
 
-def _directed(camera: re.Match[str]) -> str:
-    """A camera by its direction: the other way round."""
+def _reverse_camera(camera: re.Match[str]) -> str:
+    """Turn a camera given by its position into one given by the direction it looks in."""
 
-    def turned(match: re.Match[str]) -> str:
+    def reverse_angle(match: re.Match[str]) -> str:
         angle = float(match[3])
         return f"{match[1]}{angle % 360 - 180 if match[2] == 'azimuth' else -angle:g}"
 
-    return _ANGLE.sub(turned, camera[0])
+    return _ANGLE.sub(reverse_angle, camera[0])

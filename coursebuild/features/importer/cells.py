@@ -1,6 +1,6 @@
 """Cells of Python, which share their names, as one script of a lesson.
 
-Entry points: `script_of`, `shown_text`.
+Entry points: `build_script`, `code_for_readers`.
 
 Scripts of coursebuild are complete. So all cells of a lesson become one script, which stands where
 the last of them stood; the ones before are shown where they stood, as parts of it.
@@ -16,74 +16,79 @@ from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.values import Segment
 
 _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
-"""Of Quarto, and of MyST."""
-_DEFINES = re.compile(r"(?:@|(?:async )?def |class )")
-_TIMED = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
-_SHOWS = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
+"""An option of a cell, as Quarto and as MyST write it."""
+_DEFINITION = re.compile(r"(?:@|(?:async )?def |class )")
+_TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
+_FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
-def script_of(
+def build_script(
     cells: Sequence[Segment], title: str, context: LessonContext
 ) -> tuple[str, list[int]]:
-    """The script, and the numbers of the cells that it runs."""
-    codes = {number: _code(cell, context).strip() for number, cell in enumerate(cells)}
-    run = [number for number, code in codes.items() if code]
+    """Return the script, and the numbers of the cells that are part of it."""
+    codes = {number: _runnable_code(cell, context).strip() for number, cell in enumerate(cells)}
+    numbers = [number for number, code in codes.items() if code]
     summary = re.sub(r'[\\"]', "", title).strip().rstrip(".") or "The cells of this lesson"
     script = f'"""{summary}."""\n'
     before = ""
-    for number in run:
-        apart = before.split("\n")[-1].startswith((" ", "\t")) or _DEFINES.match(codes[number])
-        script += ("\n\n" if before and apart else "\n") + codes[number] + "\n"
+    for number in numbers:
+        is_apart = before.split("\n")[-1].startswith((" ", "\t")) or _DEFINITION.match(
+            codes[number]
+        )
+        script += ("\n\n" if before and is_apart else "\n") + codes[number] + "\n"
         before = codes[number]
-    return script, run
+    return script, numbers
 
 
-def shown_text(cell: Segment) -> str:
-    """The code of a cell as readers are shown it."""
+def code_for_readers(cell: Segment) -> str:
+    """Return a cell's code without the lines that only its tool understands."""
     return _MAGIC.sub("", _OPTION.sub("", cell.text)).strip("\n")
 
 
-def _code(cell: Segment, context: LessonContext) -> str:
-    """What a cell runs; empty where that is nothing for a script."""
+def _runnable_code(cell: Segment, context: LessonContext) -> str:
+    """Return what the script runs of a cell; empty where that is nothing."""
     options = {quarto or myst: value.strip() for quarto, myst, value in _OPTION.findall(cell.text)}
     text = _OPTION.sub("", cell.text)
     if "raises-exception" in cell.head + options.get("tags", ""):
-        context.leave(cell.place, "a cell that is to fail is shown and not run")
+        context.add_leftover(cell.place, "a cell that is to fail is shown and not run")
         return ""
     if options.get("eval") == "false":
         return ""
     first, _, rest = text.lstrip("\n").partition("\n")
-    if _TIMED.fullmatch(first):
+    if _TIMING.fullmatch(first):
         text = rest
-        context.leave(cell.place, f"`{first}`, which is for Jupyter alone")
+        context.add_leftover(cell.place, f"`{first}`, which is for Jupyter alone")
     elif first.startswith("%%"):
-        context.leave(cell.place, f"a cell of `{first.split()[0]}` is shown and not run")
+        context.add_leftover(cell.place, f"a cell of `{first.split()[0]}` is shown and not run")
         return ""
     for magic in _MAGIC.findall(text):
-        context.leave(cell.place, f"`{magic.strip()}`, which is for Jupyter alone")
+        context.add_leftover(cell.place, f"`{magic.strip()}`, which is for Jupyter alone")
     text = _MAGIC.sub("", text)
-    if _SHOWS.search(text):
-        context.leave(cell.place, "a figure: save it by `plt.savefig`, and name it by `figure=`")
+    if _FIGURE.search(text):
+        context.add_leftover(
+            cell.place, "a figure: save it by `plt.savefig`, and name it by `figure=`"
+        )
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError) as error:
-        context.leave(cell.place, f"a cell that is no Python is shown and not run: {error}")
+        context.add_leftover(cell.place, f"a cell that is no Python is shown and not run: {error}")
         return ""
-    return _printed(cell, text, tree, context) if cell.value is not False else text
+    return _print_last_value(cell, text, tree, context) if cell.shows_value is not False else text
 
 
-def _printed(cell: Segment, text: str, tree: ast.Module, context: LessonContext) -> str:
-    """The code with the value of its last expression printed, as Jupyter shows it."""
+def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: LessonContext) -> str:
+    """Return the code with its last expression printed, since Jupyter shows its value."""
     last = tree.body[-1] if tree.body else None
     if not isinstance(last, ast.Expr) or text.rstrip().endswith(";"):
         return text
     if isinstance(last.value, ast.Call):
-        if _draws(last.value):
+        if _shows_itself(last.value):
             return text
-        if not cell.value:
-            what = ast.unparse(last.value.func)
-            context.leave(cell.place, f"the value of `{what}(…)` is shown there if it has one")
+        if not cell.shows_value:
+            name = ast.unparse(last.value.func)
+            message = f"the value of `{name}(…)` is shown there if it has one"
+            context.add_leftover(cell.place, message)
             return text
     lines = text.split("\n")
     before = "\n".join(lines[: last.lineno - 1])
@@ -91,8 +96,8 @@ def _printed(cell: Segment, text: str, tree: ast.Module, context: LessonContext)
     return f"{before}\n{lead}print({ast.get_source_segment(text, last.value)})"
 
 
-def _draws(call: ast.Call) -> bool:
-    """Whether a call draws, so that its value says nothing."""
+def _shows_itself(call: ast.Call) -> bool:
+    """Whether a call draws or prints, so that its value is of no interest."""
     root: ast.expr = call.func
     while isinstance(root, ast.Attribute | ast.Call):
         root = root.func if isinstance(root, ast.Call) else root.value

@@ -33,11 +33,11 @@ from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
 from coursebuild.pipeline.scripts import run as run_scripts
 from coursebuild.report.values import plural
 
-_LONGEST = 900.0
-"""Seconds that a script may take that was not through after the usual time."""
-_ROOM = 3.0
-"""How many times as long a script may take as it took here."""
-_MISSING = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
+_LONG_TIMEOUT = 900.0
+"""Seconds allowed in the second run of a script that exceeded the usual time."""
+_TIME_FACTOR = 3.0
+"""A script's new time limit, as a multiple of the time it took here."""
+_MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
 
 
 EXAMPLES = """\
@@ -47,7 +47,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments of the command."""
     parser.description = (
         "Write a course of another tool as one of coursebuild: a course.json with Markdown,\n"
         "Jupyter notebooks, MyST, Quarto or MkDocs. Its folder is only read."
@@ -71,13 +71,13 @@ def run(arguments: argparse.Namespace) -> int:
     options = Options(out, arguments.jobs or available_cores(), arguments.quiet, store)
     converted = convert(source)
     write_course(converted, out, source)
-    said = [f"wrote {plural(len(converted.files), 'file')} to {out}"]
-    said += _try_scripts(options, Progress(quiet=options.quiet))
-    for left in converted.left:
-        place = f", {left.place}" if left.place else ""
-        said.append(f"left: {left.path}{place}: {left.what}")
+    remarks = [f"wrote {plural(len(converted.files), 'file')} to {out}"]
+    remarks += _try_scripts(options, Progress(quiet=options.quiet))
+    for leftover in converted.leftovers:
+        place = f", {leftover.place}" if leftover.place else ""
+        remarks.append(f"left: {leftover.path}{place}: {leftover.message}")
     report = check(options)
-    report = replace(report, remarks=(*said, *report.remarks), depends=None)
+    report = replace(report, remarks=(*remarks, *report.remarks), depends=None)
     return print_report(report, "text", options)
 
 
@@ -85,63 +85,71 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
-    """Run each script and write into the lessons what that showed; what fences got, in words."""
+    """Run each script and add keys and outputs to its lesson; return remarks on the new keys."""
     course = load(options.root).value
     if course is None:
         return ()
     recordings = recorded_outputs(course)
     edits: dict[Source, list[Edit]] = {}
-    said = []
-    for extraction, done in _runs(extract_scripts(course, options).runnable, options, progress):
+    remarks = []
+    for extraction, script_run in _run_scripts(
+        extract_scripts(course, options).runnable, options, progress
+    ):
         script = extraction.script
         changes = edits.setdefault(script.span.source, [])
-        keys = " ".join(_keys(script, done))
+        keys = " ".join(_missing_keys(script, script_run))
         if keys:
             end = script.span.first_line().end
             changes.append(Edit(Span(script.span.source, end, end), f" {keys}"))
-            said.append(f"{script.path} got `{keys}`")
-        if done.outcome is Outcome.OK:
-            its = [recording for recording in recordings if recording.script == script.path]
-            changes += _outputs(script, its, course, done.stdout)
+            remarks.append(f"{script.path} got `{keys}`")
+        if script_run.outcome is Outcome.OK:
+            script_recordings = [r for r in recordings if r.script == script.path]
+            changes += _output_edits(script, script_recordings, course, script_run.stdout)
     for source, changes in edits.items():
         new = apply_edits(source.text, changes)
         if new != source.text:
             write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
-    return tuple(said)
+    return tuple(remarks)
 
 
-def _runs(
+def _run_scripts(
     scripts: Sequence[Extraction], options: Options, progress: Progress
 ) -> list[tuple[Extraction, ScriptRun]]:
-    """The runs of scripts; of those that took too long with more time."""
+    """Run the scripts, those that took too long once more with more time."""
     runs = list(zip(scripts, run_scripts(scripts, options, progress), strict=True))
-    slow = [extraction for extraction, done in runs if done.outcome is Outcome.TIMEOUT]
-    patient = [replace(e, script=replace(e.script, timeout=_LONGEST)) for e in slow]
-    again = {
-        done.path: done for done in run_scripts(patient, options, progress, "running slow scripts")
+    slow = [extraction for extraction, run in runs if run.outcome is Outcome.TIMEOUT]
+    retried = [replace(e, script=replace(e.script, timeout=_LONG_TIMEOUT)) for e in slow]
+    reruns = {
+        run.path: run for run in run_scripts(retried, options, progress, "running slow scripts")
     }
-    return [(extraction, again.get(extraction.path, done)) for extraction, done in runs]
+    return [(extraction, reruns.get(extraction.path, run)) for extraction, run in runs]
 
 
-def _keys(script: Script, done: ScriptRun) -> Iterator[str]:
-    """What the fence has to say of a script that did this, as `key=value`."""
-    missing = _MISSING.search(done.stderr) if done.outcome is Outcome.FAILED else None
+def _missing_keys(script: Script, script_run: ScriptRun) -> Iterator[str]:
+    """Yield the keys that a script's fence needs after this run, as `key=value`."""
+    missing = (
+        _MISSING_MODULE.search(script_run.stderr) if script_run.outcome is Outcome.FAILED else None
+    )
     if missing is not None and not script.requires:
         yield f"requires={missing[1].partition('.')[0]}"
-    long = done.outcome is Outcome.OK and done.seconds * _ROOM > script.timeout
-    if long and "timeout=" not in script.span.first_line().text:
-        yield f"timeout={math.ceil(done.seconds * _ROOM / 10) * 10}"
-    signs = {d.sign for d in done.trace.divergences} if done.trace is not None else set()
+    is_slow = (
+        script_run.outcome is Outcome.OK and script_run.seconds * _TIME_FACTOR > script.timeout
+    )
+    if is_slow and "timeout=" not in script.span.first_line().text:
+        yield f"timeout={math.ceil(script_run.seconds * _TIME_FACTOR / 10) * 10}"
+    signs = (
+        {d.sign for d in script_run.trace.divergences} if script_run.trace is not None else set()
+    )
     if signs - {Sign.CONTACT} and not script.diverges:
         yield "diverges"
     if Sign.CONTACT in signs and not script.deep:
         yield "deep"
 
 
-def _outputs(
+def _output_edits(
     script: Script, recordings: Sequence[Recording], course: Course, printed: str
 ) -> Iterator[Edit]:
-    """What is printed, into outputs that hold nothing, or below a script that has none."""
+    """Yield edits that fill empty outputs with what was printed, or add one where there is none."""
     for recording in recordings:
         if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
             comparison = recording.comparison or course.comparison

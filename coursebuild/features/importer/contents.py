@@ -20,52 +20,52 @@ from coursebuild.features.importer.values import (
     ImportedCourse,
     ImportedLevel,
     ImportedText,
-    name_of,
     read_text,
     read_yaml,
+    title_of_file,
 )
 
 _NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "code_of_conduct")
-_FIRST = ("index", "intro", "introduction", "about")
-_TITLED = ((), ("project",), ("book",), ("website",))
-"""Where settings have the title of the course."""
-_LISTS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
-_FILES = ("file", "href", "part")
-_TITLES = ("caption", "title", "section", "text", "part")
-_TOP = {"toc", "root", "site-url", "author", "authors", "version"}
-"""What only the whole course has, whose title is no level's."""
+_PAGES = ("index", "intro", "introduction", "about")
+_TITLE_PATHS = ((), ("project",), ("book",), ("website",))
+"""Keys below which settings have the title of the course."""
+_LIST_KEYS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
+_FILE_KEYS = ("file", "href", "part")
+_TITLE_KEYS = ("caption", "title", "section", "text", "part")
+_COURSE_KEYS = {"toc", "root", "site-url", "author", "authors", "version"}
+"""Keys that only the whole course has: a title next to them is not the title of a level."""
 
 
 def read_contents(files: Files, folder: str) -> ImportedCourse:
-    """The course in a folder of notebooks or Markdown, of this name.
+    """Read the course in a folder of notebooks or Markdown; its name is a title of last resort.
 
     Raises:
         UsageError: there is nothing to import.
     """
     names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
-    myst, quarto, _, mkdocs = settings = [_settings(name, files) for name in names]
-    titles = [_at(one, *path, "title") for one in settings for path in _TITLED]
-    titles.append(_at(mkdocs, "site_name"))
-    title = next((" ".join(one.split()) for one in titles if isinstance(one, str)), "")
-    found = [
-        *_parts(_settings("_toc.yml", files), files),
-        *_parts(_at(myst, "project"), files),
-        *_parts(_at(quarto, "book", "chapters"), files),
-        *_parts(_at(quarto, "website", "sidebar"), files),
-        *_nav(_at(mkdocs, "nav"), str(_at(mkdocs, "docs_dir") or "docs"), files),
-    ] or [*_by_folder(files)]
-    if not found:
+    myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
+    titles = [_get(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
+    titles.append(_get(mkdocs, "site_name"))
+    title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
+    parts = [
+        *_read_parts(_read_settings("_toc.yml", files), files),
+        *_read_parts(_get(myst, "project"), files),
+        *_read_parts(_get(quarto, "book", "chapters"), files),
+        *_read_parts(_get(quarto, "website", "sidebar"), files),
+        *_read_nav(_get(mkdocs, "nav"), str(_get(mkdocs, "docs_dir") or "docs"), files),
+    ] or [*_group_by_folder(files)]
+    if not parts:
         raise UsageError(
             "there is nothing to import: no course.json, no notebook and no Markdown file"
         )
-    pages = [one for one in found if isinstance(one, ImportedText) and _base(one.file) in _FIRST]
-    parts = [one for one in found if one not in pages]
+    pages = [p for p in parts if isinstance(p, ImportedText) and _base_name(p.file) in _PAGES]
+    levels = _group_levels([part for part in parts if part not in pages], title)
     return ImportedCourse(
-        title=title or name_of(folder), levels=tuple(_levels(parts, title)), pages=tuple(pages)
+        title=title or title_of_file(folder), levels=tuple(levels), pages=tuple(pages)
     )
 
 
-def _settings(name: str, files: Files) -> Mapping[str, Any]:
+def _read_settings(name: str, files: Files) -> Mapping[str, Any]:
     path = next((path for path in (name, name.replace(".yml", ".yaml")) if path in files), None)
     if path is None:
         return {}
@@ -75,53 +75,53 @@ def _settings(name: str, files: Files) -> Mapping[str, Any]:
     return value if isinstance(value, dict) else {"chapters": value}
 
 
-def _at(settings: object, *path: str) -> object:
-    """What stands under a key of what stands under another; `None` where nothing does."""
+def _get(settings: object, *path: str) -> object:
+    """Return the value at a path of nested keys; `None` where there is none."""
     for key in path:
         settings = settings.get(key) if isinstance(settings, Mapping) else None
     return settings
 
 
-def _parts(value: object, files: Files) -> Iterator[ImportedText | ImportedLevel]:
-    """The lessons and groups of lessons of a table of contents, whichever tool's."""
+def _read_parts(value: object, files: Files) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield the lessons and groups of lessons in the table of contents of any of the tools."""
     if isinstance(value, str):
-        if path := _file(value, files):
+        if path := _find_text(value, files):
             yield ImportedText(file=path)
     elif isinstance(value, list):
         for item in value:
-            yield from _parts(item, files)
+            yield from _read_parts(item, files)
     elif isinstance(value, Mapping):
-        yield from _parts(value.get("root"), files)
-        inside = [part for key in _LISTS for part in _parts(value.get(key), files)]
-        path = next((path for key in _FILES if (path := _file(value.get(key), files))), "")
-        titled = next((str(value[key]) for key in _TITLES if value.get(key)), "")
-        title = "" if _file(titled, files) else titled
-        own = [ImportedText(file=path, title=title)] if path else []
-        if inside and (path or (title and not _TOP & value.keys())):
-            lessons = tuple(_lessons([*own, *inside]))
-            yield ImportedLevel(title=title or name_of(path), lessons=lessons)
+        yield from _read_parts(value.get("root"), files)
+        inside = [part for key in _LIST_KEYS for part in _read_parts(value.get(key), files)]
+        path = next((path for key in _FILE_KEYS if (path := _find_text(value.get(key), files))), "")
+        label = next((str(value[key]) for key in _TITLE_KEYS if value.get(key)), "")
+        title = "" if _find_text(label, files) else label
+        heads = [ImportedText(file=path, title=title)] if path else []
+        if inside and (path or (title and not _COURSE_KEYS & value.keys())):
+            lessons = tuple(_flatten([*heads, *inside]))
+            yield ImportedLevel(title=title or title_of_file(path), lessons=lessons)
         else:
-            yield from (*own, *inside)
+            yield from (*heads, *inside)
 
 
-def _lessons(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
+def _flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
     for part in parts:
         yield from (part,) if isinstance(part, ImportedText) else part.lessons
 
 
-def _nav(lines: object, folder: str, files: Files) -> Iterator[ImportedText | ImportedLevel]:
-    """The lines of MkDocs' `nav`: a file, or a title with a file or with further lines."""
-    for line in lines if isinstance(lines, list) else ():
-        for title, value in line.items() if isinstance(line, Mapping) else [("", line)]:
+def _read_nav(entries: object, folder: str, files: Files) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield the entries of MkDocs' `nav`: a file, or a title with a file or further entries."""
+    for entry in entries if isinstance(entries, list) else ():
+        for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
             if isinstance(value, list):
-                if inside := tuple(_lessons(_nav(value, folder, files))):
+                if inside := tuple(_flatten(_read_nav(value, folder, files))):
                     yield ImportedLevel(title=str(title), lessons=inside)
-            elif path := _file(posixpath.join(folder, str(value)), files):
+            elif path := _find_text(posixpath.join(folder, str(value)), files):
                 yield ImportedText(file=path, title=str(title))
 
 
-def _file(name: object, files: Files) -> str:
-    """The text that is named, with or without its extension; empty where that is none."""
+def _find_text(name: object, files: Files) -> str:
+    """Return a text's path, given with or without its extension; empty where there is none."""
     if not isinstance(name, str) or not name:
         return ""
     name = posixpath.normpath(name)
@@ -130,30 +130,34 @@ def _file(name: object, files: Files) -> str:
     return next((name + end for end in TEXTS if name + end in files), "")
 
 
-def _natural(path: str) -> list[tuple[int, int | str]]:
-    """Names in order, numbers by their values."""
+def _natural_order(path: str) -> list[tuple[int, int | str]]:
+    """Return a key that sorts names in natural order: numbers by their values."""
     parts = re.split(r"(\d+)", path)
     return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
 
 
-def _by_folder(files: Files) -> Iterator[ImportedText | ImportedLevel]:
-    texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural)
+def _group_by_folder(files: Files) -> Iterator[ImportedText | ImportedLevel]:
+    texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural_order)
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
-        lessons = [ImportedText(file=path) for path in paths if _base(path) not in _NOT_LESSONS]
+        lessons = [
+            ImportedText(file=path) for path in paths if _base_name(path) not in _NOT_LESSONS
+        ]
         if folder and lessons:
-            yield ImportedLevel(title=name_of(folder), lessons=tuple(lessons))
+            yield ImportedLevel(title=title_of_file(folder), lessons=tuple(lessons))
         else:
             yield from lessons
 
 
-def _base(path: str) -> str:
+def _base_name(path: str) -> str:
     return posixpath.basename(path).split(".")[0].lower()
 
 
-def _levels(parts: Iterable[ImportedText | ImportedLevel], title: str) -> Iterator[ImportedLevel]:
-    """A level for each group; lessons that stand in none are one as well."""
+def _group_levels(
+    parts: Iterable[ImportedText | ImportedLevel], title: str
+) -> Iterator[ImportedLevel]:
+    """Yield a level for each group, and one for each run of lessons outside groups."""
     for kind, run in itertools.groupby(parts, type):
         if kind is ImportedText:
-            yield ImportedLevel(title=title or "Lessons", lessons=tuple(_lessons(run)))
+            yield ImportedLevel(title=title or "Lessons", lessons=tuple(_flatten(run)))
         else:
             yield from (part for part in run if isinstance(part, ImportedLevel))

@@ -17,65 +17,65 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_json import read_course_json
-from coursebuild.features.importer.course_map import map_lines, with_texts
-from coursebuild.features.importer.lesson import lesson_text
-from coursebuild.features.importer.prose import labels
+from coursebuild.features.importer.course_map import map_lines, read_texts
+from coursebuild.features.importer.lesson import write_lesson
+from coursebuild.features.importer.prose import find_anchors
 from coursebuild.features.importer.values import (
     TEXTS,
     Files,
     ImportedCourse,
     ImportedText,
     Leftover,
-    files_of,
+    list_files,
     stem_of,
 )
 
-_IGNORED = b"public/\nexamples/\n.coursebuild/\n"
+_GITIGNORE = b"public/\nexamples/\n.coursebuild/\n"
 
 
-class Converted(Struct, frozen=True):
-    """A course as coursebuild has it."""
+class ConvertedCourse(Struct, frozen=True):
+    """The files of the new course, by path, and what has no counterpart in it."""
 
     files: Mapping[str, bytes]
-    left: tuple[Leftover, ...]
+    leftovers: tuple[Leftover, ...]
 
 
-def convert(folder: Path) -> Converted:
+def convert(folder: Path) -> ConvertedCourse:
     """Read a course of another tool; nothing is written.
 
     Raises:
         UsageError: there is nothing to import, or a file cannot be read.
     """
-    files = files_of(folder)
+    files = list_files(folder)
     maps = [path for path in files if posixpath.basename(path) == "course.json"]
-    described = min(maps, key=lambda path: (path.count("/"), path), default=None)
-    if described is None:
+    map_path = min(maps, key=lambda path: (path.count("/"), path), default=None)
+    if map_path is None:
         course = read_contents(files, folder.resolve().name)
     else:
-        course = read_course_json(described, files)
-    course = with_texts(course, files)
+        course = read_course_json(map_path, files)
+    course = read_texts(course, files)
     lessons = [lesson for level in course.levels for lesson in level.lessons]
-    texts, ids = (*lessons, *course.pages), _ids(lessons)
-    out, left, callouts = _texts(course, texts, ids, files)
-    if described is not None:
-        read = {text.file for text in texts}
-        lost = (path for path in files if path.endswith(TEXTS) and path not in read)
-        left += [Leftover(path, "", "a text that the map does not name") for path in lost]
-        left += [
-            Leftover(described, "", f"the prerequisite {name} of {text.id}, which is no lesson")
+    texts, ids = (*lessons, *course.pages), _new_ids(lessons)
+    out, leftovers, callouts = _convert_texts(course, texts, ids, files)
+    if map_path is not None:
+        paths = {text.file for text in texts}
+        unused = (path for path in files if path.endswith(TEXTS) and path not in paths)
+        leftovers += [Leftover(path, "", "a text that the map does not name") for path in unused]
+        leftovers += [
+            Leftover(map_path, "", f"the prerequisite {name} of {text.id}, which is no lesson")
             for text in texts
             for name in text.prerequisites
             if name not in ids
         ]
-    packages = dict(_packages(files, texts))
-    out |= {**packages, **dict(_models(files))}
+    packages = dict(_own_packages(files, texts))
+    out |= {**packages, **dict(_model_files(files))}
     lines = map_lines(course, ids, callouts, ("src",) if packages else ())
     out["content/course.toml"] = "".join(f"{line}\n" for line in lines).encode()
-    out[".gitignore"] = _IGNORED
-    return Converted(dict(sorted(out.items())), (*course.left, *left))
+    out[".gitignore"] = _GITIGNORE
+    return ConvertedCourse(dict(sorted(out.items())), (*course.leftovers, *leftovers))
 
 
-def write_course(course: Converted, folder: Path, source: Path) -> None:
+def write_course(course: ConvertedCourse, folder: Path, source: Path) -> None:
     """Write the files of a new course.
 
     Raises:
@@ -93,29 +93,29 @@ def write_course(course: Converted, folder: Path, source: Path) -> None:
         write_atomic(target, path, data, expected=None)
 
 
-def _ids(lessons: Sequence[ImportedText]) -> dict[str, str]:
-    """Ids of lessons, by those that they had and by those that they have."""
-    named = {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
+def _new_ids(lessons: Sequence[ImportedText]) -> dict[str, str]:
+    """Return the new ids of lessons, by their old ids, their new ids and their slugs."""
+    by_old_id = {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
     slugs = {lesson.slug: lesson.id for lesson in lessons}
-    return slugs | {lesson.id: lesson.id for lesson in lessons} | named
+    return slugs | {lesson.id: lesson.id for lesson in lessons} | by_old_id
 
 
-def _texts(
+def _convert_texts(
     course: ImportedCourse, texts: Sequence[ImportedText], ids: Mapping[str, str], files: Files
 ) -> tuple[dict[str, bytes], list[Leftover], dict[str, str]]:
-    """The files of lessons and pages, what was left, and kinds of callouts of the course's own."""
-    written = [text for text in texts if text.path]
-    targets = {stem_of(text.file): text.link for text in written}
+    """Return the files of lessons and pages, the leftovers, and the course's own callouts."""
+    texts_with_files = [text for text in texts if text.path]
+    targets = {stem_of(text.file): text.link for text in texts_with_files}
     anchors = {
         anchor: text.link
-        for text in reversed(written)
+        for text in reversed(texts_with_files)
         for segment in text.segments
-        for anchor in labels(segment.text)
+        for anchor in find_anchors(segment.text)
     }
     out: dict[str, bytes] = {}
-    left: list[Leftover] = []
+    leftovers: list[Leftover] = []
     callouts: dict[str, str] = {}
-    for text in written:
+    for text in texts_with_files:
         context = LessonContext(
             text.file,
             targets,
@@ -126,12 +126,12 @@ def _texts(
             camera_is_position=course.camera_is_position,
         )
         script = _script_path(text)
-        out[text.path] = lesson_text(text.segments, text.title, script, context).encode()
-        out |= {place: files[path].read_bytes() for path, place in context.copied.items()}
-        out |= {place: text.pictures[name] for name, place in context.pictures.items()}
-        left += context.left
+        out[text.path] = write_lesson(text.segments, text.title, script, context).encode()
+        out |= {place: files[path].read_bytes() for path, place in context.file_paths.items()}
+        out |= {place: text.pictures[name] for name, place in context.picture_paths.items()}
+        leftovers += context.leftovers
         callouts |= context.callouts
-    return out, left, callouts
+    return out, leftovers, callouts
 
 
 def _script_path(text: ImportedText) -> str:
@@ -139,8 +139,8 @@ def _script_path(text: ImportedText) -> str:
     return f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
 
 
-def _packages(files: Files, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:
-    """Packages of the course's own that its lessons import, below `src`."""
+def _own_packages(files: Files, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:
+    """Yield the files of the course's own packages that its lessons import, below `src`."""
     code = "\n".join(segment.text for text in texts for segment in text.segments)
     imported = set(re.findall(r"^[ \t]*(?:from|import)[ \t]+(\w+)", code, re.MULTILINE))
     roots = [posixpath.dirname(path) for path in files if path.endswith("/__init__.py")]
@@ -152,13 +152,13 @@ def _packages(files: Files, texts: Sequence[ImportedText]) -> Iterator[tuple[str
                     yield f"src/{name}/{path.removeprefix(f'{root}/')}", file.read_bytes()
 
 
-def _models(files: Files) -> Iterator[tuple[str, bytes]]:
-    """Models, with the meshes and textures beside them."""
+def _model_files(files: Files) -> Iterator[tuple[str, bytes]]:
+    """Yield the models, and the meshes and textures in their folders."""
     for path, file in files.items():
         folders = posixpath.dirname(path).split("/")
         if "models" in folders:
-            at = folders.index("models")
-            name = "/".join(("models", *folders[at + 1 :], posixpath.basename(path)))
+            depth = folders.index("models")
+            name = "/".join(("models", *folders[depth + 1 :], posixpath.basename(path)))
             yield name, file.read_bytes()
         elif path.endswith(".xml") and b"<mujoco" in (data := file.read_bytes()):
             yield f"models/{posixpath.basename(path)}", data

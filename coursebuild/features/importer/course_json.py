@@ -1,7 +1,7 @@
 """The map of a course in a `course.json` of levels and lessons.
 
-Entry point: `read_course_json`. Such files are written by hand in many dialects, so a field is
-known by several names; what is known by none is left, and said once.
+Entry point: `read_course_json`. People write such files by hand in many dialects, so a
+field can have several names; unknown fields are reported once, with their number.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from coursebuild.features.importer.values import (
     stem_of,
 )
 
-_NAMES: dict[str, str] = {
+_FIELD_NAMES: dict[str, str] = {
     "number": "id",
     "name": "title",
     **dict.fromkeys(("description", "subtitle", "tagline", "goal"), "summary"),
@@ -37,17 +37,17 @@ _NAMES: dict[str, str] = {
     **dict.fromkeys(("module", "part"), "level"),
     **dict.fromkeys(("lang", "locale"), "language"),
 }
-"""What fields are called here, by other names that they have."""
-_COURSE = ("id", "title", "summary", "levels", "lessons", "pages", "language")
-_LEVEL = ("id", "title", "summary", "lessons", "checkpoint")
-_LESSON = (
+"""The names of fields here, by the names they have in other dialects."""
+_COURSE_FIELDS = ("id", "title", "summary", "levels", "lessons", "pages", "language")
+_LEVEL_FIELDS = ("id", "title", "summary", "lessons", "checkpoint")
+_LESSON_FIELDS = (
     *("id", "slug", "title", "summary", "file", "objectives", "prerequisites", "minutes"),
     *("status", "checkpoint", "level"),
 )
 
 
 def read_course_json(path: str, files: Files) -> ImportedCourse:
-    """The course that a file describes.
+    """Read the course that a file describes.
 
     Raises:
         UsageError: it is no JSON, or holds no levels.
@@ -63,9 +63,9 @@ def read_course_json(path: str, files: Files) -> ImportedCourse:
     if isinstance(data, dict) and isinstance(data.get("course"), dict):
         data |= data.pop("course")
     reader = _Reader(files)
-    course = reader.fields(data, _COURSE)
-    apart = [reader.fields(item, _LESSON) for item in _items(course, "lessons")]
-    levels = tuple(reader.level(item, apart) for item in _items(course, "levels"))
+    course = reader.fields(data, _COURSE_FIELDS)
+    loose = [reader.fields(item, _LESSON_FIELDS) for item in _items(course, "lessons")]
+    levels = tuple(reader.level(item, loose) for item in _items(course, "levels"))
     if not levels:
         raise UsageError(f"{path} has no `levels`")
     return ImportedCourse(
@@ -74,10 +74,10 @@ def read_course_json(path: str, files: Files) -> ImportedCourse:
         language=_text(course, "language"),
         levels=levels,
         pages=tuple(
-            reader.lesson(reader.fields(item, _LESSON)) for item in _items(course, "pages")
+            reader.lesson(reader.fields(item, _LESSON_FIELDS)) for item in _items(course, "pages")
         ),
         camera_is_position=True,
-        left=tuple(
+        leftovers=tuple(
             Leftover(path, "", f"`{key}` ({count} times), which a course map does not have")
             for key, count in reader.unknown.items()
         ),
@@ -85,25 +85,25 @@ def read_course_json(path: str, files: Files) -> ImportedCourse:
 
 
 class _Reader:
-    """Reads objects of the file."""
+    """Reads the objects of the file, and counts the fields that it does not know."""
 
     def __init__(self, files: Files) -> None:
         self.files = files
         self.unknown: Counter[str] = Counter()
-        """How often there are fields that nothing here knows."""
+        """How often each unknown field occurs."""
 
-    def fields(self, value: Any, known: tuple[str, ...]) -> dict[str, Any]:
-        """The fields of an object, by the names that they have here."""
+    def fields(self, value: Any, names: tuple[str, ...]) -> dict[str, Any]:
+        """Return the fields of an object, by their names here; of these, `names` are expected."""
         if not isinstance(value, dict):
             raise UsageError("course.json: a level or a lesson is no object")
-        self.unknown.update(key for key in value if _name(key) not in known)
-        return {_name(key): item for key, item in value.items()}
+        self.unknown.update(key for key in value if _field_name(key) not in names)
+        return {_field_name(key): item for key, item in value.items()}
 
-    def level(self, value: object, apart: list[dict[str, Any]]) -> ImportedLevel:
-        """A level, with those of the lessons that stand apart that name it."""
-        level = self.fields(value, _LEVEL)
-        lessons = [self.fields(item, _LESSON) for item in _items(level, "lessons")]
-        lessons += [lesson for lesson in apart if _text(lesson, "level") == _text(level, "id")]
+    def level(self, value: object, loose: list[dict[str, Any]]) -> ImportedLevel:
+        """Read a level with its lessons; `loose` are those listed elsewhere, which name theirs."""
+        level = self.fields(value, _LEVEL_FIELDS)
+        lessons = [self.fields(item, _LESSON_FIELDS) for item in _items(level, "lessons")]
+        lessons += [lesson for lesson in loose if _text(lesson, "level") == _text(level, "id")]
         return ImportedLevel(
             id=_text(level, "id"),
             title=_text(level, "title"),
@@ -112,7 +112,7 @@ class _Reader:
         )
 
     def lesson(self, lesson: dict[str, Any]) -> ImportedText:
-        """A lesson, or a page."""
+        """Read a lesson or a page."""
         minutes = re.search(r"\d+", _text(lesson, "minutes"))
         return ImportedText(
             old_id=_text(lesson, "id"),
@@ -127,24 +127,24 @@ class _Reader:
         )
 
     def file(self, lesson: dict[str, Any]) -> str:
-        """The Markdown file of a lesson: that named, or that whose name begins with its id."""
-        named, name, slug = (_text(lesson, key) for key in ("file", "id", "slug"))
-        texts = [path for path in self.files if path.endswith((".md", ".qmd", ".ipynb"))]
-        end = "/" + named.lstrip("./")
-        found = [path for path in texts if named and f"/{path}".endswith(end)]
-        begins = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(name)}(?![\w.])|{re.escape(slug)}$")
-        for path in texts:
-            if name and begins.match(posixpath.basename(stem_of(path))):
-                found.append(path)
-        return found[0] if found else ""
+        """Return the file of a lesson: the one it names, or one whose name begins with its id."""
+        file, id, slug = (_text(lesson, key) for key in ("file", "id", "slug"))
+        paths = [path for path in self.files if path.endswith((".md", ".qmd", ".ipynb"))]
+        suffix = "/" + file.lstrip("./")
+        matches = [path for path in paths if file and f"/{path}".endswith(suffix)]
+        pattern = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(id)}(?![\w.])|{re.escape(slug)}$")
+        for path in paths:
+            if id and pattern.match(posixpath.basename(stem_of(path))):
+                matches.append(path)
+        return matches[0] if matches else ""
 
 
-def _name(key: str) -> str:
-    return _NAMES.get(key, key)
+def _field_name(key: str) -> str:
+    return _FIELD_NAMES.get(key, key)
 
 
 def _texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
-    """The texts of a field, each on one line: the items of a list, or the value."""
+    """Return the texts of a field, each on one line: the items of a list, or its value."""
     value = fields.get(name)
     items = value if isinstance(value, list) else [value]
     texts = (" ".join(item.split()) for item in items if isinstance(item, str))
@@ -157,12 +157,12 @@ def _text(fields: dict[str, Any], name: str) -> str:
 
 def _items(fields: dict[str, Any], name: str) -> list[Any]:
     value = fields.get(name)
-    if isinstance(value, dict):  # by their ids
+    if isinstance(value, dict):  # items by their ids
         return [{"id": key, **item} for key, item in value.items() if isinstance(item, dict)]
     return value if isinstance(value, list) else []
 
 
 def _summary(fields: dict[str, Any]) -> str:
-    """The summary, with what a learner is to be able to do at this place."""
+    """Return the summary, with what a learner should be able to do by then."""
     checkpoint = _text(fields, "checkpoint")
     return f"{_text(fields, 'summary')} {checkpoint and f'Checkpoint: {checkpoint}'}".strip()

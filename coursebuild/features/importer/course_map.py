@@ -1,6 +1,6 @@
 """The map of the new course.
 
-Entry points: `with_texts`, what its texts are and where they go; `map_lines`.
+Entry points: `read_texts`, which reads the texts and gives each an id and a path; `map_lines`.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from msgspec.structs import replace
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.toml_text import quoted
 from coursebuild.features.importer.lesson import read_segments
-from coursebuild.features.importer.values import Files, ImportedCourse, ImportedText, name_of
+from coursebuild.features.importer.values import Files, ImportedCourse, ImportedText, title_of_file
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
-"""Words for the status of a lesson that is written; with any other one it is a draft."""
+"""Statuses of a lesson that is finished; with any other it is a draft."""
 
 
-def with_texts(course: ImportedCourse, files: Files) -> ImportedCourse:
-    """The course with its texts read, and with the ids and paths that they get.
+def read_texts(course: ImportedCourse, files: Files) -> ImportedCourse:
+    """Return the course with its texts read, and with their new ids and paths.
 
     Raises:
         UsageError: a file cannot be read.
@@ -30,23 +30,23 @@ def with_texts(course: ImportedCourse, files: Files) -> ImportedCourse:
         id = level.id if re.fullmatch("[A-Za-z0-9]+", level.id) else str(number)
         lessons = []
         for place, lesson in enumerate(level.lessons, 1):
-            own = re.fullmatch(rf"{re.escape(id)}(\.[A-Za-z0-9]+)+", lesson.old_id)
-            lessons.append(_read(lesson, lesson.old_id if own else f"{id}.{place}", files))
+            fits = re.fullmatch(rf"{re.escape(id)}(\.[A-Za-z0-9]+)+", lesson.old_id)
+            lessons.append(_read_text(lesson, lesson.old_id if fits else f"{id}.{place}", files))
         title = level.title or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
-    pages = (_read(page, "", files) for page in course.pages if page.file)
+    pages = (_read_text(page, "", files) for page in course.pages if page.file)
     return replace(course, levels=tuple(levels), pages=tuple(pages))
 
 
-def _read(text: ImportedText, id: str, files: Files) -> ImportedText:
-    """A lesson of this id, or a page, which has none yet."""
+def _read_text(text: ImportedText, id: str, files: Files) -> ImportedText:
+    """Read the file of a lesson with this id, or of a page, whose id is made from its title."""
     title, slug = text.title, text.slug
     if not text.file:
         title = title or id
         return replace(text, id=id, slug=slug_of(slug or title), title=title)
-    found, segments, pictures = read_segments(files[text.file], text.file)
-    title = " ".join((title or found or name_of(text.file)).split())
-    slug = slug_of(slug or name_of(text.file))
+    heading, segments, pictures = read_segments(files[text.file], text.file)
+    title = " ".join((title or heading or title_of_file(text.file)).split())
+    slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug):
         slug = slug_of(title)
     page = slug_of(text.old_id or title)
@@ -61,9 +61,9 @@ def map_lines(
     callouts: Mapping[str, str],
     packages: tuple[str, ...],
 ) -> Iterator[str]:
-    """The lines of `course.toml`; `ids` are those of lessons now, by those that they had."""
+    """Yield the lines of `course.toml`; `ids` are the new ids of lessons, by the old ones."""
     yield "[course]"
-    yield from _fields(
+    yield from _field_lines(
         title=course.title, summary=course.summary, language=course.language, packages=packages
     )
     yield from ("", "[verify]", 'compare = "digits"')
@@ -72,10 +72,10 @@ def map_lines(
         yield from (f"{quoted(kind)} = {quoted(label)}" for kind, label in callouts.items())
     for level in course.levels:
         yield from ("", "[[level]]")
-        yield from _fields(id=level.id, title=level.title, summary=level.summary)
+        yield from _field_lines(id=level.id, title=level.title, summary=level.summary)
         for lesson in level.lessons:
             yield from ("", "[[level.lesson]]")
-            yield from _fields(
+            yield from _field_lines(
                 id=lesson.id,
                 slug=lesson.slug,
                 title=lesson.title,
@@ -87,7 +87,7 @@ def map_lines(
             )
     for page in course.pages:
         yield from ("", "[[page]]")
-        yield from _fields(id=page.id, title=page.title, file=page.path)
+        yield from _field_lines(id=page.id, title=page.title, file=page.path)
 
 
 def _status(lesson: ImportedText) -> str:
@@ -96,7 +96,7 @@ def _status(lesson: ImportedText) -> str:
     return "complete" if lesson.status.lower() in _COMPLETE else "draft"
 
 
-def _fields(**values: str | tuple[str, ...] | int | None) -> Iterator[str]:
+def _field_lines(**values: str | tuple[str, ...] | int | None) -> Iterator[str]:
     for name, value in values.items():
         if isinstance(value, tuple) and value:
             yield f"{name} = [{', '.join(map(quoted, value))}]"

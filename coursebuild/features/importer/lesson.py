@@ -1,6 +1,6 @@
 """A lesson of another tool → its Markdown.
 
-Entry points: `read_segments`, `lesson_text`.
+Entry points: `read_segments`, `write_lesson`.
 """
 
 from __future__ import annotations
@@ -10,62 +10,62 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from coursebuild.core.pages.marks import fence
-from coursebuild.features.importer.blocks import block_text
-from coursebuild.features.importer.cells import script_of, shown_text
+from coursebuild.features.importer.blocks import convert_segment
+from coursebuild.features.importer.cells import build_script, code_for_readers
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.notebook import read_notebook
-from coursebuild.features.importer.segments import front_matter, read_markdown, split_title
+from coursebuild.features.importer.segments import read_front_matter, read_markdown, split_title
 from coursebuild.features.importer.values import Segment, read_text
 
 
 def read_segments(path: Path, name: str) -> tuple[str, list[Segment], dict[str, bytes]]:
-    """The title that a file gives itself, its segments, and pictures that it holds.
+    """Return the title that a file states, its segments, and the pictures in it.
 
     Raises:
         UsageError: it cannot be read.
     """
     text = read_text(path, name)
-    attached: dict[str, bytes] = {}
-    matter: Mapping[str, object] = {}
+    pictures: dict[str, bytes] = {}
+    metadata: Mapping[str, object] = {}
     if name.endswith(".ipynb"):
-        segments, attached = read_notebook(text, name)
+        segments, pictures = read_notebook(text, name)
     else:
-        matter, size = front_matter(text)
+        metadata, size = read_front_matter(text)
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
     title, segments = split_title(segments)
-    return str(matter.get("title") or title), segments, attached
+    return str(metadata.get("title") or title), segments, pictures
 
 
-def lesson_text(
+def write_lesson(
     segments: Sequence[Segment], title: str, script_path: str, context: LessonContext
 ) -> str:
-    """Markdown of coursebuild; its cells are the script of this path.
+    """Return a lesson in Markdown of coursebuild, with its cells as the script of this path.
 
-    The script stands where its last cell stood. Cells before are shown where they stood, but for
-    those directly before it.
+    The script takes the place of its last cell. Earlier cells are shown where they stood, except
+    for those directly before the script, which would only repeat it.
     """
     cells = [segment for segment in segments if segment.kind == "cell"]
-    script, run = script_of(cells, title, context)
+    script, script_cells = build_script(cells, title, context)
     parts: list[str] = []
-    number, shown = 0, 0
+    number, shown_end = 0, 0
     for segment in segments:
         if segment.kind != "cell":
-            parts.append(block_text(segment, context).strip("\n"))
-            shown = len(parts)
+            parts.append(convert_segment(segment, context).strip("\n"))
+            shown_end = len(parts)
             continue
-        if run and number == run[-1]:
-            parts[shown:] = [fence(f"python file={script_path}", script)]
+        if script_cells and number == script_cells[-1]:
+            parts[shown_end:] = [fence(f"python file={script_path}", script)]
         else:
-            parts.append(_shown(segment))
-            shown = shown if number in run else len(parts)
+            parts.append(_write_cell(segment))
+            shown_end = shown_end if number in script_cells else len(parts)
         number += 1
     return "\n\n".join(part for part in parts if part.strip()) + "\n"
 
 
-def _shown(cell: Segment) -> str:
-    """A cell as a part of the script that stands below."""
+def _write_cell(cell: Segment) -> str:
+    """Return a cell to be read: a part of the script below, or code that is not run."""
     magic = re.match(r"\s*%%(\w+).*\n", cell.text)
     if magic is not None:
         return fence(magic[1], cell.text[magic.end() :].strip("\n"))
-    text = shown_text(cell)
+    text = code_for_readers(cell)
     return fence("python fragment", text) if text else ""

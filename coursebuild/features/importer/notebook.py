@@ -17,48 +17,51 @@ from coursebuild.features.importer.values import Segment
 
 
 def read_notebook(text: str, name: str) -> tuple[list[Segment], dict[str, bytes]]:
-    """What stands in its cells, and the pictures that are attached to them, by name.
+    """Return its cells as segments, and the pictures that are attached to them, by name.
 
     Raises:
         UsageError: it is no notebook of format 4.
     """
     try:
-        return _read(json.loads(text)["cells"])
+        return _read_cells(json.loads(text)["cells"])
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise UsageError(f"{name} is no notebook of format 4") from None
 
 
-def _read(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, bytes]]:
+def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, bytes]]:
     segments: list[Segment] = []
-    attached: dict[str, bytes] = {}
+    attachments: dict[str, bytes] = {}
     for number, cell in enumerate(cells, 1):
-        place, source = f"cell {number}", _joined(cell.get("source", ""))
+        place, source = f"cell {number}", _join_lines(cell.get("source", ""))
         if cell.get("cell_type") == "markdown":
-            pictures = _attachments(cell.get("attachments") or {})
+            pictures = _decode_attachments(cell.get("attachments") or {})
             for picture, data in pictures.items():
                 source = source.replace(f"attachment:{picture}", f"attachment:{number}-{picture}")
-                attached[f"{number}-{picture}"] = data
+                attachments[f"{number}-{picture}"] = data
             segments += read_markdown(source, place=place)
         elif cell.get("cell_type") == "code" and source.strip():
             outputs = cell.get("outputs") or ()
             tags = " ".join((cell.get("metadata") or {}).get("tags") or ())
-            shown = any(one.get("output_type") == "execute_result" for one in outputs)
-            segments.append(Segment(kind="cell", place=place, text=source, head=tags, value=shown))
+            shows_value = any(output.get("output_type") == "execute_result" for output in outputs)
+            cell_segment = Segment(
+                kind="cell", place=place, text=source, head=tags, shows_value=shows_value
+            )
+            segments.append(cell_segment)
         elif source.strip():
             segments.append(Segment(kind="block", place=place, text=source, head="text"))
-    return segments, attached
+    return segments, attachments
 
 
-def _joined(source: str | list[str]) -> str:
+def _join_lines(source: str | list[str]) -> str:
     return source if isinstance(source, str) else "".join(source)
 
 
-def _attachments(cell: Mapping[str, Any]) -> dict[str, bytes]:
-    found = {}
-    for name, kinds in cell.items():
+def _decode_attachments(attachments: Mapping[str, Any]) -> dict[str, bytes]:
+    pictures = {}
+    for name, kinds in attachments.items():
         for data in kinds.values():
             try:
-                found[name] = base64.b64decode(_joined(data))
+                pictures[name] = base64.b64decode(_join_lines(data))
             except (binascii.Error, ValueError):
                 continue
-    return found
+    return pictures

@@ -1,6 +1,6 @@
-"""Text → segments: what is prose, what a fence, what a directive of MyST, Quarto or MkDocs.
+"""Split a text into segments: prose, fences, directives of MyST, Quarto or MkDocs.
 
-Entry points: `read_markdown`, `front_matter`, `split_title`.
+Entry points: `read_markdown`, `read_front_matter`, `split_title`.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from coursebuild.features.importer.values import Segment, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
-_FRONT = re.compile(r"---[ \t]*\n(.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)", re.DOTALL)
+_FRONT_MATTER = re.compile(r"---[ \t]*\n(.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)", re.DOTALL)
 _TITLE = re.compile(r"^#[ \t]+(.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$", re.MULTILINE)
 """A heading of level 1."""
 
 
-def front_matter(text: str) -> tuple[Mapping[str, Any], int]:
-    """The YAML before a text, and how many characters it takes."""
-    match = _FRONT.match(text)
+def read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
+    """Return the YAML values at the beginning of a text, and the length of that part."""
+    match = _FRONT_MATTER.match(text)
     if match is None:
         return {}, 0
     value = read_yaml(match[1] or "{}")
@@ -34,9 +34,9 @@ def front_matter(text: str) -> tuple[Mapping[str, Any], int]:
 
 
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:
-    """The segments of a text. `place` is where it stands, where that is no line of a file.
+    """Yield the segments of a text; `place` replaces their lines, in a cell or a nested block.
 
-    Blocks inside quotations and lists are left in the prose.
+    Blocks in quotations and lists remain part of the prose.
     """
     lines = text.split("\n")
     blocks = [
@@ -51,7 +51,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
             yield Segment(kind="prose", place=place or f"line {first_line + at}", text=prose)
         at = end
         if mark:
-            if mark[0] in "!?":  # whose content is its title
+            if mark[0] in "!?":  # the parser gives an admonition's title as its content
                 content = textwrap.dedent("\n".join(lines[start + 1 : end])).strip("\n")
             yield Segment(
                 kind="cell" if _CELL.fullmatch(head) and mark[0] != ":" else "block",
@@ -62,20 +62,20 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
             )
 
 
-def _div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """Lines between colons, which may hold others: a directive of MyST, a division of Quarto."""
+def _parse_div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """Parse lines between colons, which can nest: a directive of MyST, a division of Quarto."""
 
-    def line(number: int) -> re.Match[str] | None:
+    def match_colons(number: int) -> re.Match[str] | None:
         return _COLONS.fullmatch(state.getLines(number, number + 1, state.blkIndent, False))
 
-    opening = line(start)
+    opening = match_colons(start)
     if opening is None or not opening[2]:
         return False
     if not silent:
         depth, last = 1, start
         while depth and last + 1 < end:
             last += 1
-            if colons := line(last):
+            if colons := match_colons(last):
                 depth += 1 if colons[2] else -1
         token = state.push("div", "", 0)
         token.markup, token.info = opening[1], opening[2]
@@ -86,19 +86,21 @@ def _div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
 
 
 _PARSER = MarkdownIt("commonmark").use(admon_plugin)
-_PARSER.block.ruler.before("fence", "div", _div, {"alt": ["paragraph", "list", "blockquote"]})
+_PARSER.block.ruler.before("fence", "div", _parse_div, {"alt": ["paragraph", "list", "blockquote"]})
 
 
 def split_title(segments: Sequence[Segment]) -> tuple[str, list[Segment]]:
-    """The first heading of level 1, and the segments without it; others of level 1 get level 2."""
+    """Return the first heading of level 1, and the segments without it; later ones get level 2."""
     titles: list[str] = []
 
-    def moved(heading: re.Match[str]) -> str:
+    def shift_heading(heading: re.Match[str]) -> str:
         titles.append(heading[1])
         return f"#{heading[0]}" if len(titles) > 1 else ""
 
-    without = [
-        replace(one, text=_TITLE.sub(moved, one.text)) if one.kind == "prose" else one
-        for one in segments
+    shifted = [
+        replace(segment, text=_TITLE.sub(shift_heading, segment.text))
+        if segment.kind == "prose"
+        else segment
+        for segment in segments
     ]
-    return (titles or [""])[0], without
+    return (titles or [""])[0], shifted

@@ -1,4 +1,4 @@
-"""What is read of a course of another tool."""
+"""A course of another tool as values, and how its files are read."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from msgspec import Struct
 from coursebuild.core.files.errors import UsageError
 
 TEXTS = (".md", ".qmd", ".ipynb", ".myst")
-"""What lessons are written in."""
+"""Extensions of the files that can be lessons."""
 SKIPPED = ("_build", "_site", "_book", "node_modules", "site-packages", "__pycache__", "public")
-"""Folders of which nothing is read: what tools have made."""
+"""Folders that are not read: tools write them."""
 
 
 class Leftover(Struct, frozen=True, order=True):
@@ -25,32 +25,35 @@ class Leftover(Struct, frozen=True, order=True):
     path: str
     """The file, relative to the folder that is imported."""
     place: str
-    """Where in it, as `line 12` or `cell 3`; may be empty."""
-    what: str
+    """Where in the file, as `line 12` or `cell 3`; may be empty."""
+    message: str
 
 
 class Segment(Struct, frozen=True, kw_only=True):
     """A stretch of a lesson."""
 
     kind: Literal["prose", "block", "cell"]
-    """`cell`: Python that is run; `block`: what else stands between marks."""
+    """`cell`: Python that is run; `block`: anything else between marks, such as a fence."""
     place: str
     text: str
-    """The prose, or what stands inside."""
+    """The prose, or the text between the marks."""
     head: str = ""
-    """What stands behind the marks that begin it."""
+    """The rest of the line after the opening mark; of a notebook's cell, its tags."""
     mark: str = "```"
-    """Which these are: backticks, tildes, colons, or `!!!`."""
-    value: bool | None = None
-    """Of a cell: whether the value of its last expression was shown; `None` where that is not
-    known, since nothing is recorded."""
+    """The opening mark: backticks, tildes, colons, or `!!!`."""
+    shows_value: bool | None = None
+    """Of a cell: whether the value of its last expression was shown; `None` where no output is
+    recorded."""
 
 
 class ImportedText(Struct, frozen=True, kw_only=True):
-    """A lesson or page, as the map of its course has it; what is last, once it is read."""
+    """A lesson or page as the map of its course has it.
+
+    `id` and the fields below it are set when its file is read.
+    """
 
     old_id: str = ""
-    """As its own course calls it; empty where that has no ids."""
+    """The id that it has in the other course; empty where lessons have none there."""
     file: str = ""
     """Relative to the folder that is imported; empty where it is only planned."""
     title: str = ""
@@ -62,14 +65,14 @@ class ImportedText(Struct, frozen=True, kw_only=True):
     minutes: int | None = None
     id: str = ""
     path: str = ""
-    """Of its new file; empty where it is only planned."""
+    """The path of its new file; empty where it is only planned."""
     segments: tuple[Segment, ...] = ()
     pictures: Mapping[str, bytes] = {}
-    """What its file holds itself."""
+    """Pictures that its file contains, by name."""
 
     @property
     def link(self) -> str:
-        """What leads to it."""
+        """The address for links to it."""
         kind = "page" if self.path.startswith("content/pages/") else "lesson"
         return f"{kind}:{self.id}"
 
@@ -92,15 +95,15 @@ class ImportedCourse(Struct, frozen=True, kw_only=True):
     levels: tuple[ImportedLevel, ...]
     pages: tuple[ImportedText, ...] = ()
     camera_is_position: bool = False
-    """Whether the camera of a lab says where the camera is, seen from its target."""
-    left: tuple[Leftover, ...] = ()
+    """Whether the angles of a lab's camera give its position as seen from its target."""
+    leftovers: tuple[Leftover, ...] = ()
 
 
 Files: TypeAlias = dict[str, Path]
 """The files of a folder by their path in it."""
 
 
-def files_of(folder: Path) -> Files:
+def list_files(folder: Path) -> Files:
     """All files below a folder, but for hidden ones and what tools have made.
 
     Raises:
@@ -108,12 +111,12 @@ def files_of(folder: Path) -> Files:
     """
     if not folder.is_dir():
         raise UsageError(f"there is no folder {folder}")
-    found = {}
+    files = {}
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
         if path.is_file() and not any(part.startswith(".") or part in SKIPPED for part in parts):
-            found["/".join(parts)] = path
-    return found
+            files["/".join(parts)] = path
+    return files
 
 
 def read_text(path: Path, name: str) -> str:
@@ -132,17 +135,17 @@ def read_text(path: Path, name: str) -> str:
 
 
 class _Yaml(yaml.SafeLoader):  # type: ignore[misc]  # which has no types
-    """YAML in which what other tools tag, as by `!!python/name:`, is nothing."""
+    """YAML in which a value with a tag of another tool, such as `!!python/name:`, is `None`."""
 
 
 _Yaml.add_multi_constructor("", lambda loader, tag, node: None)
 
 
 def read_yaml(text: str) -> Any:
-    """What a text of YAML says; `None` where it is none."""
+    """Return the value of a YAML text; `None` where it is invalid."""
     try:
         return _Yaml(text).get_single_data()
-    except (yaml.YAMLError, ValueError, RecursionError):  # such as a date that is none
+    except (yaml.YAMLError, ValueError, RecursionError):  # such as an invalid date
         return None
 
 
@@ -151,8 +154,8 @@ def stem_of(path: str) -> str:
     return posixpath.splitext(path)[0]
 
 
-def name_of(path: str) -> str:
-    """A file's name as a title: without extension and leading number, words apart."""
+def title_of_file(path: str) -> str:
+    """Turn a file's name into a title: without extension and leading number, with spaces."""
     name = posixpath.basename(stem_of(path))
     words = re.sub(r"^[\d.]+[\s._-]+(?=\S)", "", name)
     title = re.sub(r"[_-]+", " ", words).strip() or name

@@ -1,8 +1,8 @@
 """`coursebuild import`: courses of five kinds, and folders that cannot be imported.
 
 A case is a folder beside this file with `source/`, a course of another tool, and `expected/`: what
-an author finds in the new one, with the report in `said.txt`. In `markup` stands what is said alike
-in several of them. `pytest --rewrite-fixtures` writes `expected/`.
+an author finds in the new one, with the report in `report.txt`. The case `markup` holds what
+several dialects write alike. `pytest --rewrite-fixtures` writes `expected/`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from coursebuild.cli import main
 
 HERE = Path(__file__).parent
 CASES = sorted(path.parent.name for path in HERE.glob("*/source"))
-MADE = ("public", "examples", ".coursebuild")
+GENERATED = ("public", "examples", ".coursebuild")
 
 
 def texts(folder: Path) -> dict[str, bytes]:
@@ -24,7 +24,7 @@ def texts(folder: Path) -> dict[str, bytes]:
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.relative_to(folder).parts[0] not in MADE
+        if path.is_file() and path.relative_to(folder).parts[0] not in GENERATED
     }
 
 
@@ -47,18 +47,18 @@ def test_imported_course_builds_without_an_edit(
     monkeypatch.chdir(tmp_path / "here")
     assert main(["import", str(source)]) == 0
     report = capsys.readouterr().out.split("\n\n")[1].replace(str(tmp_path), "…") + "\n"
-    made = {**texts(tmp_path / "here" / case), "said.txt": report.encode()}
+    files = {**texts(tmp_path / "here" / case), "report.txt": report.encode()}
     assert main(["-C", case, "build", "--quiet"]) == 0, capsys.readouterr().out
     assert texts(source) == texts(HERE / case / "source")  # only read
     if rewriting:
         shutil.rmtree(expected, ignore_errors=True)
-        for path, data in made.items():
+        for path, data in files.items():
             (expected / path).parent.mkdir(parents=True, exist_ok=True)
             (expected / path).write_bytes(data)
-    assert made == texts(expected)
+    assert files == texts(expected)
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def import_refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert main(["import", *arguments]) == 2
     return capsys.readouterr().err
 
@@ -68,12 +68,12 @@ def test_folder_that_cannot_be_imported_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     course = tmp_path / "old"
-    said = refused(capsys, "old")
-    assert said == "coursebuild: there is no folder old\n"
+    stderr = import_refused(capsys, "old")
+    assert stderr == "coursebuild: there is no folder old\n"
     course.mkdir()
-    said = refused(capsys, "old")
-    nothing = "there is nothing to import: no course.json, no notebook and no Markdown file"
-    assert said == f"coursebuild: {nothing}\n"
+    stderr = import_refused(capsys, "old")
+    empty_message = "there is nothing to import: no course.json, no notebook and no Markdown file"
+    assert stderr == f"coursebuild: {empty_message}\n"
     for name, text, message in [
         (
             "course.json",
@@ -87,13 +87,13 @@ def test_folder_that_cannot_be_imported_is_refused(
         ("one.ipynb", '{"cells": 7}', "one.ipynb is no notebook of format 4"),
         ("one.ipynb", '{"cells": [7]}', "one.ipynb is no notebook of format 4"),
         ("_toc.yml", "a: [", "_toc.yml is no YAML"),
-        ("_quarto.yml", "book: 7\nwebsite: [x]", nothing),
+        ("_quarto.yml", "book: 7\nwebsite: [x]", empty_message),
     ]:
         (course / name).write_text(text)
-        assert refused(capsys, "old") == f"coursebuild: {message}\n", name
+        assert import_refused(capsys, "old") == f"coursebuild: {message}\n", name
         (course / name).unlink()
     (course / "one.md").write_bytes(b"\xff")
-    assert refused(capsys, "old") == "coursebuild: one.md is not UTF-8\n"
+    assert import_refused(capsys, "old") == "coursebuild: one.md is not UTF-8\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["old"]
 
 
@@ -103,12 +103,12 @@ def test_nothing_is_written_over(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "old").mkdir()
     (tmp_path / "old" / "one.md").write_text("# One\n\nText.\n")
-    inside = "is in the folder that is imported, which is only read"
+    message_inside = "is in the folder that is imported, which is only read"
     for out in ("old", "old/new"):
-        assert f"{inside}\n" in refused(capsys, "old", "--out", out)
+        assert f"{message_inside}\n" in import_refused(capsys, "old", "--out", out)
     (tmp_path / "there" / "content").mkdir(parents=True)
     (tmp_path / "there" / "content" / "course.toml").write_text("mine")
-    said = refused(capsys, "old", "--out", "there")
-    has = "has content/course.toml already; name an empty folder with --out"
-    assert said == f"coursebuild: {tmp_path / 'there'} {has}\n"
+    message = import_refused(capsys, "old", "--out", "there")
+    reason = "has content/course.toml already; name an empty folder with --out"
+    assert message == f"coursebuild: {tmp_path / 'there'} {reason}\n"
     assert texts(tmp_path / "there") == {"content/course.toml": b"mine"}
