@@ -17,7 +17,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.core.checks.compiled import scenarios_of_no_model
+from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
 from coursebuild.core.files.course_features import load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.read import read_course, read_sources
@@ -245,7 +245,7 @@ class _Loader:
             if model.removeprefix("models/").removesuffix(".xml") not in models:
                 if model not in self.files.unreadable:
                     paths = [one.source.path for one in self.files.models]
-                    self.found.append(scenarios_of_no_model(source, paths))
+                    self.found.append(diagnose_orphan_scenarios(source, paths))
             elif parsed.value is not None:
                 found.append(parsed.value)
         return tuple(found)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.checks.formulas import document_formulas, formula_findings
+from coursebuild.core.checks.formulas import check_formulas, document_formulas
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.engine.tool import step_key, typesetter_digest
@@ -222,7 +222,7 @@ class PageReader:
         """The summary of a text, encoded."""
         with self._lock:
             whole = self._whole(text)
-            found = formula_findings(whole.document, whole.formulas)
+            found = check_formulas(whole.document, whole.formulas)
             mathml = known_mathml(whole.formulas)
             known = summarize(whole.document, mathml)
             equations = equations_of(whole.document, mathml)

@@ -20,7 +20,11 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.checks.compiled import broken_model, check_scenarios, scenarios_of_no_model
+from coursebuild.core.checks.compiled import (
+    check_scenarios,
+    diagnose_model,
+    diagnose_orphan_scenarios,
+)
 from coursebuild.core.files.read import CourseFiles, read_course
 from coursebuild.core.model import Declarations, MjcfModel
 from coursebuild.core.model.results import ModelFacts
@@ -73,7 +77,7 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseS
     results = compile_all(root, [(model.source.path, model.source.text) for model in chosen])
     for model, result in zip(chosen, results, strict=True):
         if result.facts is None:
-            found.append(broken_model(model, result, readable_error))
+            found.append(diagnose_model(model, result, readable_error))
             continue
         says = declared.get(model.name, Declarations(model.name, model.source))
         if says is None:
@@ -178,5 +182,5 @@ def _declared(
             declared[name] = parsed.value
             found += parsed.diagnostics
         elif every and f"models/{name}.xml" not in {*paths, *files.unreadable}:
-            found.append(scenarios_of_no_model(source, paths))
+            found.append(diagnose_orphan_scenarios(source, paths))
     return declared, found

@@ -1,6 +1,6 @@
 """Checks of a whole course: values in, diagnostics out.
 
-Entry points: `course.check_course`, everything that can be known before anything runs, and
-`course.check_document`, the same for one document; `compiled.check_compiled` and
-`formulas.formula_findings` for what MuJoCo and the typesetter said.
+Entry points: `course.check_course`, all checks that need no run, and `course.check_document`, the
+same for one document; `compiled.check_compiled` and `formulas.check_formulas` for what MuJoCo and
+the typesetter reported.
 """

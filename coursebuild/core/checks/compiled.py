@@ -1,14 +1,15 @@
-"""What MuJoCo said about models and MJCF blocks, as diagnostics at the right line.
+"""What MuJoCo says about models and MJCF blocks, as diagnostics at the right line.
 
 Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, models, texts)`.
 
-1. `mjcf_texts` gives each `mjcf` block, and each model that a block of a feature holds, as a whole
-   model, with the number of lines put before it.
-2. `check_compiled` holds what compiling gave against what the lesson says, and lets features check
-   what they name. A file that only other models include need not compile by itself.
-3. Scenarios that are declared for a model are held against it: what they name is there, states and
-   commands have as many numbers as the model takes, and its timestep ends where the state is looked
-   at and commands change.
+1. `mjcf_texts` makes a whole model of each `mjcf` block and of each block of a feature that holds
+   a model, and counts the lines put before the author's.
+2. `check_compiled` compares the results of the compiler with what the lesson says, and lets
+   features check the names that they use. A file that only other models include need not compile
+   by itself.
+3. The scenarios declared for a model are compared with it: the model has what they name, states and
+   commands have as many numbers as it takes, and its timestep divides the times at which the state
+   is sampled and commands change.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
 
-_PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
+_INCLUDED_ROOT = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
 class MjcfText(Struct, frozen=True):
@@ -52,14 +53,14 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
     for document in course.documents:
         for block in document_blocks(document):
             if isinstance(block, Mjcf):
-                texts.append(_whole(block))
+                texts.append(_wrap_fragment(block))
             elif isinstance(block, FeatureBlock) and (code := block.mjcf()) is not None:
                 texts.append(MjcfText(block, code, code.text, 0))
     return tuple(texts)
 
 
-def _whole(block: Mjcf) -> MjcfText:
-    """A fragment gets the elements around it.
+def _wrap_fragment(block: Mjcf) -> MjcfText:
+    """The text of a block; a fragment is put into the elements that it names.
 
     `fragment="worldbody/body"` names nested ones, from the outside.
     """
@@ -81,74 +82,74 @@ def check_compiled(
 ) -> tuple[Diagnostic, ...]:
     """Diagnostics of the models, of the MJCF texts, and of what features name in them.
 
-    `readable` makes one line of a message of MuJoCo's.
+    `readable` makes one line of a message of MuJoCo.
     """
     blocks = (block for document in course.documents for block in document_blocks(document))
-    shown = {n for block in blocks if isinstance(block, FeatureBlock) for n in block.models()}
-    found: list[Diagnostic] = []
-    parts = _parts(course, models) - shown
+    lesson_models = {
+        n for block in blocks if isinstance(block, FeatureBlock) for n in block.models()
+    }
+    diagnostics: list[Diagnostic] = []
+    included = _included_models(course, models) - lesson_models
     for model in course.models:
         result = models[model.name]
-        if result.error and model.name not in parts:
-            found.append(broken_model(model, result, readable))
+        if result.error and model.name not in included:
+            diagnostics.append(diagnose_model(model, result, readable))
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
-        found += _check_text(text, result, readable)
+        diagnostics += _check_text(text, result, readable)
         if result.facts is not None:
-            facts[_place(text.block)] = result.facts
+            facts[_block_key(text.block)] = result.facts
 
-    def known(block: FeatureBlock) -> ModelFacts | None:
+    def find_facts(block: FeatureBlock) -> ModelFacts | None:
         names = (*block.models(), *block.mentioned_models())
-        named = (models[name].facts for name in names if name in models)
-        return next(named, None) or facts.get(_place(block))
+        candidates = (models[name].facts for name in names if name in models)
+        return next(candidates, None) or facts.get(_block_key(block))
 
     for feature in features():
         if feature.check_models is not None:
-            found += feature.check_models(course, known)
-    for declared in course.declarations:
-        facts_of_model = models[declared.model].facts
+            diagnostics += feature.check_models(course, find_facts)
+    for declarations in course.declarations:
+        facts_of_model = models[declarations.model].facts
         if facts_of_model is not None:
-            found += check_scenarios(declared, facts_of_model)
-    return tuple(found)
+            diagnostics += check_scenarios(declarations, facts_of_model)
+    return tuple(diagnostics)
 
 
-def broken_model(
+def diagnose_model(
     model: MjcfModel, result: CompileResult, readable: Callable[[str], str]
 ) -> Diagnostic:
-    """Why a model does not compile."""
+    """The diagnostic of a model that does not compile."""
     span = line_span(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
     message = f"the model `{model.name}` does not compile: {readable(result.error)}"
     return diagnose("model-error", span, message)
 
 
-def scenarios_of_no_model(source: Source, models: Collection[str]) -> Diagnostic:
-    """Of a file of scenarios beside which there is none of the models, given by their paths."""
+def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagnostic:
+    """The diagnostic of a file of scenarios without its model; `models` are the paths of all."""
     model = source.path.removesuffix(".toml") + ".xml"
-    near = nearest(model, models)
-    help = f"is it `{near}`?" if near is not None else "put it beside its model"
+    likely = nearest(model, models)
+    help = f"is it `{likely}`?" if likely is not None else "put it beside its model"
     message = f"there is no model {model} to which these scenarios belong"
     return diagnose("scenario-model", source.span(0, 0), message, help=help)
 
 
-def _place(block: Mjcf | FeatureBlock) -> tuple[str, int]:
-    """What a block is found by: it may be another object the next time."""
+def _block_key(block: Mjcf | FeatureBlock) -> tuple[str, int]:
+    """A key for a block: features may hold another object for the same one."""
     return block.span.path, block.span.start
 
 
-def _parts(course: Course, models: Mapping[str, CompileResult]) -> set[str]:
-    """Names of the files in models/ that are there to be included by others."""
-    included = {
-        path for result in models.values() if result.facts for path in result.facts.includes
-    }
+def _included_models(course: Course, models: Mapping[str, CompileResult]) -> set[str]:
+    """Names of the files in models/ that are meant to be included by others."""
+    paths = {path for result in models.values() if result.facts for path in result.facts.includes}
     return {
         model.name
         for model in course.models
-        if model.source.path in included or _PART.match(model.source.text)
+        if model.source.path in paths or _INCLUDED_ROOT.match(model.source.text)
     }
 
 
 def line_span(code: Excerpt, line: int | None, before: int, otherwise: Span) -> Span:
-    """A line of a model, from 1, which has `before` more lines in front when it is compiled."""
+    """The span of a line that MuJoCo names; `before` lines were put before those of `code`."""
     if line is None or not 1 <= line - before <= code.text.count("\n") + 1:
         return otherwise
     row = code.lines()[line - before - 1]
@@ -169,7 +170,7 @@ def _check_text(
                 f"this block must fail with `{block.error}`, and it compiles",
                 help="mend the block, or drop `error=`",
             )
-        elif _folded(block.error) not in _folded(result.error):
+        elif _collapse_spaces(block.error) not in _collapse_spaces(result.error):
             yield diagnose(
                 "mjcf-message",
                 span,
@@ -179,81 +180,81 @@ def _check_text(
         return
     if result.error:
         span = line_span(text.code, result.line, text.lines_before, block.span.first_line())
-        what, help = "this block", ""
+        subject, help = "this block", ""
         if isinstance(block, FeatureBlock):
-            what = f"the model in this {kind_of_block(block).name}"
+            subject = f"the model in this {kind_of_block(block).name}"
         elif block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
-        message = f"{what} does not compile: {readable(result.error)}"
+        message = f"{subject} does not compile: {readable(result.error)}"
         yield diagnose("mjcf-error", span, message, help=help)
 
 
-def _folded(text: str) -> str:
+def _collapse_spaces(text: str) -> str:
     return " ".join(text.split())
 
 
 _RULE = "scenario-model"
 
 
-def check_scenarios(declared: Declarations, facts: ModelFacts) -> Iterator[Diagnostic]:
-    """Everything in which the scenarios do not fit the model."""
-    for scenario in declared.scenarios:
+def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[Diagnostic]:
+    """Yield everything in which the scenarios do not fit the model."""
+    for scenario in declarations.scenarios:
         yield from _check_keyframe(scenario, facts)
         yield from _check_lengths(scenario, facts)
-        yield from _check_measured(scenario, facts)
+        yield from _check_measure(scenario, facts)
         yield from _check_timestep(scenario, facts)
-    for sweep in declared.sweeps:
-        yield from _check_sweep(sweep, declared.scenarios, facts)
+    for sweep in declarations.sweeps:
+        yield from _check_sweep(sweep, declarations.scenarios, facts)
 
 
 def _check_keyframe(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    wanted, place = scenario.keyframe, scenario.place("keyframe")
+    keyframe, place = scenario.keyframe, scenario.place("keyframe")
     count = len(facts.keyframes)
-    if isinstance(wanted, int) and wanted >= count:
+    if isinstance(keyframe, int) and keyframe >= count:
         have = f"it has {count}" if count else "it has none"
-        message = f"the model has no keyframe {wanted}: {have}, counted from 0"
+        message = f"the model has no keyframe {keyframe}: {have}, counted from 0"
         yield diagnose(_RULE, place, message)
-    if isinstance(wanted, str) and wanted not in facts.keyframes:
+    if isinstance(keyframe, str) and keyframe not in facts.keyframes:
         names = [name for name in facts.keyframes if name]
-        message = f"the model has no keyframe `{wanted}`"
-        yield diagnose(_RULE, place, message, help=did_you_mean(wanted, names))
+        message = f"the model has no keyframe `{keyframe}`"
+        yield diagnose(_RULE, place, message, help=did_you_mean(keyframe, names))
 
 
 def _check_lengths(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    for name, given, count, what in (
+    for name, values, count, noun in (
         ("qpos", scenario.qpos, facts.nq, "positions (`nq`)"),
         ("qvel", scenario.qvel, facts.nv, "velocities (`nv`)"),
         ("controls", scenario.controls[0] if scenario.controls else (), facts.nu, "actuators"),
     ):
         if name == "controls" and scenario.controls:
-            wrong = len(given) != count
-            message = f"a command has {len(given)} numbers, and the model has {count} {what}"
+            is_wrong = len(values) != count
+            message = f"a command has {len(values)} numbers, and the model has {count} {noun}"
         else:
-            wrong = bool(given) and len(given) != count
-            message = f"`{name}` has {len(given)} numbers, and the model has {count} {what}"
-        if wrong:
+            is_wrong = bool(values) and len(values) != count
+            message = f"`{name}` has {len(values)} numbers, and the model has {count} {noun}"
+        if is_wrong:
             yield diagnose(_RULE, scenario.place(name), message)
 
 
-def _check_measured(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
+def _check_measure(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
     measure = scenario.measured
     if measure is None:
         return
-    known = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}[measure.kind]
-    if measure.name not in known:
+    names = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}[measure.kind]
+    if measure.name not in names:
         message = f"the model has no {measure.kind} `{measure.name}`"
-        help = did_you_mean(measure.name, [name for name in known if name])
+        help = did_you_mean(measure.name, [name for name in names if name])
         yield diagnose(_RULE, scenario.place("measure"), message, help=help)
 
 
 def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
     step = facts.timestep
-    given = (
+    lengths = (
         ("sample", scenario.sample),
         ("hold", scenario.hold),
         ("duration", scenario.duration),
     )
-    for name, length in given:
+    for name, length in lengths:
         if length is not None:
             count = round(length / step)
             if abs(count * step - length) > 1e-9 * length:
@@ -264,31 +265,33 @@ def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[D
             return
 
 
-MOST_SWEPT = 2_000_000
-"""Steps of all runs of a sweep together: each is looked at, so that these take minutes."""
+MAX_SWEEP_STEPS = 2_000_000
+"""Steps of all runs of a sweep together; so many take minutes, as each is looked at."""
 
 
 def _check_sweep(
     sweep: DeclaredSweep, scenarios: Sequence[DeclaredScenario], facts: ModelFacts
 ) -> Iterator[Diagnostic]:
-    own, total = facts.timestep, 0.0
-    run = next((one for one in scenarios if sweep.scenario in (None, one.name)), None)
-    duration = None if run is None else run.duration
+    timestep, total = facts.timestep, 0.0
+    scenario = next((s for s in scenarios if sweep.scenario in (None, s.name)), None)
+    duration = None if scenario is None else scenario.duration
     if duration is None:
-        held = 0.0 if run is None else len(run.controls) * (run.hold or 0.0)
-        duration = max(held, min(DURATION, MOST_STEPS * own))
-    for part in sweep.variations:
-        timed = part.parameter == "option.timestep"
-        for value in part.values:
-            step = own
+        command_seconds = (
+            0.0 if scenario is None else len(scenario.controls) * (scenario.hold or 0.0)
+        )
+        duration = max(command_seconds, min(DURATION, MOST_STEPS * timestep))
+    for variation in sweep.variations:
+        timed = variation.parameter == "option.timestep"
+        for value in variation.values:
+            step = timestep
             if timed and isinstance(value, float | int):
-                step = own * value if part.relative else value
+                step = timestep * value if variation.relative else value
             if step <= 0:
-                yield diagnose(_RULE, part.span, f"a timestep cannot be {step:g} s")
+                yield diagnose(_RULE, variation.span, f"a timestep cannot be {step:g} s")
                 return
             total += duration / step
-        if total > MOST_SWEPT:
-            message = f"with `{part.parameter}` the sweep makes {total:.2g} steps"
-            help = f"{MOST_SWEPT:,} are the most: take fewer values, or a shorter scenario"
-            yield diagnose(_RULE, part.span, message, help=help)
+        if total > MAX_SWEEP_STEPS:
+            message = f"with `{variation.parameter}` the sweep makes {total:.2g} steps"
+            help = f"{MAX_SWEEP_STEPS:,} are the most: take fewer values, or a shorter scenario"
+            yield diagnose(_RULE, variation.span, message, help=help)
             return

@@ -1,4 +1,4 @@
-"""A whole course checked: lessons, links, mentions, labs, terms and features, against each other.
+"""Check a whole course: lessons, links, mentions, terms and the rules of features.
 
 Entry points: `check_course`; `check_document`, the same for one document.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from coursebuild.core.checks.links import LinkTargets, document_links, link_targets
+from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
 from coursebuild.core.model import (
     Block,
     Course,
@@ -25,43 +25,47 @@ from coursebuild.core.text.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
-    """Lessons, links, mentions, terms and features, checked against each other."""
+    """Check lessons, links, mentions and terms against each other, and the rules of features."""
     targets, documents = link_targets(course), course.documents
-    found = [wrong for one in documents for wrong in _document_findings(course, one, targets)]
-    return (*found, *feature_findings(course, documents))
+    diagnostics = [
+        diagnostic
+        for document in documents
+        for diagnostic in _check_core_rules(course, document, targets)
+    ]
+    return (*diagnostics, *_check_features(course, documents))
 
 
 def check_document(
     course: Course, document: Document, targets: LinkTargets
 ) -> tuple[Diagnostic, ...]:
     """What `check_course` finds in one document, given what the rest of the course offers."""
-    own = _document_findings(course, document, targets)
-    return (*own, *feature_findings(course, (document,)))
+    diagnostics = _check_core_rules(course, document, targets)
+    return (*diagnostics, *_check_features(course, (document,)))
 
 
-def _document_findings(
+def _check_core_rules(
     course: Course, document: Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
     blocks = tuple(document_blocks(document))
-    yield from _lesson_findings(course, document, blocks)
-    yield from _title_findings(course, document)
-    yield from document_links(course, document, targets)
-    yield from _term_findings(blocks, targets.terms)
+    yield from _check_empty_lesson(course, document, blocks)
+    yield from _check_title(course, document)
+    yield from check_links(course, document, targets)
+    yield from _check_terms(blocks, targets.terms)
 
 
-def feature_findings(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """What features find wrong in some documents of a course."""
+def _check_features(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+    """Yield what features find wrong in some documents of a course."""
     for feature in features():
         if feature.check is not None:
             yield from feature.check(course, documents)
 
 
-def _lesson_findings(
+def _check_empty_lesson(
     course: Course, document: Document, blocks: Iterable[Block]
 ) -> tuple[Diagnostic, ...]:
-    """A lesson that is said to be complete and shows nothing; `blocks` are the document's.
+    """Report a complete lesson that shows nothing; `blocks` are those of the document.
 
-    A draft says itself that there is more to come.
+    A draft may be empty.
     """
     if not is_blank(blocks):
         return ()
@@ -79,8 +83,8 @@ def _lesson_findings(
     )
 
 
-def _title_findings(course: Course, document: Document) -> Iterator[Diagnostic]:
-    """A page that opens with a title other than the one that the map gives it."""
+def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:
+    """Report a page that begins with another title than it has in the map."""
     span = title_line(document.source)
     for page in course.pages:
         if page.document is document and span is not None and span.text != page.title:
@@ -88,18 +92,20 @@ def _title_findings(course: Course, document: Document) -> Iterator[Diagnostic]:
             yield diagnose("heading-top", span, message, help="give it one title in both")
 
 
-def _term_findings(blocks: Iterable[Block], known: Mapping[str, Span]) -> tuple[Diagnostic, ...]:
-    """Terms that are defined elsewhere as well; `known` says where each is defined first."""
-    found: list[Diagnostic] = []
+def _check_terms(
+    blocks: Iterable[Block], definitions: Mapping[str, Span]
+) -> tuple[Diagnostic, ...]:
+    """Report terms that have an earlier definition; `definitions` has the first of each."""
+    diagnostics: list[Diagnostic] = []
     for inline in walk_inlines(tuple(i for block in blocks for i in block_inlines(block))):
         if not isinstance(inline, Term):
             continue
-        first = known.get(inline.id)
+        first = definitions.get(inline.id)
         if first is None or (first.path, first.start) == (inline.span.path, inline.span.start):
             continue
         message = f"the term `{inline.id}` is defined twice"
         help = "leave one definition, and link to it from here: "
         help += f'`[…](term:{inline.id})`; or name this one by `{{term="…"}}`'
         notes = [Note("the first one is here", first)]
-        found.append(diagnose("term-repeated", inline.span, message, help=help, notes=notes))
-    return tuple(found)
+        diagnostics.append(diagnose("term-repeated", inline.span, message, help=help, notes=notes))
+    return tuple(diagnostics)

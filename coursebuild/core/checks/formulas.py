@@ -1,7 +1,7 @@
-"""Formulas: which ones a course has, and where those that do not parse stand.
+"""The formulas of a course, and diagnostics of those that do not parse.
 
 Entry points: `course_formulas(course)`; `document_formulas`, `formula_texts` and
-`formula_findings` for one document.
+`check_formulas` for one document.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
 
 
-def _uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
-    """Every formula that says something; an empty one is the parser's to report."""
+def _formula_uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
+    """Every formula with its TeX in the text; empty ones were reported by the parser."""
     for block in document_blocks(document):
         if isinstance(block, MathBlock):
             if block.tex.text.strip():
@@ -36,7 +36,7 @@ def _uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
 
 def formula_texts(document: Document) -> Iterator[Excerpt]:
     """The TeX of every formula of a document, in order."""
-    return (tex for _, tex in _uses(document))
+    return (tex for _, tex in _formula_uses(document))
 
 
 def course_formulas(course: Course) -> tuple[Formula, ...]:
@@ -45,18 +45,18 @@ def course_formulas(course: Course) -> tuple[Formula, ...]:
 
 
 def document_formulas(document: Document) -> tuple[Formula, ...]:
-    """The same of one document."""
-    return tuple(dict.fromkeys(formula for formula, _ in _uses(document)))
+    """Each different formula of one document, in order of first use."""
+    return tuple(dict.fromkeys(formula for formula, _ in _formula_uses(document)))
 
 
-def formula_findings(
+def check_formulas(
     document: Document, typeset: Mapping[Formula, str | MathError]
 ) -> tuple[Diagnostic, ...]:
     """One diagnostic for each place where a formula that does not parse stands."""
-    found: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     if not any(isinstance(result, MathError) for result in typeset.values()):
         return ()
-    for formula, tex in _uses(document):
+    for formula, tex in _formula_uses(document):
         result = typeset[formula]
         if not isinstance(result, MathError):
             continue
@@ -64,5 +64,7 @@ def formula_findings(
         if result.position is not None:
             at = min(result.position, len(tex.text) - 1)
             span = tex.span(at, at + 1)
-        found.append(diagnose("math-syntax", span, f"the formula does not parse: {result.message}"))
-    return tuple(found)
+        diagnostics.append(
+            diagnose("math-syntax", span, f"the formula does not parse: {result.message}")
+        )
+    return tuple(diagnostics)

@@ -1,6 +1,6 @@
-"""Links and mentions of the sources: every one leads somewhere.
+"""Check that every link, mention and image of the sources leads somewhere.
 
-Entry points: `link_targets(course)`; `document_links`, for one document.
+Entry points: `link_targets(course)`; `check_links`, for one document.
 
 1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
    each document.
@@ -77,7 +77,7 @@ class LinkTargets(Struct, frozen=True):
     scripts: frozenset[str]
     files: frozenset[str]
     terms: Mapping[str, Span]
-    """Where each is defined, by its id; of two places the first."""
+    """The first definition of each, by its id."""
 
 
 def link_targets(course: Course) -> LinkTargets:
@@ -94,7 +94,7 @@ def link_targets(course: Course) -> LinkTargets:
         frozenset(level.id for level in course.levels),
         {page.id: page.document for page in course.pages},
         {model.name: model for model in course.models},
-        {d.model: tuple(one.name for one in d.scenarios) for d in course.declarations},
+        {d.model: tuple(scenario.name for scenario in d.scenarios) for d in course.declarations},
         frozenset(scripts),
         frozenset(course.files),
         terms,
@@ -102,16 +102,15 @@ def link_targets(course: Course) -> LinkTargets:
 
 
 def anchors(document: Document) -> Mapping[str, Span]:
-    """The ids that a link may name in a document, and where they lead.
+    """The ids that a link may name in a document, and the spans to which they lead.
 
-    The title of a page, headings, quizzes, listings, outputs, formulas, terms, and ids written in
-    raw HTML; of lines, see `_is_line`. Each lookup after the first finds what was kept with the
-    document.
+    Ids of its title, headings, quizzes, listings, outputs, formulas and terms, and those in raw
+    HTML; for lines of scripts, see `_names_lines`. They are kept with the document.
     """
-    known: dict[str, Span] | None = document.__dict__.get("anchors")
-    if known is None:
-        known = document.__dict__["anchors"] = dict(_anchors(document))
-    return known
+    spans_by_id: dict[str, Span] | None = document.__dict__.get("anchors")
+    if spans_by_id is None:
+        spans_by_id = document.__dict__["anchors"] = dict(_anchors(document))
+    return spans_by_id
 
 
 def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
@@ -142,48 +141,47 @@ def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
                 yield inline.anchor, inline.span
 
 
-def _is_line(anchor: str, document: Document) -> bool:
+def _names_lines(anchor: str, document: Document) -> bool:
     """Whether an anchor names lines of a script of a document."""
-    lines, script = linked_lines(anchor), _listing(anchor, document)
-    return lines is not None and script is not None and lines[2] <= _length(script)
+    lines, script = linked_lines(anchor), _find_listing(anchor, document)
+    return lines is not None and script is not None and lines[2] <= _count_lines(script)
 
 
-def _listing(anchor: str, document: Document) -> Script | None:
+def _find_listing(anchor: str, document: Document) -> Script | None:
     """The script of a document of which an anchor names lines, whether it has them or not."""
     if (lines := linked_lines(anchor)) is None:
         return None
-    wanted = f"{lines[0]}.L{lines[1]}"
+    listing, first, _ = lines
     scripts = document_scripts(document)
-    return next((s for s in scripts if line_anchor(s.path, lines[1]) == wanted), None)
+    return next((s for s in scripts if line_anchor(s.path, first) == f"{listing}.L{first}"), None)
 
 
-def _length(script: Script) -> int:
+def _count_lines(script: Script) -> int:
     return script.code.text.rstrip("\n").count("\n") + 1
 
 
-def document_links(course: Course, document: Document, known: LinkTargets) -> Iterator[Diagnostic]:
-    """A diagnostic for each link, mention or image of a document that leads nowhere.
-
-    `known` is what the course offers.
-    """
-    drawn = {figure.span for figure in recorded_figures(document)}
+def check_links(course: Course, document: Document, targets: LinkTargets) -> Iterator[Diagnostic]:
+    """Report each link, mention or image of a document that leads nowhere."""
+    recorded_spans = {figure.span for figure in recorded_figures(document)}
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
-            yield from _forbidden(block, course)
-            yield from _check_html(block, document, known)
+            yield from _check_html_rules(block, course)
+            yield from _check_html_links(block, document, targets)
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, Link):
                 target = resolve(inline.target, course, document.source.path)
-                yield from _check_link(inline, target, document, known)
-            elif isinstance(inline, Image) and inline.url_span not in drawn:
-                yield from _check_media("the image ", inline.url, inline.url_span, document, known)
+                yield from _check_link(inline, target, document, targets)
+            elif isinstance(inline, Image) and inline.url_span not in recorded_spans:
+                yield from _check_media(
+                    "the image ", inline.url, inline.url_span, document, targets
+                )
             elif isinstance(inline, RawInline):
-                yield from _forbidden(inline, course)
-                yield from _check_html(inline, document, known)
+                yield from _check_html_rules(inline, course)
+                yield from _check_html_links(inline, document, targets)
 
 
-def _forbidden(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnostic]:
-    """What the course does not allow of raw HTML."""
+def _check_html_rules(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnostic]:
+    """Report raw HTML that the course does not allow."""
     if course.html == "none" and not (is_comment(html) or html.html.startswith("</")):
         message, help = "the course allows no raw HTML", "write it in Markdown"
         yield diagnose("html-forbidden", html.span, message, help=help)
@@ -193,45 +191,45 @@ def _forbidden(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnost
             yield diagnose("html-forbidden", part.span, part.message, help=help)
 
 
-def _check_html(
-    html: HtmlBlock | RawInline, document: Document, known: LinkTargets
+def _check_html_links(
+    html: HtmlBlock | RawInline, document: Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
-    """Links of raw HTML to anchors of its own page, and the files that it shows."""
+    """Check links of raw HTML to anchors of its own page, and the files that it shows."""
     span = html.span
     for link in _HTML_ANCHOR.finditer(span.text):
         place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
-        yield from _check_url(place, link[1], document, known)
+        yield from _check_url(place, link[1], document, targets)
     for media in html.media:
         parts = urlsplit_or_none(media.url)
         if parts is None or (parts.scheme != "data" and (parts.netloc or parts.path)):
-            yield from _check_media("", media.url, media.span, document, known)
+            yield from _check_media("", media.url, media.span, document, targets)
 
 
 def _check_link(
-    link: Link, target: Target, document: Document, known: LinkTargets
+    link: Link, target: Target, document: Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
     span = link.target_span
     if isinstance(target, UrlTarget):
-        yield from _check_url(span, target.url, document, known)
+        yield from _check_url(span, target.url, document, targets)
         return
-    rule, name, names, missing = _named(link, target, known)
+    rule, name, names, missing = _look_up(link, target, targets)
     if name not in names:
-        help = _other_kind(target, known) or _lesson_help(target, known)
+        help = _suggest_other_kind(target, targets) or _suggest_lesson(target, targets)
         help = help or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
     elif isinstance(target, ModelTarget):
-        declared = known.scenarios.get(target.name, ())
-        yield from _model_place(span, target.anchor, known.models[target.name], declared)
+        scenarios = targets.scenarios.get(target.name, ())
+        yield from _check_model_anchor(span, target.anchor, targets.models[target.name], scenarios)
     elif isinstance(target, LessonTarget):
-        to, where = known.lessons[target.id], f"lesson {target.id}"
-        yield from _anchor(span, target.anchor, to, where)
+        lesson = targets.lessons[target.id]
+        yield from _check_anchor(span, target.anchor, lesson, f"lesson {target.id}")
     elif isinstance(target, PageTarget):
-        to, where = known.pages[target.id], f"page `{target.id}`"
-        yield from _anchor(span, target.anchor, to, where)
+        page = targets.pages[target.id]
+        yield from _check_anchor(span, target.anchor, page, f"page `{target.id}`")
 
 
-def _by_id(kind: str, id: str) -> str:
-    """How to lead to a lesson, a level or a page."""
+def _link_help(kind: str, id: str) -> str:
+    """How to write a link to a lesson, a level or a page."""
     if kind == "level":
         return f"write `Level {id}` in the text, which becomes a link"
     if kind == "lesson":
@@ -239,61 +237,65 @@ def _by_id(kind: str, id: str) -> str:
     return f"link to `{kind}:{id}`"
 
 
-def _other_kind(target: _Name, known: LinkTargets) -> str:
-    """What to write where a lesson is called a level, or a level a lesson."""
-    if isinstance(target, LessonTarget) and target.id in known.levels:
+def _suggest_other_kind(target: _Name, targets: LinkTargets) -> str:
+    """A help text where a lesson is called a level, or a level a lesson; else empty."""
+    if isinstance(target, LessonTarget) and target.id in targets.levels:
         kind = "level"
-    elif isinstance(target, LevelTarget) and target.id in known.lessons:
+    elif isinstance(target, LevelTarget) and target.id in targets.lessons:
         kind = "lesson"
     else:
         return ""
-    return f"{target.id} is a {kind}: {_by_id(kind, target.id)}"
+    return f"{target.id} is a {kind}: {_link_help(kind, target.id)}"
 
 
-_NUMBERED = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
-"""A file or an address that begins with the id of a lesson."""
+_LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
+"""A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
 
 
-def _lesson_help(target: _Name, known: LinkTargets) -> str:
-    """The lesson that is meant by its file or slug, else those of the same level."""
+def _suggest_lesson(target: _Name, targets: LinkTargets) -> str:
+    """A help text: the lesson whose file or slug the link names, or those of its level."""
     if not isinstance(target, LessonTarget):
         return ""
-    numbered = _NUMBERED.fullmatch(target.id)
-    if numbered and numbered[1] in known.lessons:
-        return f"did you mean `lesson:{numbered[1]}`?"
-    written = ((id, d.source.path) for id, d in known.lessons.items() if d is not None)
-    named = [id for id, path in written if path.endswith(f"-{target.id}.md")]
-    if len(named) == 1:
-        return f"did you mean `lesson:{named[0]}`?"
+    match = _LESSON_NAME.fullmatch(target.id)
+    if match and match[1] in targets.lessons:
+        return f"did you mean `lesson:{match[1]}`?"
+    paths = ((id, d.source.path) for id, d in targets.lessons.items() if d is not None)
+    ids = [id for id, path in paths if path.endswith(f"-{target.id}.md")]
+    if len(ids) == 1:
+        return f"did you mean `lesson:{ids[0]}`?"
     level = target.id.rpartition(".")[0]
-    near = [id for id in known.lessons if level and id.rpartition(".")[0] == level]
-    return f"level {level} has " + ", ".join(f"`{id}`" for id in near) if near else ""
+    ids_of_level = [id for id in targets.lessons if level and id.rpartition(".")[0] == level]
+    return (
+        f"level {level} has " + ", ".join(f"`{id}`" for id in ids_of_level) if ids_of_level else ""
+    )
 
 
-def _named(link: Link, target: _Name, known: LinkTargets) -> tuple[str, str, Collection[str], str]:
-    """The rule of a link, the name by which it calls, all there are, and what to say without it."""
+def _look_up(
+    link: Link, target: _Name, targets: LinkTargets
+) -> tuple[str, str, Collection[str], str]:
+    """The rule of a link, the name of its target, all names of this kind, and the message."""
     lacks = (
         f"is {'mentioned' if link.mention else 'linked to'}, and the course map does not have it"
     )
     match target:
         case LessonTarget(id=id):
-            return "link-lesson", id, known.lessons, f"lesson {id} {lacks}"
+            return "link-lesson", id, targets.lessons, f"lesson {id} {lacks}"
         case LevelTarget(id=id):
-            return "link-level", id, known.levels, f"level {id} {lacks}"
+            return "link-level", id, targets.levels, f"level {id} {lacks}"
         case PageTarget(id=id):
-            return "link-page", id, known.pages, f"no page `{id}` in the course map"
+            return "link-page", id, targets.pages, f"no page `{id}` in the course map"
         case ModelTarget(name=name):
-            return "link-model", name, known.models, f"no model `{name}` in models/"
+            return "link-model", name, targets.models, f"no model `{name}` in models/"
         case ExampleTarget(path=path):
-            return "link-example", path, known.scripts, f"no lesson has a script `{path}`"
+            return "link-example", path, targets.scripts, f"no lesson has a script `{path}`"
         case TermTarget(id=id):
-            return "link-term", id, known.terms, f"no lesson defines the term `{id}`"
+            return "link-term", id, targets.terms, f"no lesson defines the term `{id}`"
         case _:
             assert_never(target)
 
 
-def _anchor(
-    span: Span, anchor: str | None, document: Document | None, where: str
+def _check_anchor(
+    span: Span, anchor: str | None, document: Document | None, page_name: str
 ) -> Iterator[Diagnostic]:
     if not anchor:
         return
@@ -301,25 +303,25 @@ def _anchor(
         yield diagnose(
             "link-anchor",
             span,
-            f"{where} is planned, so it has no anchor `#{anchor}` yet",
+            f"{page_name} is planned, so it has no anchor `#{anchor}` yet",
             help="link to the lesson itself",
         )
         return
-    known = anchors(document)
+    ids = anchors(document)
     name = unquote(anchor)
-    if name in known or _is_line(name, document):
+    if name in ids or _names_lines(name, document):
         return
-    listing = _listing(name, document)
+    listing = _find_listing(name, document)
     help = (
-        did_you_mean(anchor, known)
+        did_you_mean(anchor, ids)
         if listing is None
-        else f"the last line of `{listing.path}` is {_length(listing)}"
+        else f"the last line of `{listing.path}` is {_count_lines(listing)}"
     )
-    yield diagnose("link-anchor", span, f"{where} has no anchor `#{anchor}`", help=help)
+    yield diagnose("link-anchor", span, f"{page_name} has no anchor `#{anchor}`", help=help)
 
 
 def _check_url(
-    span: Span, url: str, document: Document, known: LinkTargets
+    span: Span, url: str, document: Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
     parts = urlsplit_or_none(url)
     if parts is None:
@@ -329,54 +331,56 @@ def _check_url(
         return
     if not parts.path:
         route = _ROUTE.fullmatch(unquote(parts.fragment))
-        if route is not None and (ids := _ids(route[1], known)) and route[2] in ids:
+        if route is not None and (ids := _ids_of_kind(route[1], targets)) and route[2] in ids:
             message = f"`{url}` is an address of another tool"
-            help = _by_id(route[1], route[2])
+            help = _link_help(route[1], route[2])
             yield diagnose("link-anchor", span, message, help=help)
             return
-        yield from _anchor(span, parts.fragment or None, document, "this page")
+        yield from _check_anchor(span, parts.fragment or None, document, "this page")
         return
     path = local_file(url, document.source.path)
-    if path not in known.files:
-        yield diagnose("link-file", span, f"no file `{path}`", help=_file_help(path, known))
+    if path not in targets.files:
+        yield diagnose("link-file", span, f"no file `{path}`", help=_suggest_file(path, targets))
 
 
 _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 """The address of a lesson in a course that one page with a script shows."""
 
 
-def _ids(kind: str, known: LinkTargets) -> Collection[str]:
+def _ids_of_kind(kind: str, targets: LinkTargets) -> Collection[str]:
     """The ids of lessons, levels or pages."""
-    return {"lesson": known.lessons, "level": known.levels, "page": known.pages}[kind]
+    return {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}[kind]
 
 
-def _file_help(path: str, known: LinkTargets) -> str:
+def _suggest_file(path: str, targets: LinkTargets) -> str:
     name = posixpath.basename(path)
-    numbered = _NUMBERED.fullmatch(name)
-    if name.endswith((".md", ".html")) and numbered and numbered[1] in known.lessons:
-        return f"link to the lesson by its id: `lesson:{numbered[1]}`"
+    match = _LESSON_NAME.fullmatch(name)
+    if name.endswith((".md", ".html")) and match and match[1] in targets.lessons:
+        return f"link to the lesson by its id: `lesson:{match[1]}`"
     if name.endswith(".md"):
         return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
-    if name.endswith(".xml") and name[:-4] in known.models:
+    if name.endswith(".xml") and name[:-4] in targets.models:
         return f"link to a model by its name: `model:{name[:-4]}`"
-    files = {posixpath.basename(file): file for file in known.files if not file.endswith(".md")}
-    near = nearest(name, files)
-    return f"did you mean `{files[near]}`?" if near else "files that pages may use lie in content/"
+    files = {posixpath.basename(file): file for file in targets.files if not file.endswith(".md")}
+    likely = nearest(name, files)
+    return (
+        f"did you mean `{files[likely]}`?" if likely else "files that pages may use lie in content/"
+    )
 
 
 def _check_media(
-    what: str, url: str, span: Span, document: Document, known: LinkTargets
+    subject: str, url: str, span: Span, document: Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
-    """Whether a file that a page shows is one of the course."""
+    """Check that a file that a page shows is one of the course."""
     parts = urlsplit_or_none(url)
     if parts is None or parts.scheme or parts.netloc:
-        message = f"{what}`{url}` is not a file of the course"
+        message = f"{subject}`{url}` is not a file of the course"
         help = "put the file into content/ and name it relative to the lesson"
         yield diagnose("image-remote", span, message, help=help)
         return
     path = local_file(url, document.source.path)
-    if path not in known.files:
-        yield diagnose("link-file", span, f"no file `{path}`", help=_file_help(path, known))
+    if path not in targets.files:
+        yield diagnose("link-file", span, f"no file `{path}`", help=_suggest_file(path, targets))
 
 
 def urlsplit_or_none(url: str) -> SplitResult | None:
@@ -387,23 +391,23 @@ def urlsplit_or_none(url: str) -> SplitResult | None:
         return None
 
 
-def _model_place(
+def _check_model_anchor(
     span: Span, anchor: str | None, model: MjcfModel, scenarios: Collection[str]
 ) -> Iterator[Diagnostic]:
-    """What is wrong with an anchor behind `model:NAME`, if anything.
+    """Check the anchor of a link `model:NAME#anchor`.
 
     The ids are those that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
-    declares have one: of others nobody knows before they are measured.
+    declares have one, as others are unknown before they are measured.
     """
     if not anchor:
         return
     name, path = unquote(anchor), model.source.path
-    known = {*model_anchors(scenarios), listing_anchor(path)}
-    if name in known:
+    ids = {*model_anchors(scenarios), listing_anchor(path)}
+    if name in ids:
         return
     lines = linked_lines(name)
     if lines is None or line_anchor(path, lines[1]) != f"{lines[0]}.L{lines[1]}":
-        help = did_you_mean(name, known)
+        help = did_you_mean(name, ids)
     else:
         last = model.source.text.rstrip().count("\n") + 1
         if lines[2] <= last:

@@ -1,4 +1,4 @@
-"""What MuJoCo said of models and MJCF blocks, at the line where it stands."""
+"""What MuJoCo says of models and MJCF blocks, reported at the right line."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from support.made_courses import BOX, facts, make_course, told
 GOOD = CompileResult("", None, facts())
 
 
-def failed(line: int | None = None, error: str = "XML Error: no good") -> CompileResult:
+def failure(line: int | None = None, error: str = "XML Error: no good") -> CompileResult:
     return CompileResult(error, line)
 
 
-def checked(
+def check(
     course: Course, of_text: CompileResult = GOOD, **models: CompileResult
 ) -> tuple[Diagnostic, ...]:
     texts = [(text, of_text) for text in mjcf_texts(course)]
@@ -43,15 +43,15 @@ def block(keys: str, *lines: str) -> Course:
     ],
 )
 def test_a_fragment_gets_the_elements_around_it(keys: str, text: str, before: int) -> None:
-    (found,) = mjcf_texts(block(keys, "<geom/>"))
-    assert (found.text, found.lines_before) == (text, before)
+    (wrapped,) = mjcf_texts(block(keys, "<geom/>"))
+    assert (wrapped.text, wrapped.lines_before) == (text, before)
 
 
 def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
     lab = '```lab\n{"xml": "<mujoco/>"}\n```\n'
     by_name = '```lab\n{"model": "box"}\n```\n'
     course = make_course(f"```mjcf\n<a/>\n```\n\n{lab}", f"{by_name}\n```mjcf\n<b/>\n```\n")
-    assert [found.text for found in mjcf_texts(course)] == ["<a/>\n", "<mujoco/>", "<b/>\n"]
+    assert [text.text for text in mjcf_texts(course)] == ["<a/>\n", "<mujoco/>", "<b/>\n"]
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
 def test_an_error_is_told_at_its_line_without_indent(
     keys: str, line: int | None, expected: str
 ) -> None:
-    assert told(checked(block(keys), failed(line))) == [f"mjcf-error: {expected}"]
+    assert told(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
 
 
 PART = "<!-- a part -->\n<mujocoinclude/>\n"
@@ -90,37 +90,37 @@ def test_a_file_that_others_include_need_not_compile(
     part: str, whole: CompileResult, expected: list[str]
 ) -> None:
     course = make_course(models={"part": part, "whole": BOX})
-    assert told(checked(course, part=failed(), whole=whole)) == expected
+    assert told(check(course, part=failure(), whole=whole)) == expected
 
 
 def test_names_that_a_lab_uses_are_in_its_own_model() -> None:
-    named = facts(keyframes=("home", "", "up"), sites=("tip",))
-    model, other = (CompileResult("", None, one) for one in (named, facts(sites=("top",))))
-    for source, of_text, box in (('"model": "box"', other, model), ('"xml": "<x/>"', model, other)):
+    right = CompileResult("", None, facts(keyframes=("home", "", "up"), sites=("tip",)))
+    wrong = CompileResult("", None, facts(sites=("top",)))
+    for source, of_text, box in (('"model": "box"', wrong, right), ('"xml": "<x/>"', right, wrong)):
         for fields, expected in (
             ('"key": "up", "trail": "tip"', []),
             ('"key": 2', []),
             ('"trail": "top", "key": 3', ["lab-name: 3", 'lab-name: "top"']),
         ):
             course = make_course(f"```lab\n{{{source}, {fields}}}\n```\n", models={"box": BOX})
-            assert told(checked(course, of_text, box=box)) == expected
+            assert told(check(course, of_text, box=box)) == expected
     course = make_course('```lab\n{"model": "box", "key": 9}\n```\n', models={"box": BOX})
-    assert told(checked(course, box=failed())) == ["model-error: "]
+    assert told(check(course, box=failure())) == ["model-error: "]
 
 
 def test_a_part_that_a_lab_uses_as_its_model_must_compile() -> None:
     course = make_course('```lab\n{"model": "part"}\n```\n', models={"part": PART})
-    assert told(checked(course, part=failed())) == ["model-error: "]
+    assert told(check(course, part=failure())) == ["model-error: "]
 
 
 def test_scenarios_are_held_against_the_compiled_model() -> None:
     report = "```bench box scenario=fall\n```\n"
     home = CompileResult("", None, facts(keyframes=("home",)))
     undeclared = make_course(report, models={"box": BOX})
-    assert told(checked(undeclared, box=home)) == ["bench-scenario: fall"]
-    assert told(checked(undeclared, box=failed())) == ["model-error: "]
-    declared = '[[scenario]]\nname = "swing"\nkeyframe = 1\n'
-    course = make_course(report, models={"box": BOX}, declared={"box": declared})
+    assert told(check(undeclared, box=home)) == ["bench-scenario: fall"]
+    assert told(check(undeclared, box=failure())) == ["model-error: "]
+    scenarios = '[[scenario]]\nname = "swing"\nkeyframe = 1\n'
+    course = make_course(report, models={"box": BOX}, declared={"box": scenarios})
     # That the scenario is none of those declared is known before anything is compiled.
-    assert told(checked(course, box=home)) == ["scenario-model: 1"]
-    assert told(checked(course, box=failed())) == ["model-error: "]
+    assert told(check(course, box=home)) == ["scenario-model: 1"]
+    assert told(check(course, box=failure())) == ["model-error: "]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.core.checks.formulas import course_formulas, formula_findings
+from coursebuild.core.checks.formulas import check_formulas, course_formulas
 from coursebuild.core.model.results import Formula, MathError
 from support.made_courses import make_course, said, told
 
@@ -23,7 +23,7 @@ def test_a_formula_is_told_at_each_place_where_it_stops_to_parse() -> None:
     good = {Formula("a", False): "", Formula("x + y", True): ""}
     for position, expected in ((None, "x + y"), (0, "x"), (4, "y"), (5, "y"), (99, "y")):
         typeset = {**good, Formula("x + y", False): MathError("no good", position)}
-        found = formula_findings(document, typeset)
-        assert told(found) == [f"math-syntax: {expected}"] * 2
-        assert said(found) == ["the formula does not parse: no good"] * 2
-        assert [d.span.line for d in found] == [1, 3]
+        diagnostics = check_formulas(document, typeset)
+        assert told(diagnostics) == [f"math-syntax: {expected}"] * 2
+        assert said(diagnostics) == ["the formula does not parse: no good"] * 2
+        assert [d.span.line for d in diagnostics] == [1, 3]

@@ -13,7 +13,7 @@ QUESTION = '{"id": "one", "kind": "open", "q": "Q", "reference": "R"}'
 QUIZ = f'```quiz\n{{"id": "q1", "questions": [{QUESTION}]}}\n```\n'
 
 
-def findings(first: str, second: str = f"## There {{#there}}\n\n{SCRIPT}") -> list[str]:
+def messages_of(first: str, second: str = f"## There {{#there}}\n\n{SCRIPT}") -> list[str]:
     files = ["content/lessons/plot.svg", "content/data/a b.csv"]
     return told(check_course(make_course(first, second, models={"box": BOX}, files=files)))
 
@@ -36,13 +36,13 @@ BAD = {
 
 
 def test_links_that_lead_somewhere_are_good() -> None:
-    assert findings("## Here\n\n" + "\n".join(f"[a]({target})" for target in GOOD)) == []
+    assert messages_of("## Here\n\n" + "\n".join(f"[a]({target})" for target in GOOD)) == []
 
 
 @pytest.mark.parametrize("rule", BAD)
 def test_links_that_lead_nowhere_are_told_at_their_targets(rule: str) -> None:
-    found = findings("## Here\n\n" + "\n".join(f"[a]({target})" for target in BAD[rule]))
-    assert found == [f"{rule}: {target}" for target in BAD[rule]]
+    messages = messages_of("## Here\n\n" + "\n".join(f"[a]({target})" for target in BAD[rule]))
+    assert messages == [f"{rule}: {target}" for target in BAD[rule]]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_links_that_lead_nowhere_are_told_at_their_targets(rule: str) -> None:
     ],
 )
 def test_mentions_are_links_wherever_they_stand(text: str, expected: list[str]) -> None:
-    assert findings(text) == expected
+    assert messages_of(text) == expected
 
 
 def test_each_thing_of_a_document_that_has_an_anchor_is_known_by_it() -> None:
@@ -68,14 +68,14 @@ def test_each_thing_of_a_document_that_has_an_anchor_is_known_by_it() -> None:
         + '\n$$\nx\n$$ {#eq:one}\n\n<div id="raw">\n</div>\n\nText <b id=in>b</b>'
         + " and [mass]{term}.\n"
     )
-    known = anchors(document("content/lessons/1.1-x.md", text))
-    assert known.keys() == {
+    spans = anchors(document("content/lessons/1.1-x.md", text))
+    assert spans.keys() == {
         *("a", "a_b.py", "a_b.out", "a_b.out-2", "q1", "q1.one", "eq:one", "raw", "in", "term:mass")
     }
-    assert [known[id].text for id in ("a", "in", "term:mass")] == [
+    assert [spans[id].text for id in ("a", "in", "term:mass")] == [
         *("## A B {#a}", "<b id=in>", "[mass]{term}")
     ]
-    assert known["eq:one"].start == text.index("$$")
+    assert spans["eq:one"].start == text.index("$$")
 
 
 @pytest.mark.parametrize(

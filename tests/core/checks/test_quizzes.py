@@ -14,20 +14,20 @@ from support.made_courses import make_course, said, told
 
 def question(line: int = 1) -> str:
     """A quiz with a question about a line that a script prints."""
-    asked = {"kind": "output", "q": "Q", "of": "examples/x.py", "line": line}
-    return f"```quiz\n{json.dumps({'id': 'q', 'questions': [asked]})}\n```\n"
+    question_json = {"kind": "output", "q": "Q", "of": "examples/x.py", "line": line}
+    return f"```quiz\n{json.dumps({'id': 'q', 'questions': [question_json]})}\n```\n"
 
 
-def ran(stdout: str, outcome: Outcome = Outcome.OK) -> ScriptRun:
+def script_run(stdout: str, outcome: Outcome = Outcome.OK) -> ScriptRun:
     return ScriptRun("examples/x.py", outcome, 0, stdout, "", 0.0)
 
 
 def test_an_output_question_needs_a_script_that_runs() -> None:
     script = "```python file=examples/x.py\nprint(1)\n```\n"
     assert check_course(make_course(question(), script)) == ()
-    found = check_course(make_course(question(), script.replace(".py", ".py norun")))
-    assert told(found) == ['quiz-output: "examples/x.py"']
-    assert said(found) == ["`examples/x.py` is marked `norun`, so it has no output"]
+    diagnostics = check_course(make_course(question(), script.replace(".py", ".py norun")))
+    assert told(diagnostics) == ['quiz-output: "examples/x.py"']
+    assert said(diagnostics) == ["`examples/x.py` is marked `norun`, so it has no output"]
 
 
 @pytest.mark.parametrize(
@@ -45,6 +45,6 @@ def test_an_output_question_is_about_a_line_that_is_printed(
 ) -> None:
     course = make_course(question(line))
     message = f"`examples/x.py` has no line {line}: it prints {lines}"
-    assert said(check_output_lines(course, [ran(stdout)])) == ([message] if lines else [])
-    for runs in ([], [ran(stdout, Outcome.FAILED)]):
+    assert said(check_output_lines(course, [script_run(stdout)])) == ([message] if lines else [])
+    for runs in ([], [script_run(stdout, Outcome.FAILED)]):
         assert not list(check_output_lines(course, runs)), "it did not run to its end"

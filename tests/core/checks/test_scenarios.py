@@ -25,15 +25,15 @@ GOOD = (
 )
 
 
-def findings(*scenarios: str) -> list[str]:
+def messages_of(*scenarios: str) -> list[str]:
     texts = (f'[[scenario]]\nname = "s{n}"\n{text}\n' for n, text in enumerate(scenarios))
-    (declared,) = make_course(models={}, declared={"box": "".join(texts)}).declarations
-    found = tuple(check_scenarios(declared, MODEL))
-    return [f"{a}; {b}" for a, b in zip(told(found), said(found), strict=True)]
+    (declarations,) = make_course(models={}, declared={"box": "".join(texts)}).declarations
+    diagnostics = tuple(check_scenarios(declarations, MODEL))
+    return [f"{a}; {b}" for a, b in zip(told(diagnostics), said(diagnostics), strict=True)]
 
 
 def test_scenarios_that_fit_their_model_are_good() -> None:
-    assert findings(*GOOD) == []
+    assert messages_of(*GOOD) == []
 
 
 @pytest.mark.parametrize(
@@ -53,11 +53,11 @@ def test_scenarios_that_fit_their_model_are_good() -> None:
     ],
 )  # fmt: skip
 def test_what_does_not_fit_the_model_is_told_at_its_value(line: str, expected: str) -> None:
-    assert findings(line) == [f"scenario-model: {expected}"]
+    assert messages_of(line) == [f"scenario-model: {expected}"]
 
 
 def test_all_that_is_wrong_with_all_scenarios_is_told() -> None:
-    found = findings("keyframe = 8\nduration = 0.003", "keyframe = 7\nqvel = [1]")
-    assert [one.partition(";")[0] for one in found] == [
+    messages = messages_of("keyframe = 8\nduration = 0.003", "keyframe = 7\nqvel = [1]")
+    assert [message.partition(";")[0] for message in messages] == [
         f"scenario-model: {place}" for place in ("8", "0.003", "7", "[")
     ]
