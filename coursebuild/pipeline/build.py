@@ -41,8 +41,8 @@ def build(options: Options, out: Path) -> Report:
             stays = f"; {out} stays as it is" if place.exists() else ""
             return replace(report, remarks=(f"nothing was published{stays}",))
         stage = functools.partial(progress.stage, "publishing")
-        publish(options.root, place, site.files, site.listed, jobs=options.jobs, stage=stage)
-    count = len(site.files) + (site.listed is not None)
+        publish(options.root, place, site.files, site.file_list, jobs=options.jobs, stage=stage)
+    count = len(site.files) + (site.file_list is not None)
     return replace(report, remarks=(f"published {count} files in {out}",))
 
 

@@ -50,7 +50,7 @@ class Site(Struct, frozen=True):
 
     files: tuple[SiteFile, ...]
     """Sorted by path."""
-    listed: FileList | None
+    file_list: FileList | None
     """The list of them all, where there is one."""
     diagnostics: tuple[Diagnostic, ...]
     drawn: tuple[str, ...]
@@ -109,7 +109,7 @@ class SiteMaker:
         downloads = Downloads.of(self.library, self.assets, self.documents, self.root, self.store)
         files: list[SiteFile] = [*shared, *own, *self._copies(own), *downloads.files]
         context = functools.partial(self._context, pages, names, downloads)
-        added, listed = added_files(context)
+        added, file_list = added_files(context)
         files += [*added, OutputFile(urls.ROBOTS, meta.robots(self.course))]
         if self.course.base_url:
             files.append(OutputFile(urls.SITEMAP, meta.sitemap(self.course, pages.indexed)))
@@ -118,7 +118,7 @@ class SiteMaker:
         if entries is None and not pages.are_sound({file.path for file in files}):
             found = tuple(broken_links([*framed, *files], self.course.base_url))
         everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
-        return Site(everything, listed, found, pages.drawn, names, pages.keys)
+        return Site(everything, file_list, found, pages.drawn, names, pages.keys)
 
     # --- what all pages share
 

@@ -1,10 +1,10 @@
-"""Writing a file for others, in one step, without holding an archive in memory.
+"""Exports: a file or an archive, written in one step, without holding the archive in memory.
 
-Entry points: `check_target`, which says early whether one may be written somewhere;
+Entry points: `check_target`, which says early whether an export may be written somewhere;
 `write_export`.
 
-The same files give the same bytes: they stand in the order of their paths, with one date, and what
-is compressed already is stored.
+The same files give the same bytes: entries are sorted by path and have the same date. Files that
+are compressed already are stored.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from coursebuild.core.model.results import SiteFile
 _DATE = (1980, 1, 1, 0, 0, 0)
 _LEVEL = 6
 _FIRST = "mimetype"
-"""What an e-book must begin with, stored."""
+"""The file that an e-book must begin with, uncompressed."""
 _STORED = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _FIRST)
 _AUTHORED = ("features", "models", "examples", ".coursebuild", ".git")
 
 
 def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
-    """Nothing may be at `out`, or at what it links to, but such a file of an earlier export.
+    """Check that an export may be written to `out`: nothing is there, or only an earlier export.
 
-    That has a file called `mark`, or `mark` near its beginning where it is no archive.
+    An earlier archive holds a file called `mark`; any other export has `mark` near its beginning.
 
     Raises:
         PublishRefusedError: the file must not go there.
@@ -71,13 +71,13 @@ def _begins_with(place: Path, mark: str) -> bool:
 
 
 def write_export(out: Path, files: Iterable[SiteFile], *, archive: bool) -> int:
-    """Write files into an archive, or the only one as it is; gives the size in bytes.
+    """Write files into an archive, or a single file as it is; return the size in bytes.
 
     Raises:
         EffectError: it cannot be written; what was there stays.
     """
     place = Path(os.path.realpath(out))
-    # One name, so that what a killed command left is written over by the next.
+    # Always the same name, so that the next command overwrites what a killed one left.
     temporary = place.with_name(f".{place.name}.part")
     try:
         try:
@@ -102,8 +102,8 @@ def _pack(target: BinaryIO, files: Iterable[SiteFile]) -> None:
     with zipfile.ZipFile(target, "w") as archive:
         for file in sorted(files, key=lambda file: (file.path != _FIRST, file.path)):
             entry = zipfile.ZipInfo(file.path, _DATE)
-            stored = file.path.lower().endswith(_STORED)
-            entry.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+            is_stored = file.path.lower().endswith(_STORED)
+            entry.compress_type = zipfile.ZIP_STORED if is_stored else zipfile.ZIP_DEFLATED
             entry.create_system = 3
             entry.external_attr = 0o100644 << 16
             archive.writestr(entry, file.make(), compresslevel=_LEVEL)

@@ -1,8 +1,9 @@
-"""What stands at a path now, as a short text: the same text, the same content.
+"""The state of a file or folder as a short text: the same text means the same content.
 
 Entry points: `file_state`, `folder_state`, `modules_in`; `changed_since` with a time of a `Clock`.
 
-A file is its SHA-256, a folder the hash of what it lists, and what is not there is `absent`.
+The state of a file is its SHA-256, that of a folder a hash of the names in it; a path where nothing
+is has the state `absent`.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ ABSENT = "absent"
 FOLDER = "folder"
 FILE = "file"
 SPECIAL = "special"
-"""A device or a pipe: what it gives cannot be known beforehand."""
+"""A device or a pipe: what will be read from it cannot be known."""
 _TICK = 2_000_000_000
 """The coarsest clock of a file system, ns."""
 _LAG = 20_000_000
-"""How far the clock of a file system may be behind, ns."""
+"""How far the clock of a file system may lag behind, ns."""
 _LONGEST_TICK = 0.05
 
 
@@ -40,7 +41,7 @@ def file_state(path: str) -> str:
         if not stat.S_ISREG(status.st_mode):
             return SPECIAL
         times = status.st_mtime_ns, status.st_ctime_ns
-        if max(times) + _TICK >= time.time_ns():  # another change may not show in its times
+        if max(times) + _TICK >= time.time_ns():  # another change might not show in its times
             return _sha256(path)
         return _known_sha256(path, (*times, status.st_size, status.st_ino, status.st_dev))
     except (FileNotFoundError, NotADirectoryError, ValueError):  # the last: a null character
@@ -56,7 +57,7 @@ def _sha256(path: str) -> str:
 
 @functools.lru_cache(maxsize=10_000)
 def _known_sha256(path: str, signature: tuple[int, ...]) -> str:
-    """That of a file with these times, this size and place: large ones are parts of many models."""
+    """The SHA-256 of a file, remembered by its stat: large files are parts of many models."""
     return _sha256(path)
 
 
@@ -78,26 +79,27 @@ def folder_state(path: str) -> str:
 
 
 def modules_in(folder: str, names: Iterable[str]) -> str:
-    """Which modules of these names a folder has."""
+    """Return those of the names that are modules in the folder."""
     try:
-        listed = frozenset(os.listdir(folder))  # noqa: PTH208
+        entries = frozenset(os.listdir(folder))  # noqa: PTH208
     except (OSError, ValueError):
         return ""
     return " ".join(
         name
         for name in names
-        if f"{name}.py" in listed or (name in listed and Path(folder, name, "__init__.py").exists())
+        if f"{name}.py" in entries
+        or (name in entries and Path(folder, name, "__init__.py").exists())
     )
 
 
 class Clock:
-    """The clock of the file system that the course lies on: a file in the store is touched."""
+    """The clock of the file system that holds the course, read by touching a file there."""
 
     def __init__(self, store: Memo) -> None:
         self._path = store.folder / "clock"
 
     def now(self) -> int:
-        """A time, ns: what changes from now on has this time or a later one."""
+        """The time now, ns: every later change has this time or a later one."""
         try:
             if not self._path.exists():
                 make_private_folder(self._path.parent)
@@ -107,7 +109,7 @@ class Clock:
             return time.time_ns() - _LAG
 
     def tick(self) -> None:
-        """Wait until what has changed before has an earlier time than `now` gives."""
+        """Wait until `now` gives a later time than all changes so far have."""
         before = self.now()
         until = time.monotonic() + _LONGEST_TICK
         while self.now() <= before and time.monotonic() < until:
@@ -117,7 +119,7 @@ class Clock:
 def changed_since(path: str, since_ns: int) -> bool:
     """Whether a file or folder has changed since a time of a `Clock`, by its own times.
 
-    Of what is not there the folder counts in which it would be.
+    Where nothing is at the path, the times of the nearest folder above it count.
     """
     place = Path(path)
     while True:
@@ -128,5 +130,5 @@ def changed_since(path: str, since_ns: int) -> bool:
             if place == place.parent:
                 return False
             place = place.parent
-    # The time of content can be set to anything, also to a moment that is to come.
+    # The modification time can be set to anything, even to the future.
     return status.st_ctime_ns >= since_ns or since_ns <= status.st_mtime_ns <= time.time_ns()

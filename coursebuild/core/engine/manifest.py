@@ -1,11 +1,12 @@
-"""What was published last: by its key and its stat, a file of the site that need not be made again.
+"""The manifest of the last published site: the key and the stat of each file.
 
-Entry points: `Manifest.read(root, place)`, `Manifest.write`; `marker`, the list of its files that a
-site itself has, `holds` and `foreign_files`, by which nobody's files are published over.
+Entry points: `Manifest.read(root, place)`, `Manifest.write`; `marker`, the list of files that a
+site itself carries; `holds` and `foreign_files`, which keep publishing from overwriting the files
+of others.
 
-The manifest is an entry of the course's `Memo`, since a site holds nothing that changes from build
-to build without need. It is only believed of a file that is, by size, time of change and inode, the
-one that was written; where it is missing or damaged everything is made again.
+The manifest is an entry of the course's `Memo`, not a file of the site, since it changes from build
+to build. It is believed only of a file that is, by size, modification time and inode, the one that
+was written. Where it is missing or damaged, everything is made again.
 """
 
 from __future__ import annotations
@@ -22,19 +23,19 @@ from msgspec import Struct
 from coursebuild.core.engine.memo import Memo
 
 KIND = "published"
-"""The kind of entry that a manifest is."""
+"""The kind of a manifest's memo entry."""
 MARKER = ".coursebuild-site"
 """A file in every site: a line that says what it is, then the path of every file of the site."""
 _HEADER = "site built by coursebuild; every file listed here may be replaced"
 _JUNK = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
-"""What file managers strew about."""
+"""Files that file managers leave in folders."""
 
 
 class ManifestEntry(Struct, frozen=True, array_like=True):
     """A published file."""
 
     key: str
-    """A hash of all that its bytes depend on."""
+    """A hash of everything that its bytes depend on."""
     digest: str
     """SHA-256 of its bytes, in hexadecimal digits."""
     size: int
@@ -66,17 +67,17 @@ class Manifest(Struct, frozen=True):
 
     @classmethod
     def read(cls, root: Path, place: Path) -> Manifest:
-        """What is known of the site at this place: nothing, where there is no sound manifest."""
-        found = Memo(root).get_value(KIND, _key(root, place), dict[str, ManifestEntry])
-        return cls(place, found or {})
+        """The manifest of the site at this place; an empty one where none can be read."""
+        entries = Memo(root).get_value(KIND, _key(root, place), dict[str, ManifestEntry])
+        return cls(place, entries or {})
 
     def entry(self, path: str, key: str) -> ManifestEntry | None:
-        """What was published at a path under a key."""
-        found = self.entries.get(path)
-        return found if found is not None and found.key == key else None
+        """The entry of a path if it was published under this key."""
+        entry = self.entries.get(path)
+        return entry if entry is not None and entry.key == key else None
 
     def is_whole(self, path: str, key: str) -> bool:
-        """Whether the file there was published under this key, and is as it was."""
+        """Whether the file at the path was published under this key and has not changed since."""
         entry = self.entry(path, key)
         try:
             return entry is not None and entry.fits(os.lstat(f"{self.place}/{path}"))
@@ -84,43 +85,43 @@ class Manifest(Struct, frozen=True):
             return False
 
     def write(self, root: Path) -> None:
-        """Keep it for the next build; one that cannot be written only costs time."""
+        """Keep the manifest for the next build; failing to write it only costs time."""
         Memo(root).put_value(KIND, _key(root, self.place), self.entries)
 
 
 def _key(root: Path, place: Path) -> str:
-    """One for each place; it is the same when the project is moved with the site in it."""
-    named = place.relative_to(root) if place.is_relative_to(root) else place
-    return hashlib.sha256(os.fsencode(named)).hexdigest()
+    """The key of the place's manifest; it stays when the project moves with the site in it."""
+    name = place.relative_to(root) if place.is_relative_to(root) else place
+    return hashlib.sha256(os.fsencode(name)).hexdigest()
 
 
 # --- the files of a site
 
 
 def marker(paths: Iterable[str]) -> bytes:
-    """What is in the marker of a site with these files."""
+    """The content of the marker of a site with these files."""
     return "\n".join([_HEADER, *sorted(paths), ""]).encode()
 
 
 def holds(folder: Path, paths: Collection[str]) -> bool:
-    """Whether a folder has these files and the marker, and no other."""
+    """Whether a folder has these files and the marker, and no others."""
     return set(_files(folder)) == {MARKER, *paths}
 
 
 def foreign_files(place: Path) -> list[str]:
-    """Files at the place that no build of ours put there; sorted."""
+    """The files at the place that no build of ours put there, sorted."""
     if not os.path.lexists(place):
         return []
-    listed: list[str] = []
+    own_paths: list[str] = []
     with contextlib.suppress(FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
-        header, *listed = (place / MARKER).read_text(encoding="utf-8").split("\n")
-        listed = [MARKER, *listed] if header == _HEADER else []
-    return sorted(set(_files(place)).difference(listed))
+        header, *own_paths = (place / MARKER).read_text(encoding="utf-8").split("\n")
+        own_paths = [MARKER, *own_paths] if header == _HEADER else []
+    return sorted(set(_files(place)).difference(own_paths))
 
 
 def _files(folder: Path) -> list[str]:
-    """The paths of all files in a folder, but for junk."""
-    found: list[str] = []
+    """The paths of all files in a folder except junk."""
+    paths: list[str] = []
     folders = [""]
     for prefix in folders:
         with os.scandir(f"{folder}/{prefix}") as entries:
@@ -128,5 +129,5 @@ def _files(folder: Path) -> list[str]:
                 if entry.is_dir(follow_symlinks=False):
                     folders.append(f"{prefix}{entry.name}/")
                 elif entry.name not in _JUNK:
-                    found.append(prefix + entry.name)
-    return found
+                    paths.append(prefix + entry.name)
+    return paths

@@ -1,16 +1,17 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
-Entry point: `Memo`: `get` and `put`, or both in one, `get_or_create`; `get_value` and `put_value`
-of JSON.
+Entry point: `Memo`, with `get` and `put`, or both in one, `get_or_create`; `get_value` and
+`put_value` for JSON.
 
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
-   together. It begins with a hash of its name and its data, and whoever reads it says of which type
-   the data must be. A damaged entry is reported, removed and made again.
-2. It is written beside its place and renamed there, so that other processes see whole entries only.
+   together. It begins with a hash of its name and its data, and the reader says which type the
+   data must have. A damaged entry is reported, removed and made again.
+2. It is written under a temporary name and then renamed, so that other processes see whole entries
+   only.
 3. Results of scripts and trials can be shared: they are also looked for in the shared cache, if
    there is one, and sent there. Everything else is made on this machine.
-4. Now and then, as a command ends, entries are removed until all take less than the limit, those
-   first that were used longest ago.
+4. Now and then, as a command ends, the entries used longest ago are removed until the rest is
+   within the limit.
 
 Nothing is lost when the folder is deleted.
 """
@@ -42,26 +43,26 @@ Value = TypeVar("Value")
 
 FOLDER = ".coursebuild"
 SIZE = 1 << 30
-"""Bytes that all may take."""
+"""Bytes that all entries may take together."""
 HASH = re.compile(r"[0-9a-f]{64}")
-"""What an entry, or a group of them, is called."""
+"""The name of an entry or of a group of entries."""
 TEMPORARY = ".new-"
-"""Names of files that are being written begin so."""
+"""What the names of files begin with while they are written."""
 _DIGEST = hashlib.sha256().digest_size
 _USED = 3600.0
-"""Seconds after which the use of an entry is noted again, and what a killed writer left goes."""
-_OFTEN = 3600.0
-"""Seconds between two times that all is gone through."""
+"""Seconds after which the use of an entry is noted again, and a killed writer's file is removed."""
+_PRUNE_INTERVAL = 3600.0
+"""Seconds between two prunings."""
 _SHARE = 16
-"""Where this part of the limit was written at once all is gone through at once."""
-_NEWEST = 8
-"""Entries that a group keeps."""
-_ROOM = 0.9
-"""Part of the limit that is left full, so that not every command has to remove something."""
+"""A command that wrote this part of the limit, a sixteenth, prunes whatever the interval."""
+_GROUP_SIZE = 8
+"""Entries that a group keeps, the newest."""
+_PRUNED_SHARE = 0.9
+"""Part of the limit that pruning leaves in use, so that not every command has to prune."""
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write a file in a folder that is there, or write it anew: whole or not at all."""
+    """Make or replace a file in an existing folder, whole or not at all."""
     new = path.with_name(f"{TEMPORARY}{os.urandom(8).hex()}")
     try:
         new.write_bytes(data)
@@ -73,16 +74,16 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def sealed(name: str, data: bytes, key: bytes = b"") -> bytes:
-    """An entry: data behind the hash of itself and its name, such as `KIND/KEY`.
+    """Make an entry: data, preceded by a hash of it and of the entry's name, such as `KIND/KEY`.
 
-    With a key only those who have it can make one.
+    With a key, only those who have the key can make one.
     """
     text = b"%s\0%s" % (name.encode(), data)
     return (hmac.digest(key, text, "sha256") if key else hashlib.sha256(text).digest()) + data
 
 
 def unsealed(name: str, entry: bytes, key: bytes = b"") -> bytes | None:
-    """The data of an entry; `None` where it is not what was put under this name."""
+    """The data of an entry; `None` where it is not what was stored under this name."""
     data = entry[_DIGEST:]
     return data if hmac.compare_digest(entry, sealed(name, data, key)) else None
 
@@ -105,58 +106,58 @@ class Memo:
         self.shared = shared
         self.size = size
         self.fresh = fresh
-        """Whether everything is to be made again: nothing is found, and what is made is kept."""
+        """Whether everything is to be made again: `get` finds nothing, `put` works as usual."""
         self._lock = threading.Lock()
-        self._told: set[str] = set()
-        self._waiting: list[str] = []
-        self._tell: Callable[[str], None] = self._waiting.append
-        self._written = 0
+        self._messages: set[str] = set()
+        self._pending: list[str] = []
+        self._tell: Callable[[str], None] = self._pending.append
+        self._bytes_written = 0
         if shared is not None:
             shared.tell = self._say
 
     def listen(self, tell: Callable[[str], None]) -> None:
-        """Be told what is wrong with entries, a line each; also what was found before."""
+        """Send messages about damaged entries to `tell`, a line each, earlier ones included."""
         with self._lock:
             self._tell = tell
-            waiting, self._waiting = self._waiting, []
-        for line in waiting:
+            pending, self._pending = self._pending, []
+        for line in pending:
             tell(line)
 
     def get_or_create(self, kind: str, key: str, make: Callable[[], bytes]) -> bytes:
-        """The result of this kind and key: one that is kept, or made now and kept."""
-        found = self.get(kind, key, bytes)
-        if found is not None:
-            return found
-        made = make()
+        """The result of this kind and key: the one kept, or one made and kept now."""
+        data = self.get(kind, key, bytes)
+        if data is not None:
+            return data
+        data = make()
         if self.fresh:
             before = self.peek(kind, key, bytes)
-            if before is not None and before != made:
+            if before is not None and before != data:
                 self._say(f"{_short(f'{kind}/{key}')} was made again and is not what was kept")
-        self.put(kind, key, made)
-        return made
+        self.put(kind, key, data)
+        return data
 
     def get(
         self, kind: str, key: str, read: Callable[[bytes], Value | None], *, shared: bool = False
     ) -> Value | None:
-        """The result of this kind and key, if it is kept and whole.
+        """The result of this kind and key, if an undamaged one is kept.
 
-        `read` makes the result of its bytes; what it raises, or `None`, means that they hold none.
-        A `shared` one is looked for in the shared cache too.
+        `read` makes the result from its bytes; if it raises one of `DAMAGE` or returns `None`, the
+        entry is damaged. A `shared` result is looked for in the shared cache too.
         """
         if self.fresh:
             return None
-        found = self.peek(kind, key, read)
-        if found is None and self.shared is not None and shared:
-            found = self._fetch(self.shared, f"{kind}/{key}", read)
-        return found
+        value = self.peek(kind, key, read)
+        if value is None and self.shared is not None and shared:
+            value = self._fetch(self.shared, f"{kind}/{key}", read)
+        return value
 
     def peek(self, kind: str, key: str, read: Callable[[bytes], Value | None]) -> Value | None:
-        """What this machine keeps under a key, though everything is to be made again."""
+        """What this machine keeps under a key, even if everything is to be made again."""
         name = f"{kind}/{key}"
         path = f"{self.folder}/{name}"
         try:
             with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - there are many
-                changed = os.fstat(file.fileno()).st_mtime
+                modified = os.fstat(file.fileno()).st_mtime
                 entry = file.read()
         except OSError:
             return None
@@ -165,12 +166,12 @@ class Memo:
             if value is None:
                 os.unlink(path)  # noqa: PTH108
                 self._say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
-            elif time.time() - changed > _USED:
-                os.utime(path)  # what was used lately stays
+            elif time.time() - modified > _USED:
+                os.utime(path)  # entries used lately are pruned last
         return value
 
     def put(self, kind: str, key: str, data: bytes, *, shared: bool = False) -> None:
-        """Keep a result, here or also in the shared cache; that it cannot be only costs time."""
+        """Keep a result, if `shared` also in the shared cache; failing to only costs time."""
         name = f"{kind}/{key}"
         self._write(name, data)
         if self.shared is not None and shared:
@@ -185,15 +186,15 @@ class Memo:
         self.put(kind, key, msgspec.json.encode(value))
 
     def group(self, kind: str, key: str) -> list[str]:
-        """The keys, `GROUP/KEY`, of the newest entries in a group, newest first; the others go."""
+        """Return the keys `GROUP/KEY` of a group, newest first, and remove all but the newest."""
         folder = self.folder / kind / key
-        found: list[tuple[float, str]] = []
-        with contextlib.suppress(OSError), os.scandir(folder) as entries:
-            found = [(e.stat().st_mtime, e.name) for e in entries if not e.name.startswith(".")]
-        found.sort(reverse=True)
-        for _, name in found[_NEWEST:]:
+        entries: list[tuple[float, str]] = []
+        with contextlib.suppress(OSError), os.scandir(folder) as files:
+            entries = [(f.stat().st_mtime, f.name) for f in files if not f.name.startswith(".")]
+        entries.sort(reverse=True)
+        for _, name in entries[_GROUP_SIZE:]:
             (folder / name).unlink(missing_ok=True)
-        return [f"{key}/{name}" for _, name in found[:_NEWEST]]
+        return [f"{key}/{name}" for _, name in entries[:_GROUP_SIZE]]
 
     def shared_group(self, kind: str, key: str) -> list[str]:
         """The keys of a group that the shared cache has."""
@@ -203,30 +204,30 @@ class Memo:
         return [f"{key}/{name}" for name in names if HASH.fullmatch(name)]
 
     def close(self) -> None:
-        """Wait until the shared cache has what was made, and keep all within the limit."""
+        """Wait until the shared cache has all new results, and keep this one within its limit."""
         if self.shared is not None:
             self.shared.flush()
-        if self._written:
+        if self._bytes_written:
             with contextlib.suppress(OSError):
                 self._prune_if_due()
-            self._written = 0
+            self._bytes_written = 0
 
     def _prune_if_due(self) -> None:
-        """Go through all if that was not done lately, or much was written since."""
-        noted = self.folder / "pruned"
+        """Prune if that was not done lately, or if much was written since."""
+        marker = self.folder / "pruned"
         with contextlib.suppress(FileNotFoundError):
-            age = time.time() - noted.stat().st_mtime
-            if 0.0 <= age < _OFTEN and self._written * _SHARE < self.size:
+            age = time.time() - marker.stat().st_mtime
+            if 0.0 <= age < _PRUNE_INTERVAL and self._bytes_written * _SHARE < self.size:
                 return
-        noted.touch()
+        marker.touch()
         prune(self.folder, self.size)
 
     def _say(self, line: str) -> None:
-        """Tell of something once."""
+        """Send a message, unless it was sent before."""
         with self._lock:
-            if line in self._told:
+            if line in self._messages:
                 return
-            self._told.add(line)
+            self._messages.add(line)
             tell = self._tell
         tell(line)
 
@@ -257,11 +258,11 @@ class Memo:
             self._say(f"results cannot be kept in {FOLDER}: {reason(error)}")
             return
         with self._lock:
-            self._written += len(entry)
+            self._bytes_written += len(entry)
 
 
 def _value(data: bytes | None, read: Callable[[bytes], Value | None]) -> Value | None:
-    """What the data of an entry holds; `None` where it is not what it should be."""
+    """The result that an entry's data holds; `None` where the data is missing or damaged."""
     try:
         return None if data is None else read(data)
     except DAMAGE:
@@ -269,7 +270,7 @@ def _value(data: bytes | None, read: Callable[[bytes], Value | None]) -> Value |
 
 
 def _short(name: str) -> str:
-    """An entry as people are told of it."""
+    """An entry's name in messages."""
     kind, _, key = name.partition("/")
     return f"the entry {kind}/{key[:12]}…" if len(key) > 12 else f"the entry {name}"
 
@@ -278,16 +279,16 @@ def _short(name: str) -> str:
 
 
 def prune(folder: Path, limit: int) -> None:
-    """Remove entries until the rest takes at most `limit` bytes: those first that were used first.
+    """Remove the entries used longest ago until the rest takes at most `limit` bytes.
 
     Only files named by a hash are entries. Other processes may write, read and prune meanwhile:
-    whoever misses an entry that was removed makes it again.
+    one that misses a removed entry makes it again.
     """
-    with os.scandir(folder) as found:
-        kinds = [kind.path for kind in found if kind.is_dir(follow_symlinks=False)]
+    with os.scandir(folder) as entries:
+        kinds = [kind.path for kind in entries if kind.is_dir(follow_symlinks=False)]
     files = sorted(file for kind in kinds for file in _entries(kind, time.time() - _USED))
     total = sum(size for _, _, size in files)
-    enough = limit if total <= limit else limit * _ROOM
+    enough = limit if total <= limit else limit * _PRUNED_SHARE
     for _, path, size in files:
         if total <= enough:
             break
@@ -299,10 +300,10 @@ def prune(folder: Path, limit: int) -> None:
 def _entries(folder: str, long_ago: float) -> Iterator[tuple[float, str, int]]:
     """The entries in a folder: when each was used last, its path and its size.
 
-    What a writer that was killed `long_ago` left there goes.
+    Temporary files that a killed writer left before `long_ago` are removed.
     """
-    with contextlib.suppress(OSError), os.scandir(folder) as found:
-        for entry in found:
+    with contextlib.suppress(OSError), os.scandir(folder) as files:
+        for entry in files:
             if entry.is_dir(follow_symlinks=False) and HASH.fullmatch(entry.name):
                 yield from _entries(entry.path, long_ago)
                 with contextlib.suppress(OSError):  # it is not empty

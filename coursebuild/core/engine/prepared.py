@@ -1,8 +1,8 @@
-"""What comes with the tool made ahead: fonts cut to what is always kept, templates, copies.
+"""Files that come with the tool ready-made: fonts cut to their usual characters, templates, copies.
 
 Entry points: `prepared_file`, by its key; `prepared_folder`. The modules `site/prepare_*.py` make
-the files when site/dist is made. What is not there under its key, since it was changed since, is
-made again.
+the files when site/dist is made. A file whose input has changed since then has another key, is not
+found, and is made during the build.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from typing import Any
 from coursebuild.core.files.resources import assets_dir
 
 FOLDER = "prepared"
-"""In the folder of the bundled files."""
+"""Its name in the folder of the bundled files."""
 
 
 def prepared_folder() -> Path:
-    """Where it all lies."""
+    """The folder of the prepared files."""
     return assets_dir() / FOLDER
 
 
 def prepared_file(kind: str, key: str) -> bytes | None:
-    """A result of a kind by its key: of `fonts` that of a job, of `copies` a compressed file."""
-    file: str | None = _made_ahead(f"{kind}.json").get(key)
+    """A prepared file by its kind and key: of `fonts` the result of a job, of `copies` a copy."""
+    file: str | None = _read_list(f"{kind}.json").get(key)
     return None if file is None else (prepared_folder() / file).read_bytes()
 
 
 @functools.cache
-def _made_ahead(name: str) -> dict[str, Any]:
-    """A list of what was made ahead; empty in a bundle that somebody made without."""
+def _read_list(name: str) -> dict[str, Any]:
+    """The list of one kind of prepared files; empty in a bundle that was made without them."""
     try:
         text = (prepared_folder() / name).read_text(encoding="utf-8")
     except FileNotFoundError:
         return {}
-    found: dict[str, Any] = json.loads(text)
-    return found
+    files: dict[str, Any] = json.loads(text)
+    return files

@@ -1,20 +1,19 @@
-"""Publishing a site whole: written beside the old one, then swapped in, or not at all.
+"""Publishing a site: written whole beside the old one, then swapped in, or not at all.
 
 Entry points: `check_out`, which says early whether a site may go somewhere; `publish`.
 
-1. The place is checked: never the project or what its author wrote, never a folder with files that
-   we did not put there. One build publishes to a place at a time.
+1. The place is checked: it is neither the project nor a folder of the author's, and holds no file
+   that we did not put there. One build publishes to a place at a time.
 2. The site is filled into a slot: a folder beside the place, on the same file system. A file that
    was published before under the same key, and is whole, stays in the slot, or is linked from the
    old site; the others are made.
 3. Slot and site are exchanged in one step. Where the system cannot, the old site is renamed away
-   and the new one renamed in; where a build was killed between the two, the next puts it back.
-4. The old site is put away in `.coursebuild/`. It is the slot of the next build, which has to put
-   into it only what it lacks: to link thousands of files anew, and to remove as many, takes longer
-   than to make those that an edit changes. It is believed as little as the site.
+   and the new one renamed in; if a build is killed between the two, the next one puts it back.
+4. The old site is put away in `.coursebuild/`, as the slot of the next build, which then has to add
+   only what is missing: linking thousands of files, and removing as many, takes longer than making
+   the few that an edit changes. Its files are checked as those of the site are.
 
-A site is derived and can be built again, so it is not forced to the disk: after a power cut, build
-again.
+A site can be built again, so it is not synced to the disk: after a power cut, build again.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.model.results import FileList, SiteFile
 
 _EXCHANGE = {"linux": "renameat2", "darwin": "renameatx_np"}
-"""Names of the system's function that swaps two paths, which takes the same arguments in both."""
+"""The system's function that swaps two paths; it takes the same arguments on both systems."""
 _AT_FDCWD = {"linux": -100, "darwin": -2}
 _RENAME_EXCHANGE = 2  # linux/fs.h; RENAME_SWAP in sys/stdio.h of macOS
 _UNSUPPORTED = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EPERM)
@@ -49,7 +48,7 @@ _AUTHORED = ("content", "features", "models", "examples", ".coursebuild", ".git"
 
 
 def check_out(root: Path, out: Path) -> Path:
-    """Where the site goes: `out`, or the folder it links to. What a killed build left is mended.
+    """Return where the site goes: `out`, or the folder it links to; undo a killed build.
 
     Raises:
         PublishRefusedError: a site must not go there.
@@ -64,7 +63,7 @@ def publish(
     root: Path,
     out: Path,
     files: Iterable[SiteFile],
-    listed: FileList | None = None,
+    file_list: FileList | None = None,
     *,
     jobs: int = 1,
     stage: Callable[[], AbstractContextManager[None]] = nullcontext,
@@ -75,26 +74,26 @@ def publish(
         root: the course folder.
         out: where the site goes; a link to a folder stays one.
         files: each path once; POSIX, relative, without `..`.
-        listed: a file that is made of what all these are.
-        jobs: copies of this process, at most, that make and write files where there are many.
-        stage: is entered when the files are made.
+        file_list: a file that lists all the others.
+        jobs: how many copies of this process, at most, make and write files where there are many.
+        stage: a context that is entered while the files are made.
 
     Returns:
-        The paths of the files that were written, sorted: the others are as they were.
+        The paths of the files that were written, sorted; the others have not changed.
 
     Raises:
         PublishRefusedError: a site must not go there.
         EffectError: it cannot be written; the old site is still there.
-        ValueError: a path is none that a site may have (a bug of the caller).
+        ValueError: a path is not valid in a site (a bug of the caller).
     """
     place = check_out(root, out)
     root = Path(os.path.realpath(root))
-    keyed = with_keys(files, listed)
+    keyed = with_keys(files, file_list)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with folder_lock(place.parent):
             _check_place(root, out, place)
-            site = NewSite(Manifest.read(root, place), keyed, listed)
+            site = NewSite(Manifest.read(root, place), keyed, file_list)
             if site.is_there():
                 return ()
             return _replace(root, place, site, jobs, stage)
@@ -109,11 +108,11 @@ def _replace(
     jobs: int,
     stage: Callable[[], AbstractContextManager[None]],
 ) -> tuple[str, ...]:
-    """Fill the slot with the site, and swap the two; gives what was written."""
-    slot = _beside(place, "new")
+    """Fill the slot with the site and swap the two; return the paths that were written."""
+    slot = _sibling(place, "new")
     try:
         open_slot(root, slot)
-        entries, made = site.fill(slot, jobs, stage)
+        entries, paths = site.fill(slot, jobs, stage)
         if not holds(slot, entries):
             raise EffectError(f"somebody else changes what is being written to {place}")
         slot.chmod(_mode(place))
@@ -122,7 +121,7 @@ def _replace(
         _recover(place)
         put_away(root, slot)
     Manifest(place, entries).write(root)
-    return tuple(sorted(made))
+    return tuple(sorted(paths))
 
 
 # --- the place
@@ -130,9 +129,9 @@ def _replace(
 
 def _check_place(root: Path, out: Path, place: Path) -> None:
     if root.is_relative_to(place):
-        what = "is the project itself" if place == root else "holds the project"
+        relation = "is the project itself" if place == root else "holds the project"
         raise PublishRefusedError(
-            f"{out} {what}", help="publish to a folder of its own, such as `public`"
+            f"{out} {relation}", help="publish to a folder of its own, such as `public`"
         )
     for name in _AUTHORED:
         if place.is_relative_to(os.path.realpath(root / name)):
@@ -149,19 +148,19 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
     except OSError as error:
         raise EffectError(f"{out} cannot be read: {reason(error)}") from None
     if foreign:
-        more = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
+        rest = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
         raise PublishRefusedError(
-            f"{out} holds files that coursebuild did not put there: {', '.join(foreign[:3])}{more}",
+            f"{out} holds files that coursebuild did not put there: {', '.join(foreign[:3])}{rest}",
             help="move them away, or publish to another folder",
         )
 
 
 def _swap(slot: Path, place: Path) -> None:
-    """Put the new site at the place, and the old one where the new one was."""
+    """Move the new site to the place, and the old one to the slot."""
     if not os.path.lexists(place):
         slot.rename(place)
     elif not exchange(slot, place):
-        old = _beside(place, "old")
+        old = _sibling(place, "old")
         remove(old)
         place.rename(old)
         slot.rename(place)
@@ -169,10 +168,10 @@ def _swap(slot: Path, place: Path) -> None:
 
 
 def exchange(a: Path, b: Path) -> bool:
-    """Swap two folders in one step; gives whether the system, and the file system, can.
+    """Swap two folders in one step; return `False` where the system or file system cannot.
 
     Raises:
-        OSError: they can, and refused.
+        OSError: the system can, but refused.
     """
     try:
         native = getattr(ctypes.CDLL(None, use_errno=True), _EXCHANGE[sys.platform])
@@ -188,8 +187,8 @@ def exchange(a: Path, b: Path) -> bool:
 
 
 def _recover(place: Path) -> None:
-    """Put the last good site back, if a build was killed after renaming it away."""
-    old = _beside(place, "old")
+    """Put the last good site back if a build was killed after renaming it away."""
+    old = _sibling(place, "old")
     if os.path.lexists(place):
         remove(old)
     elif (old / MARKER).is_file():
@@ -197,12 +196,12 @@ def _recover(place: Path) -> None:
 
 
 def _mode(place: Path) -> int:
-    """The permissions of the site's folder: those that it has, else the usual ones."""
+    """The permissions of the site's folder: those it has already, else the usual ones."""
     with contextlib.suppress(FileNotFoundError):
         return stat.S_IMODE(place.stat().st_mode)
     return 0o755
 
 
-def _beside(place: Path, what: str) -> Path:
-    """A folder of ours beside the place: `new`, the slot while it is filled; `old`."""
-    return place.with_name(f".{place.name}.coursebuild-{what}")
+def _sibling(place: Path, suffix: str) -> Path:
+    """A folder of ours beside the place: `new`, the slot while it is filled, or `old`."""
+    return place.with_name(f".{place.name}.coursebuild-{suffix}")

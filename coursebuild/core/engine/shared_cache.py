@@ -1,11 +1,11 @@
 """Results shared between machines: a folder, or any place that fsspec knows (`s3://…`).
 
-Entry point: `shared_cache(where)` gives the `SharedCache` that a `Memo` uses.
+Entry point: `shared_cache(address)` returns the `SharedCache` that a `Memo` uses.
 
-1. It holds entries of memos under the same names; the memo that reads one verifies it.
-2. Reading waits for the place. Threads write, while the work goes on.
-3. A place that cannot be reached, or takes too long, is reported once and left alone for a while:
-   it costs time, and is never an error.
+1. It holds entries of memos under the same names; the memo that reads an entry verifies it.
+2. Reading waits for the place. Threads write while the work goes on.
+3. A place that cannot be reached or takes too long is reported once and left alone for a while:
+   it costs time, but is never an error.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from coursebuild.core.engine.memo import replace_file
 from coursebuild.core.files.errors import EffectError, reason
 
 _VERSION = "coursebuild-1"
-"""A folder in the shared place; to be changed with what entries look like."""
+"""The folder of entries in the shared place; change it when the format of entries changes."""
 _SIGNED = "coursebuild-1-signed"
-"""That of entries which only those who have a key can make."""
+"""The folder of signed entries, which only those who have the key can make."""
 _TIMEOUT = 15.0
 """Seconds that a request may take."""
 _FLUSH = 60.0
-"""Seconds that a command waits at its end for what is still to be sent."""
+"""Seconds that a command waits at its end for entries still to be sent."""
 _PAUSE = 120.0
 """Seconds for which a place that failed is left alone."""
 _WRITERS = 4
@@ -37,9 +37,9 @@ T = TypeVar("T")
 
 
 class FolderPlace:
-    """A folder, perhaps of a network's file system.
+    """A folder, perhaps on a network file system.
 
-    Paths in it are POSIX and relative; whatever is raised means trouble.
+    Paths in it are POSIX and relative. An exception of any kind means that the place failed.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -51,7 +51,7 @@ class FolderPlace:
             return (self.folder / path).read_bytes()
         except (FileNotFoundError, NotADirectoryError):
             if not self.folder.is_dir():
-                self.folder.mkdir()  # or say why not; what lies above it must be there
+                self.folder.mkdir()  # or raise the reason; its parent must exist
             return None
 
     def write(self, path: str, data: bytes) -> None:
@@ -70,7 +70,7 @@ class FolderPlace:
 
 
 class RemotePlace:
-    """A place of fsspec's, as a `FolderPlace`."""
+    """A place that fsspec reaches, with the interface of `FolderPlace`."""
 
     def __init__(self, files: Any, top: str) -> None:
         self.files = files
@@ -89,67 +89,67 @@ class RemotePlace:
         full = f"{self.top}/{path}"
         try:
             self.files.pipe_file(full, data)
-        except FileNotFoundError:  # it has folders
+        except FileNotFoundError:  # this kind of place has folders
             self.files.makedirs(full.rpartition("/")[0], exist_ok=True)
             self.files.pipe_file(full, data)
 
     def names(self, folder: str) -> list[str]:
         """The names in a folder; none if there is none."""
         try:
-            found = self.files.ls(f"{self.top}/{folder}", detail=False)
+            paths = self.files.ls(f"{self.top}/{folder}", detail=False)
         except (FileNotFoundError, NotADirectoryError):
             return []
-        return [PurePosixPath(str(path)).name for path in found]
+        return [PurePosixPath(str(path)).name for path in paths]
 
 
-def shared_cache(where: str, key: bytes = b"") -> SharedCache:
-    """The cache at a folder or an URL; nothing is read yet.
+def shared_cache(address: str, key: bytes = b"") -> SharedCache:
+    """The cache at a folder or a URL; nothing is read yet.
 
-    With a key, that of the entries signed with it.
+    With a key, the cache of entries signed with it.
 
     Raises:
         EffectError: this installation cannot reach such a place at all.
     """
-    scheme, separator, _ = where.partition("://")
+    scheme, separator, _ = address.partition("://")
     if not separator:
-        return SharedCache(where, FolderPlace(Path(where).expanduser().absolute()), key)
+        return SharedCache(address, FolderPlace(Path(address).expanduser().absolute()), key)
     if scheme == "file":
-        return SharedCache(where, FolderPlace(Path(unquote(urlsplit(where).path))), key)
+        return SharedCache(address, FolderPlace(Path(unquote(urlsplit(address).path))), key)
     try:
         from fsspec.core import url_to_fs
     except ImportError:
         raise EffectError(
-            f"the cache {where} needs the package fsspec",
+            f"the cache {address} needs the package fsspec",
             help="run `pip install 'coursebuild[cache]'`",
         ) from None
     try:
-        files, top = url_to_fs(where, use_listings_cache=False)
+        files, top = url_to_fs(address, use_listings_cache=False)
     except ImportError as error:
-        raise EffectError(f"the cache {where} needs a package: {_words(error)}") from None
+        raise EffectError(f"the cache {address} needs a package: {_words(error)}") from None
     except ValueError as error:
-        raise EffectError(f"there is no place like {where}: {_words(error)}") from None
-    return SharedCache(where, RemotePlace(files, top), key)
+        raise EffectError(f"there is no place like {address}: {_words(error)}") from None
+    return SharedCache(address, RemotePlace(files, top), key)
 
 
 class SharedCache:
-    """A place where entries are shared; its failures raise nothing."""
+    """A place where entries are shared; its failures raise no exception."""
 
     def __init__(
         self,
-        where: str,
+        address: str,
         place: FolderPlace | RemotePlace,
         key: bytes = b"",
         timeout: float = _TIMEOUT,
     ) -> None:
-        self.where = where
+        self.address = address
         self.place = place
         self.key = key
-        """What entries are signed with; empty where they are not."""
+        """The key that entries are signed with; empty where they are not signed."""
         self._folder = _SIGNED if key else _VERSION
         self.timeout = timeout
         self.tell: Callable[[str], None] = lambda line: None
-        """Is told, once, when the place cannot be used."""
-        self._told = False
+        """Called once, with a message, when the place cannot be used."""
+        self._was_reported = False
         self._down_until = -1.0
         self._queue: queue.Queue[tuple[str, bytes]] = queue.Queue()
         self._writers = 0
@@ -158,7 +158,7 @@ class SharedCache:
         self._sent = threading.Condition()
 
     def read(self, name: str) -> bytes | None:
-        """An entry; `None` where there is none or it cannot be had."""
+        """An entry; `None` where there is none or the place fails."""
         return self._ask(lambda: self.place.read(f"{self._folder}/{name}"), None)
 
     def names(self, folder: str) -> list[str]:
@@ -166,7 +166,7 @@ class SharedCache:
         return self._ask(lambda: self.place.names(f"{self._folder}/{folder}"), [])
 
     def write(self, name: str, entry: bytes) -> None:
-        """Send an entry when there is time."""
+        """Queue an entry to be sent in the background."""
         if self._is_down():
             return
         with self._sent:
@@ -178,7 +178,7 @@ class SharedCache:
                 threading.Thread(target=self._send, name="shared cache", daemon=True).start()
 
     def flush(self, seconds: float = _FLUSH) -> None:
-        """Wait until all is sent, but not for ever."""
+        """Wait until everything is sent, but not for ever."""
         until = time.monotonic() + seconds
         with self._sent:
             while self._unsent and not self._is_down():
@@ -189,9 +189,9 @@ class SharedCache:
                 self._sent.wait(min(left, 0.5))
 
     def _send(self) -> None:
-        """Send what waits, and end: idle threads would keep this process from being forked."""
+        """Send what is queued, then end: an idle thread would keep this process from forking."""
         while True:
-            with self._lock:  # so that nothing is put in and left
+            with self._lock:  # or an entry queued now would find no writer
                 try:
                     name, entry = self._queue.get_nowait()
                 except queue.Empty:
@@ -208,7 +208,7 @@ class SharedCache:
                     self._sent.notify_all()
 
     def _ask(self, function: Callable[[], T], otherwise: T) -> T:
-        """What the function gives in time; a call that hangs is left behind."""
+        """The function's result if it comes in time; a call that hangs is abandoned."""
         if self._is_down():
             return otherwise
         result: list[T] = []
@@ -231,12 +231,12 @@ class SharedCache:
     def _is_down(self) -> bool:
         return time.monotonic() < self._down_until
 
-    def _fail(self, why: str) -> None:
+    def _fail(self, cause: str) -> None:
         with self._lock:
             self._down_until = time.monotonic() + _PAUSE
-            told, self._told = self._told, True
-        if not told:
-            self.tell(f"the shared cache {self.where} cannot be used: {why}")
+            was_reported, self._was_reported = self._was_reported, True
+        if not was_reported:
+            self.tell(f"the shared cache {self.address} cannot be used: {cause}")
 
 
 def _words(error: Exception) -> str:

@@ -1,10 +1,10 @@
-"""A folder that is filled with the files of a site, beside the place where the site goes.
+"""The slot: a folder that is filled with the files of a new site, beside the site's place.
 
-Entry points: `NewSite`, whose `fill` makes a slot hold it, of files `with_keys`; `open_slot`,
-`put_away` and `remove`.
+Entry points: `NewSite`, whose `fill` fills a slot; `with_keys`, which gives its files their keys;
+`open_slot`, `put_away` and `remove`.
 
-A slot held the site before the last one, or is empty. A file stays in it, or is linked from the old
-site, where the manifest knows it under the same key and it is as it was; all others are made.
+A slot holds the site before the last one, or nothing. A file stays in it, or is linked from the old
+site, if the manifest lists it under the same key and it has not changed; all others are made.
 """
 
 from __future__ import annotations
@@ -26,30 +26,30 @@ from coursebuild.core.engine.workers import Workers, can_fork
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile, SiteFile
 
 _NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
-"""A part of a path that is empty or stands for a folder, a control character, a backslash."""
+"""What no path may have: an empty part, `.` or `..`, a control character, a backslash."""
 _MANY = 128
-"""Files for which copies of this process are worth their start."""
+"""How many files make it worth starting copies of this process."""
 _SHARE = 16
-"""Files that a copy writes for one request."""
+"""How many files a copy writes for one request."""
 _MOST = 4
-"""Copies: more would wait for the disk."""
+"""The most copies: more would wait for the disk."""
 
 
 class NewSite(Struct, frozen=True):
-    """The site that is to be, and what is known of the one that is there."""
+    """The site to be published, and the manifest of the one that is there."""
 
     old: Manifest
     files: Mapping[str, tuple[SiteFile, str]]
     """By path, each with its key."""
-    listed: FileList | None
+    file_list: FileList | None
 
     def is_there(self) -> bool:
-        """Whether it is there already, whole and with nothing beside it."""
+        """Whether the published site is already this one, whole and without other files."""
         keys = {path: key for path, (_, key) in self.files.items()}
-        if self.listed is not None:
-            keys[self.listed.path] = self._list_key(self.listed)
+        if self.file_list is not None:
+            keys[self.file_list.path] = self._list_key(self.file_list)
         if keys != {path: entry.key for path, entry in self.old.entries.items()}:
-            return False  # as after every edit: no file is looked at for that
+            return False  # the usual case after an edit, found without looking at any file
         place = self.old.place
         try:
             return (
@@ -63,75 +63,75 @@ class NewSite(Struct, frozen=True):
     def fill(
         self, slot: Path, jobs: int, stage: Callable[[], AbstractContextManager[None]]
     ) -> tuple[dict[str, ManifestEntry], list[str]]:
-        """Make the slot hold the site; gives what is in it, and the paths that are new."""
-        folders = _folders([*self.files, *([self.listed.path] if self.listed else [])])
-        known = {p: e for p, (_, k) in self.files.items() if (e := self.old.entry(p, k))}
-        entries = _sift(f"{slot}/", "", known, frozenset(folders))
+        """Fill the slot with the site; return its entries and the paths that were written."""
+        folders = _folders([*self.files, *([self.file_list.path] if self.file_list else [])])
+        manifest_entries = {p: e for p, (_, k) in self.files.items() if (e := self.old.entry(p, k))}
+        entries = _remove_stale(f"{slot}/", "", manifest_entries, frozenset(folders))
         for folder in folders:
             (slot / folder).mkdir(exist_ok=True)
             (slot / folder).chmod(0o755)  # whatever the umask is
-        for path, entry in known.items():
+        for path, entry in manifest_entries.items():
             if path not in entries and self._link(path, entry, slot):
                 entries[path] = entry
-        new = [found for path, found in self.files.items() if path not in entries]
-        entries |= _written(slot, new, jobs, stage)
-        made = [file.path for file, _ in new]
-        if self.listed is not None and self._add_list(self.listed, slot, entries):
-            made.append(self.listed.path)
+        new = [keyed_file for path, keyed_file in self.files.items() if path not in entries]
+        entries |= _write_files(slot, new, jobs, stage)
+        new_paths = [file.path for file, _ in new]
+        if self.file_list is not None and self._add_list(self.file_list, slot, entries):
+            new_paths.append(self.file_list.path)
         _write_file(f"{slot}/{MARKER}", marker(entries))
-        return entries, made
+        return entries, new_paths
 
-    def _add_list(self, listed: FileList, slot: Path, entries: dict[str, ManifestEntry]) -> bool:
-        """Add the list of all files; whether it is a new one."""
-        key = self._list_key(listed)
-        entry = self.old.entry(listed.path, key)
-        if entry is not None and self._link(listed.path, entry, slot):
-            entries[listed.path] = entry
+    def _add_list(self, file_list: FileList, slot: Path, entries: dict[str, ManifestEntry]) -> bool:
+        """Add the list of all files; return whether it had to be written."""
+        key = self._list_key(file_list)
+        entry = self.old.entry(file_list.path, key)
+        if entry is not None and self._link(file_list.path, entry, slot):
+            entries[file_list.path] = entry
             return False
         facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
-        target = f"{slot}/{listed.path}"
-        digest = _write_file(target, listed.make(facts))
-        entries[listed.path] = ManifestEntry.of(key, digest, os.lstat(target))
+        target = f"{slot}/{file_list.path}"
+        digest = _write_file(target, file_list.make(facts))
+        entries[file_list.path] = ManifestEntry.of(key, digest, os.lstat(target))
         return True
 
-    def _list_key(self, listed: FileList) -> str:
-        """What the list's bytes depend on: nothing of it is known before all files are."""
+    def _list_key(self, file_list: FileList) -> str:
+        """The list's key: a hash of the keys of all files, since the list names all of them."""
         lines = (f"{key} {path}" for path, (_, key) in self.files.items())
-        text = "\n".join((listed.key, *lines))
+        text = "\n".join((file_list.key, *lines))
         return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
     def _link(self, path: str, entry: ManifestEntry, slot: Path) -> bool:
-        """Link a file of the old site, if it is as it should be."""
+        """Link a file of the old site into the slot, if it has not changed."""
         target = f"{slot}/{path}"
         try:
             os.link(f"{self.old.place}/{path}", target, follow_symlinks=False)
         except (OSError, NotImplementedError):  # it is gone, or nothing more can be linked there
             return False
-        # What was linked is looked at, not what stands there: that may be another by now.
+        # Look at the link, not at the old file, which may have been replaced meanwhile.
         if entry.fits(os.lstat(target)):
             return True
         Path(target).unlink()
         return False
 
 
-def _written(
+def _write_files(
     folder: Path,
     files: Sequence[tuple[SiteFile, str]],
     jobs: int,
     stage: Callable[[], AbstractContextManager[None]],
 ) -> dict[str, ManifestEntry]:
-    """Make files and write them into a folder, which has their folders; gives their entries.
+    """Make files, which come with their keys, and write them; return their entries.
 
-    `files` come with their keys.
+    Their folders are there already.
     """
 
     def write(file: SiteFile, key: str) -> ManifestEntry:
         target = f"{folder}/{file.path}"
-        Path(target).unlink(missing_ok=True)  # half of it, by a copy that died
+        Path(target).unlink(missing_ok=True)  # half a file, if a copy died
         return ManifestEntry.of(key, _write_file(target, file.make()), os.lstat(target))
 
     def share(start: int) -> list[ManifestEntry]:
-        return [write(*found) for found in files[start : start + _SHARE]]
+        return [write(*keyed_file) for keyed_file in files[start : start + _SHARE]]
 
     count = min(jobs, _MOST) if jobs > 1 and len(files) >= _MANY and can_fork() else 0
     with Workers(share, count) as workers, stage():
@@ -141,7 +141,7 @@ def _written(
 
 
 def _write_file(path: str, data: bytes) -> str:
-    """Write a file that is not there; gives the hash of its bytes."""
+    """Write a new file; return the hash of its bytes."""
     with open(path, "xb") as file:  # noqa: PTH123 - thousands of them
         file.write(data)
         os.fchmod(file.fileno(), 0o644)  # whatever the umask is
@@ -149,40 +149,40 @@ def _write_file(path: str, data: bytes) -> str:
 
 
 def with_keys(
-    files: Iterable[SiteFile], listed: FileList | None
+    files: Iterable[SiteFile], file_list: FileList | None
 ) -> dict[str, tuple[SiteFile, str]]:
-    """Files by path, each with a hash of what its bytes depend on.
+    """The files by path, each with its key.
 
     Raises:
-        ValueError: a path is none that a site may have, or two files have it.
+        ValueError: a path is not valid in a site, or two files have the same.
     """
-    found: dict[str, tuple[SiteFile, str]] = {}
+    keyed: dict[str, tuple[SiteFile, str]] = {}
     for file in files:
         path = file.path
         if _NO_PATH.search(path) or path == MARKER:
             raise ValueError(f"{path!r} is no path that a site may have")
-        if path in found or (listed is not None and path == listed.path):
+        if path in keyed or (file_list is not None and path == file_list.path):
             raise ValueError(f"the site has two files {path}")
         if isinstance(file, OutputFile):
-            found[path] = file, f"={hashlib.sha256(file.data).hexdigest()}"
+            keyed[path] = file, f"={hashlib.sha256(file.data).hexdigest()}"
         else:
-            found[path] = file, file.key
-    return found
+            keyed[path] = file, file.key
+    return keyed
 
 
 def _folders(paths: Iterable[str]) -> list[str]:
-    """The folders that files need, each after the one that it lies in."""
-    found = {path.rpartition("/")[0] for path in paths}
-    for folder in list(found):
+    """The folders that files need, each after its parent."""
+    folders = {path.rpartition("/")[0] for path in paths}
+    for folder in list(folders):
         while folder := folder.rpartition("/")[0]:
-            found.add(folder)
-    return sorted(found - {""})
+            folders.add(folder)
+    return sorted(folders - {""})
 
 
 def open_slot(root: Path, slot: Path) -> None:
-    """Have the folder that the site is filled into: one that is left, or an empty one."""
+    """Make the slot ready: the one that the last build put away, or an empty folder."""
     if not os.path.lexists(slot):
-        with contextlib.suppress(OSError):  # there is none, or it is on another file system
+        with contextlib.suppress(OSError):  # none was put away, or it is on another file system
             (root / FOLDER / KIND / "spare").rename(slot)
     if not slot.is_dir() or slot.is_symlink():
         with contextlib.suppress(FileNotFoundError):
@@ -192,47 +192,47 @@ def open_slot(root: Path, slot: Path) -> None:
 
 
 def put_away(root: Path, slot: Path) -> None:
-    """Keep the slot for the next build, where it is in nobody's way."""
+    """Keep the slot for the next build, in `.coursebuild/`."""
     with contextlib.suppress(OSError):
-        slot.chmod(0o700)  # one that may not be written cannot be moved elsewhere
+        slot.chmod(0o700)  # a folder that may not be written cannot be moved
         with contextlib.suppress(OSError):
             slot.rename(root / FOLDER / KIND / "spare")
             return
         remove(slot)
 
 
-def _sift(
-    folder: str, prefix: str, known: Mapping[str, ManifestEntry], folders: Container[str]
+def _remove_stale(
+    folder: str, prefix: str, manifest_entries: Mapping[str, ManifestEntry], folders: Container[str]
 ) -> dict[str, ManifestEntry]:
-    """Remove from a folder all but files that are as they should be; gives these.
+    """Remove everything from a folder but intact files and needed folders; return these files.
 
     Args:
         folder: its path, with a slash behind it.
         prefix: its path in the site, likewise.
-        known: what the files should be, by path.
-        folders: those that may stay.
+        manifest_entries: the entries of the files that may stay, by path.
+        folders: the folders that may stay.
     """
-    kept: dict[str, ManifestEntry] = {}
+    intact: dict[str, ManifestEntry] = {}
     with os.scandir(folder) as entries:
-        found = list(entries)
-    for entry in found:
+        contents = list(entries)
+    for entry in contents:
         path = prefix + entry.name
-        expected = known.get(path)
+        expected = manifest_entries.get(path)
         if not entry.is_dir(follow_symlinks=False):
             if expected is not None and expected.fits(entry.stat(follow_symlinks=False)):
-                kept[path] = expected
+                intact[path] = expected
             else:
                 os.unlink(entry.path)  # noqa: PTH108 - thousands of them
         elif path in folders:
             os.chmod(entry.path, 0o755)  # noqa: PTH101
-            kept |= _sift(f"{entry.path}/", f"{path}/", known, folders)
+            intact |= _remove_stale(f"{entry.path}/", f"{path}/", manifest_entries, folders)
         else:
             remove(Path(entry.path))
-    return kept
+    return intact
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder, as far as that can be done."""
+    """Remove a folder as far as possible."""
     with contextlib.suppress(OSError):
         folder.chmod(0o700)
     shutil.rmtree(folder, ignore_errors=True)

@@ -1,11 +1,11 @@
-"""Which tool this is: a name for its code, its templates and what it bundles.
+"""Digests of the tool: of its code, its templates and what it bundles.
 
 Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas; `code_digest`, of
-some code, by its content; `step_key`, the keys of what the tool makes.
+parts of the code, by content; `step_key`, the keys of what the tool makes.
 
-What is installed beside it belongs to it, by the versions: it may import any of that. The files'
-sizes and times tell one tool from another, so that none of them need be read. A tool that was
-installed anew makes everything once more, though it may be the same.
+A digest covers the names and versions of all installed packages, since the tool may import any of
+them. Of files it covers sizes and times, so that none has to be read; a tool that was installed
+again therefore makes everything again, even if it is the same.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH
 
 
 def tool_digest() -> str:
-    """A hash over everything that the tool consists of, features of others and Python included."""
+    """A hash over everything that the tool consists of, including Python and others' features."""
     return hashlib.sha256(f"{_tool()}\0{features_digest()}".encode()).hexdigest()
 
 
@@ -38,23 +38,25 @@ def _tool() -> str:
 
 @functools.cache
 def typesetter_digest() -> str:
-    """A hash over what makes MathML of TeX."""
+    """A hash over the code that turns TeX into MathML."""
     return _digest(str(assets_dir() / "temml"), os.path.join(_CORE, "run"))  # noqa: PTH118
 
 
 @functools.cache
-def _installed() -> str:
-    """What is installed and its versions, by the folders that installing it leaves."""
-    found: list[str] = []
+def _installed_packages() -> str:
+    """The names and versions of all installed packages, from their `.dist-info` folders."""
+    packages: list[str] = []
     for folder in sys.path:
         with contextlib.suppress(OSError):
             names = os.listdir(folder or ".")  # noqa: PTH208
-            found += sorted(name for name in names if name.endswith(".dist-info"))
-    return "\0".join(found)
+            packages += sorted(name for name in names if name.endswith(".dist-info"))
+    return "\0".join(packages)
 
 
 def _digest(*folders: str) -> str:
-    digest = hashlib.sha256(f"{sys.version}\0{_installed()}\0".encode("utf-8", "surrogateescape"))
+    digest = hashlib.sha256(
+        f"{sys.version}\0{_installed_packages()}\0".encode("utf-8", "surrogateescape")
+    )
     for folder in folders:
         for line in _lines(folder, ""):
             digest.update(line.encode("utf-8", "surrogateescape"))
@@ -62,10 +64,10 @@ def _digest(*folders: str) -> str:
 
 
 def _lines(folder: str, inner: str) -> Iterator[str]:
-    """A line for each file, sorted, without the place of the folder."""
+    """A line for each file, sorted, with its path inside the folder."""
     with os.scandir(folder) as entries:
-        found = sorted(entries, key=lambda entry: entry.name)
-    for entry in found:
+        ordered = sorted(entries, key=lambda entry: entry.name)
+    for entry in ordered:
         name = f"{inner}/{entry.name}"
         if entry.is_dir():
             if entry.name != "__pycache__":
@@ -76,9 +78,9 @@ def _lines(folder: str, inner: str) -> Iterator[str]:
 
 
 def step_key(name: str, *values: object) -> str:
-    """The key of what a step of this name makes of these values.
+    """The key of what a step of this name makes from these values.
 
-    The tool is part of it: so there is no rule about what makes a thing stale.
+    The tool's digest is part of it, so a new tool makes everything again.
     """
     return fingerprint((tool_digest(), name, values))
 
@@ -86,7 +88,8 @@ def step_key(name: str, *values: object) -> str:
 def code_digest(*parts: str, root: Path = Path(_CORE).parents[1]) -> str:
     """A hash over packages and modules, such as `mjcourse/spatial` or `coursebuild/numerics`.
 
-    What takes minutes to measure is kept as long as this is the same, whenever it was installed.
+    Measurements that take minutes are kept as long as this stays the same, even when the tool is
+    installed again.
 
     Raises:
         FileNotFoundError: the tool has no such part.
@@ -97,8 +100,8 @@ def code_digest(*parts: str, root: Path = Path(_CORE).parents[1]) -> str:
         if not (root / part).exists():
             raise FileNotFoundError(part)
     try:
-        for whole in (root / part for part in parts):
-            for path in (whole,) if whole.is_file() else sorted(whole.rglob("*.py")):
+        for place in (root / part for part in parts):
+            for path in (place,) if place.is_file() else sorted(place.rglob("*.py")):
                 name = path.relative_to(root).as_posix()
                 content = path.read_bytes()
                 digest.update(f"{name}\0{len(content)}\0".encode())

@@ -1,15 +1,15 @@
 """Whether anything has changed since a command last said that all is well: stat, compare, done.
 
-Entry points: `Watcher`, made before the work begins, whose `keep` notes after it how all was;
-`unchanged`, which gives what the command said then, where everything is as it was.
+Entry points: `Watcher`, made before the work begins, whose `keep` records the state after it;
+`unchanged`, which returns the message of the last run if nothing has changed since.
 
 1. A command depends on whole folders (the course's, the tool's), on single files that scripts read,
-   on the folders that packages are installed in, and on what it leaves behind (the extracted
-   scripts, the site). Of all of these one hash is taken: of names, modes, sizes, times and inodes.
-2. It is kept only where nothing changed while the command worked, and nothing so shortly before
-   that the clock of the file system could not have told. In doubt the next run looks closer.
+   on the folders that packages are installed in, and on its own outputs (the extracted scripts, the
+   site). One hash is taken over all of them: names, modes, sizes, times and inodes.
+2. The hash is kept only if nothing changed while the command worked, nor so shortly before that the
+   clock of the file system could not show it. In doubt the next run does all its work.
 
-This is all that a run with nothing to do loads, so it imports little: paths are strings.
+A run with nothing to do loads only this module, so it imports little: paths are strings.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 _HEADER = "coursebuild up to date 1"
 _FINE = 50_000_000
-"""ns: a file changed longer ago than this has a time that another change would not have."""
+"""ns: a file changed longer ago than this would get another time by another change."""
 _COARSE = 2_100_000_000
-"""The same where a file system counts whole milliseconds, or longer."""
+"""The same on a file system that counts whole milliseconds or longer."""
 DECISIVE = (
     "MUJOCO_GL",
     "MUJOCO_EGL_DEVICE_ID",
@@ -44,18 +44,18 @@ DECISIVE = (
     "NVIDIA_VISIBLE_DEVICES",
     "NVIDIA_DRIVER_CAPABILITIES",
 )
-"""Of the environment of scripts: what decides how something is drawn or computed."""
+"""Environment variables that decide how scripts draw or compute something."""
 _PACKAGES = ("site-packages", "dist-packages")
 """What folders with installed packages are called."""
 _VARIABLES = (*DECISIVE, "PYTHONPATH", "VIRTUAL_ENV")
 
 
 class _UnclearError(Exception):
-    """There is something here of which it cannot be told whether it has changed."""
+    """Something here may have changed without a sign of it."""
 
 
 class Watcher:
-    """Looks at what a command depends on before it begins, and once more when it is done."""
+    """The state of what a command depends on, taken before it begins and when it is done."""
 
     def __init__(self, root: str, command: Sequence[str]) -> None:
         self.root = root
@@ -63,33 +63,33 @@ class Watcher:
         self.began = time.time_ns()
         self.before = self._look(())
 
-    def keep(self, said: str, files: Iterable[str], made: Iterable[str]) -> bool:
-        """Note how all is, where it is certain that it is as the command saw it.
+    def keep(self, message: str, files: Iterable[str], outputs: Iterable[str]) -> bool:
+        """Record the state, if it is certainly the one that the command saw.
 
         Args:
-            said: what a later run with nothing to do says in the command's place.
-            files: further files that it depends on, absolute or relative to the root; also such
-                as are not there.
-            made: what it left behind, folders or files, likewise.
+            message: what a later run with nothing to do prints instead of working.
+            files: further files that the command depends on, absolute or relative to the root;
+                they need not exist.
+            outputs: the folders and files that the command made, likewise.
 
         Returns:
-            Whether it was noted.
+            Whether the state was recorded.
         """
         further = sorted({os.path.join(self.root, path) for path in files})
-        left = sorted(os.path.join(self.root, path) for path in made)
-        if any("\n" in path for path in (*further, *left)):
+        written = sorted(os.path.join(self.root, path) for path in outputs)
+        if any("\n" in path for path in (*further, *written)):
             return False
         if self.before is None or self._look(()) != self.before or self._look(further) is None:
             return False
         try:
-            state = _state(self.root, [*further, *left])
+            state = _state(self.root, [*further, *written])
         except (OSError, _UnclearError):
             return False
-        body = "\n".join((_HEADER, state, *further, *left, "", said))
+        body = "\n".join((_HEADER, state, *further, *written, "", message))
         return _write(_path(self.root, self.command), body.encode("utf-8", "surrogateescape"))
 
     def _look(self, further: Sequence[str]) -> str | None:
-        """The state of the inputs; none where it says nothing."""
+        """The state of the inputs; `None` where it is not reliable."""
         try:
             return _state(self.root, further, self.began)
         except (OSError, _UnclearError):
@@ -97,26 +97,26 @@ class Watcher:
 
 
 def unchanged(root: str, command: Sequence[str]) -> str | None:
-    """What the command said when all was as it is now; `None` where that is not known."""
+    """The message of the command's last run; `None` where anything has changed since."""
     try:
         with open(_path(root, command), "rb") as file:
             digest, _, body = file.read().partition(b"\n")
-        head, _, said = body.decode("utf-8", "surrogateescape").partition("\n\n")
+        head, _, message = body.decode("utf-8", "surrogateescape").partition("\n\n")
         header, *lines = head.split("\n")
         if digest != _digest(body) or header != _HEADER:
             return None
-        return said if _state(root, lines[1:]) == lines[0] else None
+        return message if _state(root, lines[1:]) == lines[0] else None
     except (OSError, ValueError, _UnclearError):
         return None
 
 
 def _state(root: str, further: Sequence[str], began: int | None = None) -> str:
-    """A hash over the stat of all that counts.
+    """A hash over the stat of all that the command depends on.
 
     Raises:
-        _UnclearError: there is a link to a folder, whose content is elsewhere; a file was changed
-            so shortly before `began`, or after it, that its own time says nothing.
-        OSError: something cannot be looked at.
+        _UnclearError: there is a link to a folder, whose content is elsewhere; or a file was
+            changed after `began`, or so shortly before that its time proves nothing.
+        OSError: something cannot be read.
     """
     digest = hashlib.blake2b(digest_size=32)
 
@@ -133,7 +133,7 @@ def _state(root: str, further: Sequence[str], began: int | None = None) -> str:
 
 
 def _tool() -> list[str]:
-    """Where the tool's own files are."""
+    """The folders of the tool's own files."""
     package = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     source = os.path.dirname(package)
     if not os.path.isdir(os.path.join(source, "site", "dist")):
@@ -142,13 +142,13 @@ def _tool() -> list[str]:
 
 
 def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
-    """What there is at a path, a row each; of a folder all that is in it."""
+    """What is at a path, a row each; a folder with everything in it."""
     try:
         status = os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
         yield path, "nothing"
         return
-    if path.endswith(_PACKAGES):  # each has a folder there with its version in the name
+    if path.endswith(_PACKAGES):  # each package has a folder with its version in the name
         yield path, status.st_mtime_ns, status.st_ino
         return
     if not stat.S_ISDIR(status.st_mode):
@@ -158,8 +158,10 @@ def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
     for folder in folders:
         yield folder, "folder"
         with os.scandir(folder) as entries:
-            found = sorted((entry.name, entry) for entry in entries if not is_dropping(entry.name))
-        for name, entry in found:
+            contents = sorted(
+                (entry.name, entry) for entry in entries if not is_dropping(entry.name)
+            )
+        for name, entry in contents:
             if entry.is_dir(follow_symlinks=False):
                 folders.append(entry.path)
             elif not entry.is_symlink():
@@ -175,7 +177,7 @@ def _numbers(status: os.stat_result, began: int | None) -> tuple[int, ...]:
     modified = status.st_mtime_ns
     if began is not None and modified > began - (_FINE if modified % 1_000_000 else _COARSE):
         raise _UnclearError
-    # The time of the last change of any kind: who edits a file may put its own time back.
+    # With the time of the last change of any kind, as an edit may set the modification time back.
     return status.st_mode, status.st_size, modified, status.st_ctime_ns, status.st_ino
 
 

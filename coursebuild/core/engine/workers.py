@@ -2,14 +2,13 @@
 
 Entry points: `Workers`, a context manager; `can_fork`, whether there can be any.
 
-1. A worker is forked with all that this process has read and imported, and does one task at a time
-   with the function that it was made with. What it remembers from one task to the next stays in it.
-2. `map` gives each task to the worker that is named for it, or to the first that is free, and
-   yields the results in the order of the tasks. Tasks are made while workers are at earlier ones.
-3. What a worker did not finish, because it died, is done here. What the function raises in a worker
-   is raised here.
-4. Workers are killed when the work is over, however it ends. They have nothing to save, and where
-   this process is killed they see it and end.
+1. A worker is forked with everything that this process has read and imported, and applies one
+   function to one task at a time. What it remembers between tasks stays in it.
+2. `map` gives each task to the worker it is reserved for, or else to the first idle one, and yields
+   the results in the order of the tasks. Tasks are made while workers do earlier ones.
+3. The task of a worker that died is done in this process. An exception in a worker is raised here.
+4. Workers are killed when the work is over, however it ends: they have nothing to save. If this
+   process is killed, they notice and exit.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ Result = TypeVar("Result")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _AHEAD = 32
-"""Tasks that are made before a worker is free for them."""
+"""How many tasks are made before a worker is idle."""
 
 
 def can_fork() -> bool:
-    """Whether this process can be copied: it has one thread, and nothing that a copy breaks."""
+    """Whether this process can be forked: it has one thread, and nothing that forking breaks."""
     if sys.platform == "darwin":
         return False
-    # Threads do not come along into a copy, and MuJoCo has some of its own.
+    # A fork copies only the thread that forks, and MuJoCo has some of its own.
     return threading.active_count() == 1 and "mujoco" not in sys.modules
 
 
@@ -49,16 +48,16 @@ class _Worker(Struct, eq=False):
     process: int
     connection: Connection
     task: int | None = None
-    """The number of the one that it is at."""
+    """The number of its current task."""
 
 
 class Workers(Generic[Task, Result]):
     """Forked processes that all work with the same function, or none."""
 
     def __init__(self, work: Callable[[Task], Result], count: int) -> None:
-        """Fork `count` workers now; with none, or where that fails, all is done here.
+        """Fork `count` workers; with none, or where forking fails, this process does all tasks.
 
-        Of the files that are open here only the first three are open in the workers.
+        Of the files open here, only the first three stay open in the workers.
         """
         self._work = work
         self._workers: dict[int, _Worker] = {}
@@ -78,86 +77,89 @@ class Workers(Generic[Task, Result]):
         self.close()
 
     def map(self, tasks: Iterable[tuple[int | None, Task]]) -> Iterator[tuple[Result, int | None]]:
-        """The results, in the order of the tasks, each with the worker that gave it.
+        """Yield the results in the order of the tasks, each with the number of its worker.
 
-        A task comes with the number of the worker that should do it, if any.
+        A task comes with the number of the worker that it is reserved for, if any.
         """
-        coming, there_are_more = enumerate(tasks), True
-        asked: dict[int, Task] = {}
+        numbered_tasks, there_are_more = enumerate(tasks), True
+        unfinished: dict[int, Task] = {}
         """Tasks without a result."""
-        waiting: list[tuple[int, int | None]] = []
-        """Those that no worker is at, each with the one that should do it."""
-        done: dict[int, tuple[Result, int | None]] = {}
-        given = 0
+        unassigned: list[tuple[int, int | None]] = []
+        """Tasks that no worker has begun, each with the worker it is reserved for."""
+        results: dict[int, tuple[Result, int | None]] = {}
+        next_number = 0
         try:
-            while there_are_more or asked or done:
-                if hungry := there_are_more and len(waiting) < _AHEAD:
-                    number, task = next(coming, (-1, None))
+            while there_are_more or unfinished or results:
+                if can_take_more := there_are_more and len(unassigned) < _AHEAD:
+                    number, task = next(numbered_tasks, (-1, None))
                     there_are_more = task is not None
                     if task is not None:
-                        waiting.append((number, task[0]))
-                        asked[number] = task[1]
+                        unassigned.append((number, task[0]))
+                        unfinished[number] = task[1]
                 for worker in self._workers.values():
-                    if worker.task is None and waiting:
-                        self._give(worker, waiting, asked)
+                    if worker.task is None and unassigned:
+                        self._assign(worker, unassigned, unfinished)
                 busy = {w.connection: w for w in self._workers.values() if w.task is not None}
-                if not busy and not hungry and waiting:
-                    number, _ = waiting.pop(0)
-                    done[number] = self._work(asked.pop(number)), None
-                for ready in wait(busy, 0 if hungry or not busy else None):
-                    self._take(busy[ready], asked, done)  # type: ignore[index]
-                while given in done:
-                    yield done.pop(given)
-                    given += 1
-        except BaseException:  # a result that is still to come would be taken for a later one
+                if not busy and not can_take_more and unassigned:
+                    number, _ = unassigned.pop(0)
+                    results[number] = self._work(unfinished.pop(number)), None
+                for ready in wait(busy, 0 if can_take_more or not busy else None):
+                    self._collect(busy[ready], unfinished, results)  # type: ignore[index]
+                while next_number in results:
+                    yield results.pop(next_number)
+                    next_number += 1
+        except BaseException:  # or a result still to come would count for a later task
             self.close()
             raise
 
     def close(self) -> None:
-        """End them: all of them at once, since giving back their memory takes a while."""
+        """End the workers, all at once, since freeing their memory takes a while."""
         for worker in self._workers.values():
             _kill(worker)
         for worker in [*self._workers.values()]:
-            self._lose(worker)
+            self._drop(worker)
 
-    def _give(
-        self, worker: _Worker, waiting: list[tuple[int, int | None]], asked: Mapping[int, Task]
-    ) -> None:
-        """Give a worker that has nothing to do a task: one for it, or else for nobody.
-
-        Where too many wait, it takes that of another.
-        """
-        others = self._workers.keys() - {worker.number}
-        own = next((one for one in waiting if one[1] == worker.number), None)
-        free = next((one for one in waiting if one[1] not in others), None)
-        chosen = own or free or (waiting[0] if len(waiting) >= _AHEAD else None)
-        if chosen is not None:
-            waiting.remove(chosen)
-            worker.task = chosen[0]
-            with contextlib.suppress(OSError):  # it is dead, as reading from it will show
-                worker.connection.send_bytes(pickle.dumps(asked[worker.task]))
-
-    def _take(
+    def _assign(
         self,
         worker: _Worker,
-        asked: dict[int, Task],
-        done: dict[int, tuple[Result, int | None]],
+        unassigned: list[tuple[int, int | None]],
+        unfinished: Mapping[int, Task],
     ) -> None:
-        """Take the result of a worker's task; the task of one that has died is done here."""
+        """Send an idle worker a task: one reserved for it, or else one reserved for nobody.
+
+        Where too many tasks wait, it gets one reserved for another worker.
+        """
+        other_numbers = self._workers.keys() - {worker.number}
+        reserved = next((entry for entry in unassigned if entry[1] == worker.number), None)
+        free = next((entry for entry in unassigned if entry[1] not in other_numbers), None)
+        entry = reserved or free or (unassigned[0] if len(unassigned) >= _AHEAD else None)
+        if entry is not None:
+            unassigned.remove(entry)
+            worker.task = entry[0]
+            with contextlib.suppress(OSError):  # it is dead, which `_collect` will notice
+                worker.connection.send_bytes(pickle.dumps(unfinished[worker.task]))
+
+    def _collect(
+        self,
+        worker: _Worker,
+        unfinished: dict[int, Task],
+        results: dict[int, tuple[Result, int | None]],
+    ) -> None:
+        """Receive the result of a worker's task; if the worker has died, do the task here."""
         assert worker.task is not None
-        task = asked.pop(worker.task)
+        task = unfinished.pop(worker.task)
         try:
-            good, value = pickle.loads(worker.connection.recv_bytes())
+            is_result, value = pickle.loads(worker.connection.recv_bytes())
         except (EOFError, OSError):
-            self._lose(worker)
-            done[worker.task] = self._work(task), None
+            self._drop(worker)
+            results[worker.task] = self._work(task), None
             return
-        if not good:
+        if not is_result:
             raise value
-        done[worker.task] = value, worker.number
+        results[worker.task] = value, worker.number
         worker.task = None
 
-    def _lose(self, worker: _Worker) -> None:
+    def _drop(self, worker: _Worker) -> None:
         del self._workers[worker.number]
         worker.connection.close()
         _kill(worker)
@@ -166,7 +168,7 @@ class Workers(Generic[Task, Result]):
 
     def _fork(self, number: int) -> None:
         ours, theirs = Pipe()
-        # A signal for all of the terminal's processes must not do in the worker what it does here.
+        # A signal to all processes of the terminal must not run this process's handlers there.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
         try:
             process = os.fork()
@@ -189,17 +191,17 @@ def _kill(worker: _Worker) -> None:
 def _serve(
     work: Callable[[Any], Any], connection: Connection, blocked: Collection[int]
 ) -> NoReturn:
-    """What a worker does until its input ends; `blocked`: signals that it is to block then."""
+    """Do tasks until the input ends; `blocked` are the signals that the worker blocks."""
     status = 1
     try:
-        # Ctrl-C is for the process that has forked it, which ends it.
+        # Ctrl-C is for the parent, which ends its workers.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        # By others locks are held, and other workers; it must not outlive its parent with them.
+        # Other open files hold locks or belong to other workers: do not keep them open.
         os.closerange(3, connection.fileno())
         os.closerange(max(3, connection.fileno() + 1), 1 << 16)
-        gc.freeze()  # what there is now is not looked through here
+        gc.freeze()  # do not collect among the objects of the parent
         with contextlib.suppress(EOFError, OSError):
             while True:
                 task = pickle.loads(connection.recv_bytes())
@@ -214,7 +216,7 @@ def _serve(
 
 
 def _sendable(error: BaseException) -> BaseException:
-    """An exception that can be raised elsewhere."""
+    """The exception, or one like it, in a form that can be pickled."""
     error.add_note(f"in a worker:\n{traceback.format_exc()}")
     try:
         pickle.loads(pickle.dumps(error))

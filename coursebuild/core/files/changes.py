@@ -2,12 +2,12 @@
 
 Entry points: `change_files(root, changes)`; `undo_changes(root)`, before a command reads a course.
 
-1. What each file holds and is to hold goes into a journal in `.coursebuild/`.
+1. A journal in `.coursebuild/` records the old and the new content of each file.
 2. The files are written and removed one after the other, each whole (`write_atomic`).
-3. The journal is removed: from this instant all is done.
+3. The journal is removed, which completes the change.
 
-Where 2 fails, what was done is undone. Where the process was killed, the next command does that: a
-file that is as the journal wanted it becomes what it was, one that somebody has edited since stays.
+If step 2 fails, the changes so far are undone. If the process was killed, the next command undoes
+them: a file with the new content gets the old one back; one that was edited since stays.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ JOURNAL = ".coursebuild/changes"
 
 
 class FileChange(Struct, frozen=True):
-    """A file of the course: what it holds and what it is to hold; `None` is no file."""
+    """The old and the new content of a file of the course; `None` where there is no file."""
 
     path: str
     old: bytes | None
@@ -37,10 +37,10 @@ class FileChange(Struct, frozen=True):
 def change_files(
     root: Path, changes: Sequence[FileChange], on_wait: Callable[[str], None] | None = None
 ) -> None:
-    """Make all changes, or none; `on_wait` hears that another command is waited for.
+    """Make all changes, or none; `on_wait` gets a message if another command must end first.
 
     Raises:
-        EffectError: a file cannot be written, or is no longer what was read.
+        EffectError: a file cannot be written, or has changed since it was read.
     """
     with project_lock(root, on_wait):
         _undo(root)
@@ -49,7 +49,7 @@ def change_files(
         write_atomic(root, JOURNAL, msgspec.msgpack.encode(changes), expected=None)
         try:
             for change in changes:
-                _put(root, change.path, change.old, change.new)
+                _replace(root, change.path, change.old, change.new)
         except BaseException:
             _undo(root)
             raise
@@ -57,9 +57,9 @@ def change_files(
 
 
 def undo_changes(root: Path) -> None:
-    """Undo what a killed command had begun."""
+    """Undo the changes of a command that was killed."""
     if (root / JOURNAL).exists():
-        with project_lock(root):  # a command that is at work has it
+        with project_lock(root):  # a command still at work holds it
             _undo(root)
 
 
@@ -70,12 +70,12 @@ def _undo(root: Path) -> None:
         return
     for change in reversed(msgspec.msgpack.decode(journal, type=tuple[FileChange, ...])):
         with contextlib.suppress(FileChangedError):
-            _put(root, change.path, change.new, change.old)
+            _replace(root, change.path, change.new, change.old)
     (root / JOURNAL).unlink()
 
 
-def _put(root: Path, path: str, old: bytes | None, new: bytes | None) -> None:
-    """Let a file that holds `old` hold `new`."""
+def _replace(root: Path, path: str, old: bytes | None, new: bytes | None) -> None:
+    """Replace the content `old` of a file by `new`."""
     if new is not None:
         write_atomic(root, path, new, expected=old)
         return
@@ -83,7 +83,7 @@ def _put(root: Path, path: str, old: bytes | None, new: bytes | None) -> None:
     try:
         check_unchanged(file, path, old)
         file.unlink()
-        for folder in file.relative_to(root).parents:  # that nothing is left in
+        for folder in file.relative_to(root).parents:  # remove those that are empty now
             with contextlib.suppress(OSError):
                 (root / folder).rmdir()
     except OSError as error:

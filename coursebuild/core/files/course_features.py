@@ -1,6 +1,6 @@
-"""The features that a course brings itself: Python files that its map names, run here.
+"""The features of a course's own: Python files that its map names, run in this process.
 
-Entry point: `load_course_features`. They are as trusted as the course's scripts are.
+Entry point: `load_course_features`. These files are trusted as the course's scripts are.
 """
 
 from __future__ import annotations
@@ -20,53 +20,53 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 
 def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
-    """Make the features of a course those of this process; what is wrong with them."""
-    found: list[Feature] = []
-    wrong: list[Diagnostic] = []
+    """Load the features of a course into this process; return diagnostics about them."""
+    features: list[Feature] = []
+    diagnostics: list[Diagnostic] = []
     digest = hashlib.sha256()
 
-    def tell(named: NamedPath, message: str, mend: str = "correct the file") -> None:
+    def tell(entry: NamedPath, message: str, mend: str = "correct the file") -> None:
         help = f"{mend}, or take it out of `features` in the map"
-        wrong.append(diagnose("feature-broken", named.span, message, help=help))
+        diagnostics.append(diagnose("feature-broken", entry.span, message, help=help))
 
-    for named in course.features:
+    for entry in course.features:
         try:
-            code = read_bytes(root, named.path)
+            code = read_bytes(root, entry.path)
         except EffectError as error:
-            tell(named, error.message, "write it, as `coursebuild new feature NAME` does")
+            tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
-        digest.update(named.path.encode() + b"\0" + code + b"\0")
-        feature = _run(named.path, code)
+        digest.update(entry.path.encode() + b"\0" + code + b"\0")
+        feature = _run(entry.path, code)
         if isinstance(feature, str):
-            tell(named, feature)
-        elif reason := clash(feature, (*installed_features(), *found)):
-            tell(named, f"{named.path}: {reason}")
+            tell(entry, feature)
+        elif reason := clash(feature, (*installed_features(), *features)):
+            tell(entry, f"{entry.path}: {reason}")
         else:
-            found.append(feature)
-    use_course_features(found, digest.hexdigest() if course.features else "")
-    return tuple(wrong)
+            features.append(feature)
+    use_course_features(features, digest.hexdigest() if course.features else "")
+    return tuple(diagnostics)
 
 
 def _run(path: str, code: bytes) -> Feature | str:
-    """The feature of a file, or why there is none.
+    """The feature of a file, or a message that says why there is none.
 
-    An unchanged file is not run again: blocks that were read would be of another class than those
-    that are read now.
+    An unchanged file is not run again: that would define its classes anew, and blocks read earlier
+    would no longer be instances of them.
     """
-    known = _last.get(path)
-    if known is None or known[0] != code:
-        known = _last[path] = code, _first_run(path, code)
-    return known[1]
+    last = _last.get(path)
+    if last is None or last[0] != code:
+        last = _last[path] = code, _first_run(path, code)
+    return last[1]
 
 
 _last: dict[str, tuple[bytes, Feature | str]] = {}
-"""By path: the code that was run last, and what came of it."""
+"""By path: the code that was run last, and its feature or message."""
 
 
 def _first_run(path: str, code: bytes) -> Feature | str:
     module = ModuleType(f"course_{path.removesuffix('.py').replace('/', '.')}")
     module.__file__ = path
-    sys.modules[module.__name__] = module  # where kept values of its classes look for these
+    sys.modules[module.__name__] = module  # where decoding looks for its classes
     try:
         exec(compile(code, path, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:  # whatever an author's code raises

@@ -1,6 +1,6 @@
-"""Where a course is, by strings and stat alone: a run with nothing to do loads no more than this.
+"""Where a course is, by strings and stat alone, since a run with nothing to do loads this module.
 
-Entry points: `find_course_root`; `is_dropping`, of names that are none of a course's files.
+Entry points: `find_course_root`; `is_dropping`, for names that are not files of a course.
 """
 
 from __future__ import annotations
@@ -8,9 +8,9 @@ from __future__ import annotations
 import os
 
 MAP = "content/course.toml"
-"""By this file a folder is a course."""
+"""The file that makes a folder a course."""
 FOLDERS = ("content", "features", "models", "mjcourse", "theme")
-"""What a course's author writes, and the library that a course may have of its own."""
+"""The folders that a course's author writes, and the library that a course may have."""
 
 
 def is_dropping(name: str) -> bool:
@@ -25,7 +25,7 @@ def find_course_root(start: str) -> str | None:
     while True:
         if os.path.exists(os.path.join(folder, MAP)):
             return folder
-        above = os.path.dirname(folder)
-        if above == folder:
+        parent = os.path.dirname(folder)
+        if parent == folder:
             return None
-        folder = above
+        folder = parent

@@ -11,9 +11,9 @@ import os
 
 
 class EffectError(Exception):
-    """The world outside refused.
+    """An effect outside the process failed or was refused.
 
-    `message` says what, in lower case without a full stop; `help` says how to go on.
+    `message` says what is wrong, in lower case without a full stop; `help` says how to mend it.
     """
 
     def __init__(self, message: str, *, help: str = "") -> None:
@@ -23,7 +23,7 @@ class EffectError(Exception):
 
 
 class FileChangedError(EffectError):
-    """A file is no longer what was read: replacing it would lose somebody's work."""
+    """A file has changed since it was read: replacing it would lose somebody's work."""
 
 
 class OutsideProjectError(EffectError):
@@ -35,7 +35,7 @@ class PublishRefusedError(EffectError):
 
 
 class UsageError(Exception):
-    """The command was called in a way that cannot be; its text is for the user. Exit status 2."""
+    """A command was called wrongly; the text is for the user. Exit status 2."""
 
     def __init__(self, message: str, *, help: str = "") -> None:
         super().__init__(f"{message}; {help}" if help else message)
@@ -48,7 +48,7 @@ def reason(error: OSError) -> str:
 
 
 def lacking(error: MemoryError | OSError | RuntimeError) -> EffectError | None:
-    """What the machine has no more of; `None` where the error is another."""
+    """The error of a machine that has run out of something; `None` for all other errors."""
     if isinstance(error, MemoryError):
         return EffectError("there is not enough memory")
     if isinstance(error, OSError) and error.errno in _HELP:
@@ -67,4 +67,4 @@ _HELP = {
     errno.EDQUOT: "",
     errno.EFBIG: "`ulimit -f` says how large a file may be",
 }
-"""What there can be too little of, and how to get more."""
+"""The errors of resources that can run out, with how to get more."""

@@ -1,15 +1,15 @@
-"""Writing the lessons' scripts to `examples/`, and never over what somebody changed there.
+"""Writing the lessons' scripts to `examples/`, but never over a file that somebody changed there.
 
 Entry point: `write_examples`.
 
 1. The manifest `examples/.extracted.json` holds the SHA-256 of what was last written to each path.
-   A file that has such a hash is ours; any other content was put there by somebody and is reported,
-   with a diff, never overwritten.
-2. Before a file changes, the manifest names its new hash beside the old one; afterwards the new one
-   alone. Killed in between, the file is either, and known.
+   A file with such a hash is ours; any other content is somebody's, and is reported with a diff,
+   never overwritten.
+2. Before a file changes, the manifest gets its new hash beside the old one; afterwards it keeps the
+   new one only. If the tool is killed in between, the file has one of the two.
 3. A script that no lesson has any more is removed if it is ours.
 
-A manifest that is lost or damaged only makes the tool more careful.
+If the manifest is lost or damaged, the tool only becomes more careful.
 """
 
 from __future__ import annotations
@@ -60,15 +60,15 @@ class Blocked(Struct, frozen=True):
     path: str
     obstacle: Obstacle
     current: str
-    """What the file holds; bytes that are not UTF-8 as `\\xNN`. Empty for a link or a folder."""
+    """The content of the file, other bytes than UTF-8 as `\\xNN`; empty for a link or a folder."""
     diff: str
     """Unified diff from the lesson's block to the file; empty where there is nothing to compare."""
     diverged: bool = False
-    """Of an edited one: the lesson's block was changed as well since the file was extracted."""
+    """Whether, besides an edited file, the lesson's block was changed since it was extracted."""
 
 
 class ExamplesReport(Struct, frozen=True):
-    """What became of each script; paths in sorted order."""
+    """The paths of all scripts by outcome, sorted."""
 
     written: tuple[str, ...]
     unchanged: tuple[str, ...]
@@ -76,12 +76,12 @@ class ExamplesReport(Struct, frozen=True):
     blocked: tuple[Blocked, ...]
 
 
-def write_examples(root: Path, extractions: Mapping[str, bytes]) -> ExamplesReport:
+def write_examples(root: Path, scripts: Mapping[str, bytes]) -> ExamplesReport:
     """Bring `examples/` up to date.
 
     Args:
         root: the course folder; the caller holds its lock.
-        extractions: every script of the course by its path, POSIX, below `examples/`.
+        scripts: every script of the course by its path, POSIX, below `examples/`.
 
     Raises:
         EffectError: the folder cannot be written, or leads out of the project.
@@ -91,27 +91,31 @@ def write_examples(root: Path, extractions: Mapping[str, bytes]) -> ExamplesRepo
         resolve_inside(root, FOLDER)
     except OutsideProjectError:
         raise OutsideProjectError(f"{FOLDER}/ is a link that leads out of the project") from None
-    known = _load_manifest(root)
-    if not extractions and not known:
+    hashes_by_path = _load_manifest(root)
+    if not scripts and not hashes_by_path:
         return ExamplesReport((), (), (), ())
     try:
-        return _Update(root, known, extractions).run()
+        return _Update(root, hashes_by_path, scripts).run()
     except OSError as error:
-        where = os.path.relpath(error.filename, root) if error.filename else FOLDER
-        raise EffectError(f"{where} cannot be written: {reason(error)}") from None
+        place = os.path.relpath(error.filename, root) if error.filename else FOLDER
+        raise EffectError(f"{place} cannot be written: {reason(error)}") from None
 
 
 class _Update:
-    """One run: what is planned is written down first, then done, then written down as done."""
+    """One run: record what is planned, do it, record what was done."""
 
     def __init__(
-        self, root: Path, known: Mapping[str, tuple[str, ...]], wanted: Mapping[str, bytes]
+        self,
+        root: Path,
+        known_hashes: Mapping[str, tuple[str, ...]],
+        scripts: Mapping[str, bytes],
     ) -> None:
         self.root = root
-        self.known = known
-        self.wanted = wanted
+        self.known_hashes = known_hashes
+        """By path: the hashes that our file may have."""
+        self.scripts = scripts
         self.current: dict[str, bytes | None] = {}
-        """What the files that are written or removed hold now."""
+        """The content on the disk of the files to be written or removed."""
         self.manifest: dict[str, tuple[str, ...]] = {}
         self.written: list[str] = []
         self.unchanged: list[str] = []
@@ -119,13 +123,15 @@ class _Update:
         self.blocked: list[Blocked] = []
 
     def run(self) -> ExamplesReport:
-        for path in sorted(self.wanted.keys() | self.known.keys()):
+        for path in sorted(self.scripts.keys() | self.known_hashes.keys()):
             self._plan(path)
         (self.root / FOLDER).mkdir(exist_ok=True)
-        folders = {FOLDER, *(path.rpartition("/")[0] for path in self.wanted)}
+        folders = {FOLDER, *(path.rpartition("/")[0] for path in self.scripts)}
         remove_leftovers(self.root / folder for folder in folders)
         before = {
-            path: tuple(dict.fromkeys((*self.manifest.get(path, ()), *self.known.get(path, ()))))
+            path: tuple(
+                dict.fromkeys((*self.manifest.get(path, ()), *self.known_hashes.get(path, ())))
+            )
             for path in self.manifest.keys() | set(self.removed)
         }
         if self.written or self.removed:
@@ -143,28 +149,30 @@ class _Update:
         )
 
     def _plan(self, path: str) -> None:
-        """Say what is to be done about a script that a lesson has, or had."""
-        wanted, known = self.wanted.get(path), self.known.get(path)
+        """Decide what to do about a script that a lesson has or had."""
+        new, known_hashes = self.scripts.get(path), self.known_hashes.get(path)
         obstacle, current = self._look(path)
-        if wanted is None and (obstacle is not None or current is None):
-            return  # gone, or no longer anything of ours
-        # A power cut may make a file that was just written empty, and that holds nobody's work.
-        if current and current != wanted and _hash(current) not in (known or ()):
-            edited = Obstacle.FOREIGN if known is None else Obstacle.EDITED
-            obstacle = Obstacle.ORPHAN if wanted is None else edited
+        if new is None and (obstacle is not None or current is None):
+            return  # gone, or no longer ours
+        # An empty file is nobody's work: a power cut may empty one that was just written.
+        if current and current != new and _hash(current) not in (known_hashes or ()):
+            if new is None:
+                obstacle = Obstacle.ORPHAN
+            else:
+                obstacle = Obstacle.FOREIGN if known_hashes is None else Obstacle.EDITED
         if obstacle is not None:
             self._block(path, obstacle, current)
             return
         self.current[path] = current
-        if wanted is None:
+        if new is None:
             self.removed.append(path)
         else:
-            self.manifest[path] = (_hash(wanted),)
-            (self.unchanged if current == wanted else self.written).append(path)
+            self.manifest[path] = (_hash(new),)
+            (self.unchanged if current == new else self.written).append(path)
 
     def _look(self, path: str) -> tuple[Obstacle | None, bytes | None]:
-        """What stands at a path: an obstacle, or the bytes of a file, or nothing."""
-        folders = [at for at, c in enumerate(path) if c == "/"][1:]  # not `examples` itself
+        """What is at a path: an obstacle, or the bytes of a file, or nothing."""
+        folders = [i for i, c in enumerate(path) if c == "/"][1:]  # not `examples` itself
         try:
             for end in (*folders, len(path)):
                 mode = os.lstat(f"{self.root}/{path[:end]}").st_mode
@@ -180,11 +188,11 @@ class _Update:
     def _write(self, path: str) -> None:
         try:
             write_atomic(
-                self.root, path, self.wanted[path], expected=self.current[path], durable=False
+                self.root, path, self.scripts[path], expected=self.current[path], durable=False
             )
-        except FileChangedError:  # somebody saved it since we looked, maybe another run of the tool
+        except FileChangedError:  # somebody saved it since `_look`, maybe another run of the tool
             now = self._look(path)[1]
-            if now != self.wanted[path]:
+            if now != self.scripts[path]:
                 self.written.remove(path)
                 self._block(path, Obstacle.EDITED, now)
 
@@ -200,27 +208,29 @@ class _Update:
                 (self.root / folder).rmdir()
 
     def _block(self, path: str, obstacle: Obstacle, current: bytes | None) -> None:
-        if path in self.known:
-            self.manifest[path] = self.known[path]
+        if path in self.known_hashes:
+            self.manifest[path] = self.known_hashes[path]
         else:
             self.manifest.pop(path, None)
         text = _decode(current or b"")
         diff = ""
         if current is not None:
             diff = unified_diff(
-                _decode(self.wanted.get(path, b"")),
+                _decode(self.scripts.get(path, b"")),
                 text,
                 f"{path} (in the lesson)",
                 f"{path} (on the disk)",
             )
-        known = self.known.get(path, ())
-        wanted = self.wanted.get(path)
-        diverged = obstacle is Obstacle.EDITED and wanted is not None and _hash(wanted) not in known
+        known_hashes = self.known_hashes.get(path, ())
+        new = self.scripts.get(path)
+        diverged = (
+            obstacle is Obstacle.EDITED and new is not None and _hash(new) not in known_hashes
+        )
         self.blocked.append(Blocked(path, obstacle, text, diff, diverged))
 
 
 def unified_diff(old: str, new: str, old_name: str, new_name: str) -> str:
-    """The difference of two texts as `diff -u` writes it; empty if there is none."""
+    """The difference between two texts as `diff -u` writes it; empty if there is none."""
     import difflib
 
     return "".join(
@@ -230,7 +240,7 @@ def unified_diff(old: str, new: str, old_name: str, new_name: str) -> str:
 
 
 def _lines(text: str) -> list[str]:
-    """Split at LF alone, ends kept: a form feed in a script is no line end."""
+    """Split a text at LF only, keeping line ends: a form feed in a script is no line end."""
     return re.findall(r"[^\n]*\n|[^\n]+", text)
 
 
@@ -243,23 +253,23 @@ def _hash(data: bytes) -> str:
 
 
 def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
-    """The hashes that each extracted path may have; empty if the manifest is not what we wrote."""
+    """The hashes that each extracted file may have; empty if the manifest is missing or damaged."""
     try:
         files = json.loads((root / MANIFEST).read_bytes())["files"]
         manifest = {path: tuple(hashes) for path, hashes in files.items()}
     except OSError as error:
-        if lacking(error):  # without it all files would seem to be edited by hand, also later on
+        if lacking(error):  # an empty manifest would make all files look edited, now and later
             raise
         return {}
     except (ValueError, KeyError, TypeError, AttributeError):
         return {}
-    sound = all(
+    is_valid = all(
         path.startswith(f"{FOLDER}/")
         and ".." not in path.split("/")
         and all(isinstance(h, str) for h in hashes)
         for path, hashes in manifest.items()
     )
-    return manifest if sound else {}
+    return manifest if is_valid else {}
 
 
 def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:
@@ -275,7 +285,7 @@ def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:
             current = None
         if current == data:
             return
-        # Where there are no locks, another run may write it too.
+        # Without locks, another run may write it at the same time.
         with contextlib.suppress(FileChangedError):
             write_atomic(root, MANIFEST, data, expected=current, durable=False)
             return

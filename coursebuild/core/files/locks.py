@@ -1,12 +1,12 @@
 """One writer at a time: locks that vanish with the process that holds them.
 
 Entry points: `project_lock`, held by a command that writes into a course; `folder_lock`, held while
-a site is swapped; `try_lock` and `is_abandoned`, by which a temporary file shows whether whoever
-writes it is alive.
+a site is swapped; `try_lock` and `is_abandoned`, which tell whether the writer of a temporary file
+is alive.
 
-A lock is an flock, so that killing its holder frees it at once and nothing can be stale. Where a
-file system knows no locks, or the project cannot be written, the work goes on alone: every write of
-the tool is whole by itself, the lock only keeps two runs from doing the same work twice.
+A lock is an flock: killing its holder frees it at once, so no lock can be stale. Where a file
+system has no locks, or the project cannot be written, the work goes on without: every write of the
+tool is whole by itself, and the lock only keeps two runs from doing the same work twice.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _LONG_AGO = 3600.0
 
 
 def try_lock(fd: int) -> bool | None:
-    """Lock an open file or folder if nobody else has; `None` where there are no locks."""
+    """Try to lock an open file or folder; return whether it is ours, `None` without locks."""
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
@@ -34,7 +34,7 @@ def try_lock(fd: int) -> bool | None:
 
 
 def is_abandoned(fd: int) -> bool:
-    """Whether a temporary file has lost its writer, who would hold it locked."""
+    """Whether the writer of a temporary file, who would hold it locked, is gone."""
     locked = try_lock(fd)
     if locked is None:
         return time.time() - os.fstat(fd).st_mtime > _LONG_AGO
@@ -45,14 +45,14 @@ def is_abandoned(fd: int) -> bool:
 def project_lock(
     root: Path, on_wait: Callable[[str], None] | None = None, *, name: str = "lock"
 ) -> Iterator[None]:
-    """Hold the lock of a course folder, or another one that it has.
+    """Hold a lock of a course folder.
 
     Args:
         root: the course folder; the lock is `.coursebuild/lock` in it.
-        on_wait: is called once with a message, in the case that another run has the lock.
-        name: of the lock's file.
+        on_wait: is called once, with a message, if another run has the lock.
+        name: the name of the lock's file.
     """
-    fd = _take(root.resolve() / ".coursebuild" / name, on_wait)
+    fd = _lock_file(root.resolve() / ".coursebuild" / name, on_wait)
     try:
         yield
     finally:
@@ -62,7 +62,7 @@ def project_lock(
 
 @contextlib.contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
-    """Hold a folder locked while something in it is replaced; without leaving a file there."""
+    """Hold a folder locked while something in it is replaced, without making a file there."""
     try:
         fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:  # there is no such folder
@@ -76,9 +76,9 @@ def folder_lock(folder: Path) -> Iterator[None]:
         os.close(fd)
 
 
-def _take(path: Path, on_wait: Callable[[str], None] | None) -> int | None:
-    """The locked file; `None` where there can be no lock."""
-    said = False
+def _lock_file(path: Path, on_wait: Callable[[str], None] | None) -> int | None:
+    """Open and lock a file, waiting if need be; `None` where that is not possible."""
+    has_reported = False
     while True:
         try:
             make_private_folder(path.parent)
@@ -88,9 +88,9 @@ def _take(path: Path, on_wait: Callable[[str], None] | None) -> int | None:
         try:
             locked = try_lock(fd)
             if locked is False:
-                if on_wait is not None and not said:
-                    on_wait(_waiting(fd))
-                    said = True
+                if on_wait is not None and not has_reported:
+                    on_wait(_waiting_message(fd))
+                    has_reported = True
                 fcntl.flock(fd, fcntl.LOCK_EX)
             elif locked is None:
                 os.close(fd)
@@ -105,21 +105,21 @@ def _take(path: Path, on_wait: Callable[[str], None] | None) -> int | None:
         except BaseException:
             os.close(fd)
             raise
-        os.close(fd)  # somebody deleted .coursebuild while we waited
+        os.close(fd)  # .coursebuild was deleted while we waited
 
 
 def make_private_folder(folder: Path) -> None:
-    """Make the tool's own folder in a course, which git ignores whatever the course says."""
+    """Make the tool's own folder in a course, with a `.gitignore` that covers all of it."""
     folder.mkdir(exist_ok=True)
     ignore = folder / ".gitignore"
     if not ignore.exists():
         ignore.write_bytes(b"*\n")
 
 
-def _waiting(fd: int) -> str:
+def _waiting_message(fd: int) -> str:
     holder = os.pread(fd, 32, 0).decode("ascii", "replace").strip()
-    who = f" (process {holder})" if holder.isdigit() else ""
-    return f"another coursebuild{who} is at work on this course; waiting for it"
+    process = f" (process {holder})" if holder.isdigit() else ""
+    return f"another coursebuild{process} is at work on this course; waiting for it"
 
 
 def _is_at(fd: int, path: Path) -> bool:

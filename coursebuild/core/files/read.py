@@ -2,15 +2,15 @@
 
 Entry points: `find_root`, `read_course`, `read_bytes`.
 
-1. `content/` and `models/` are walked in sorted order; editors' droppings (names that begin with a
-   dot, `x.md~`) are none of the course's files.
-2. Lessons, pages and models are decoded as strict UTF-8, line ends and byte order mark as they are:
-   offsets into the text serve edits byte for byte.
-3. A file that cannot be had becomes a diagnostic. One that is not UTF-8 still becomes a source,
-   with U+FFFD for what is wrong, so that its other mistakes are found in the same run; it is no
-   longer what stands on the disk, so nothing can be written back over it by mistake.
+1. `content/` and `models/` are walked in sorted order, without what editors leave there (names that
+   begin with a dot, `x.md~`).
+2. Lessons, pages and models are decoded as strict UTF-8. Line ends and byte order marks stay, so
+   that edits by offset change no other byte.
+3. A file that cannot be read becomes a diagnostic. One that is not UTF-8 still becomes a source,
+   with U+FFFD for the wrong bytes, so that its other mistakes are found in the same run. Since it
+   differs from the file, no edit can be written back over that by mistake.
 4. A file that is no text at all, such as a picture, or is in UTF-16, becomes a diagnostic and
-   nothing else: whatever was found in it would be noise.
+   nothing else: any mistake found in it would be noise.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _OUTSIDE = "is reached through a link that leads out of the project"
 
 
 class CourseFiles(Struct, frozen=True):
-    """A course as it lies on the disk; sorted; paths are POSIX and relative to the root."""
+    """The files of a course, sorted; paths are POSIX and relative to the root."""
 
     map: Source | None
     lessons: tuple[Source, ...]
@@ -44,31 +44,31 @@ class CourseFiles(Struct, frozen=True):
     pages: tuple[Source, ...]
     """`content/pages/**/*.md`."""
     models: tuple[MjcfModel, ...]
-    """`models/**/*.xml`, those included that other models pull in."""
+    """`models/**/*.xml`, including those that other models include."""
     declarations: tuple[Source, ...]
     """`models/**/*.toml`: what is to be measured on the models beside them."""
     files: tuple[str, ...]
     """Every regular file in `content/` and `models/`: what a relative link can lead to."""
     unreadable: tuple[str, ...]
-    """What is there and cannot be read, or not as text."""
+    """Files that cannot be read, or not as text."""
 
 
-def find_root(chosen: Path | None, start: Path) -> Path:
-    """The course folder: the chosen one, or the nearest from `start` upwards that has a course map.
+def find_root(path: Path | None, start: Path) -> Path:
+    """The course folder: the one named, or the nearest from `start` upwards with a course map.
 
     Raises:
-        UsageError: the chosen one is no folder, or there is no course here.
+        UsageError: the named folder is none, or there is no course here.
     """
-    if chosen is not None:
-        folder = start / chosen
+    if path is not None:
+        folder = start / path
         if not folder.is_dir():
             raise UsageError(
-                f"{chosen} is not a folder" if folder.exists() else f"there is no folder {chosen}"
+                f"{path} is not a folder" if folder.exists() else f"there is no folder {path}"
             )
         return folder.resolve()
-    found = find_course_root(str(start))
-    if found is not None:
-        return Path(found)
+    root = find_course_root(str(start))
+    if root is not None:
+        return Path(root)
     raise UsageError(
         f"there is no {MAP} in this folder or one above it",
         help="go to a course, or name one with `-C DIR`",
@@ -78,7 +78,7 @@ def find_root(chosen: Path | None, start: Path) -> Path:
 def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[CourseFiles]:
     """Read the map, the lessons, the pages and the models of a course.
 
-    `open_texts` are those of files that are open in an editor, which need not be saved, by path.
+    `open_texts` are the texts of files that are open in an editor, perhaps unsaved, by path.
     """
     root = root.resolve()
     reader = _Reader(root, open_texts)
@@ -87,7 +87,7 @@ def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[Course
     pages = [f for f in files if f.startswith("content/pages/") and f.endswith(".md")]
     models = [f for f in files if f.startswith("models/") and f.endswith(".xml")]
     declarations = [f for f in files if f.startswith("models/") and f.endswith(".toml")]
-    found = CourseFiles(
+    course_files = CourseFiles(
         map=reader.map(),
         lessons=reader.sources(lessons),
         pages=reader.sources(pages),
@@ -99,21 +99,21 @@ def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[Course
         files=tuple(sorted(files)),
         unreadable=tuple(sorted(reader.unreadable)),
     )
-    return Parsed(found, tuple(reader.diagnostics))
+    return Parsed(course_files, tuple(reader.diagnostics))
 
 
 def read_bytes(root: Path, path: str) -> bytes:
     """The bytes of a file of the course.
 
     Raises:
-        OutsideProjectError: it lies outside the project, or a link leads there.
+        OutsideProjectError: it lies outside the project, or a link leads out of it.
         EffectError: it cannot be read.
     """
     return _read_inside(root.resolve(), path)
 
 
 def _read_inside(root: Path, path: str) -> bytes:
-    """As `read_bytes`, of a root without links."""
+    """Like `read_bytes`, for a root without links."""
     if "\0" in path:
         raise EffectError("a path holds a null character")
     if not Path(os.path.realpath(root / path)).is_relative_to(root):
@@ -127,20 +127,20 @@ def _read_inside(root: Path, path: str) -> bytes:
 def read_sources(
     root: Path, paths: list[str], open_texts: Mapping[str, str] = {}
 ) -> Parsed[tuple[Source, ...]]:
-    """Further text files of the project, such as pages that lie outside of `content/`."""
+    """Read further text files of the project, such as pages outside `content/`."""
     reader = _Reader(root.resolve(), open_texts)
     return Parsed(reader.sources(paths), tuple(reader.diagnostics))
 
 
 def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
-    """The text files below a folder of the course, sorted."""
+    """Read the text files below a folder of the course, sorted."""
     reader = _Reader(root.resolve())
-    found = reader.sources([*reader.walk(folder)])
-    return Parsed(found, tuple(reader.diagnostics))
+    sources = reader.sources([*reader.walk(folder)])
+    return Parsed(sources, tuple(reader.diagnostics))
 
 
 class _Reader:
-    """Reads files of one course and keeps what went wrong."""
+    """A reader of one course's files that collects diagnostics."""
 
     def __init__(self, root: Path, open_texts: Mapping[str, str] = {}) -> None:
         self.root = root
@@ -149,7 +149,7 @@ class _Reader:
         self.unreadable: list[str] = []
 
     def map(self) -> Source | None:
-        """The course map; that it is missing is a mistake already here."""
+        """Read the course map; a missing one is a diagnostic."""
         if not (self.root / MAP).is_symlink() and not (self.root / MAP).exists():
             self.diagnostics.append(
                 diagnose(
@@ -174,7 +174,7 @@ class _Reader:
         else:
             yield from self._walk(top, frozenset())
 
-    def _walk(self, folder: str, above: frozenset[tuple[int, int]]) -> Iterator[str]:
+    def _walk(self, folder: str, ancestors: frozenset[tuple[int, int]]) -> Iterator[str]:
         try:
             status = (self.root / folder).stat()
             with os.scandir(self.root / folder) as entries:
@@ -182,14 +182,16 @@ class _Reader:
         except OSError as error:
             self._refuse(folder, f"cannot be read: {reason(error)}")
             return
-        here = (status.st_dev, status.st_ino)
-        if here in above:  # a link to a folder that it lies in
+        identity = (status.st_dev, status.st_ino)
+        if identity in ancestors:  # a link to one of its own parents
             return
         for name, is_link in names:
             if not is_dropping(name):
-                yield from self._entry(f"{folder}/{name}", is_link, above | {here})
+                yield from self._walk_entry(f"{folder}/{name}", is_link, ancestors | {identity})
 
-    def _entry(self, path: str, is_link: bool, above: frozenset[tuple[int, int]]) -> Iterator[str]:
+    def _walk_entry(
+        self, path: str, is_link: bool, ancestors: frozenset[tuple[int, int]]
+    ) -> Iterator[str]:
         if not _is_text(path):
             self._refuse(path, "has a name that is not UTF-8")
             return
@@ -202,25 +204,25 @@ class _Reader:
         except FileNotFoundError:
             if is_link:
                 self._refuse(path, "is a link to a file that is not there")
-            return  # otherwise it vanished while we looked
+            return  # otherwise it was removed meanwhile
         except OSError as error:
             self._refuse(path, f"cannot be read: {reason(error)}")
             return
         if stat.S_ISDIR(mode) and not path.endswith((".md", ".xml", ".toml")):
-            yield from self._walk(path, above)
+            yield from self._walk(path, ancestors)
         elif stat.S_ISREG(mode):
             yield path
         else:
             self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
 
     def sources(self, paths: list[str]) -> tuple[Source, ...]:
-        """The files that hold text, decoded."""
-        found = []
+        """Read and decode files; those that hold no text are left out."""
+        sources = []
         for path in paths:
             if path in self.unreadable:
                 continue
             if path in self.open_texts:
-                found.append(Source(path, self.open_texts[path]))
+                sources.append(Source(path, self.open_texts[path]))
                 continue
             try:
                 data = _read_inside(self.root, path)
@@ -230,26 +232,27 @@ class _Reader:
                 self._refuse(path, error.message.removeprefix(f"{path} "))
             else:
                 source = self._decode(path, data)
-                found += [] if source is None else [source]
-        return tuple(found)
+                sources += [] if source is None else [source]
+        return tuple(sources)
 
     def _decode(self, path: str, data: bytes) -> Source | None:
-        """The text of a file; `None` where it holds none."""
+        """Decode a file; `None` where it is not text."""
         is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _STRAY
-        wrong, why = -1 if is_text else data.find(b"\0"), "is not text"  # though it is UTF-8
+        # Text with many zeros is not text, even if it is UTF-8.
+        position, problem = -1 if is_text else data.find(b"\0"), "is not text"
         try:
             text = data.decode("utf-8")
         except UnicodeDecodeError as error:
-            text, wrong, why = data.decode("utf-8", "replace"), error.start, "is not UTF-8"
+            text, position, problem = data.decode("utf-8", "replace"), error.start, "is not UTF-8"
             is_text = is_text and b"\0" not in data
         source = Source(path, text)
-        if wrong >= 0:
-            at = len(data[:wrong].decode("utf-8"))
+        if position >= 0:
+            at = len(data[:position].decode("utf-8"))
             self.diagnostics.append(
                 diagnose(
                     "file-encoding",
                     source.span(at, at + 1),
-                    f"byte 0x{data[wrong]:02x} {why}",
+                    f"byte 0x{data[position]:02x} {problem}",
                     help=f"save the file as UTF-8{_guess(data)}",
                 )
             )
@@ -258,15 +261,15 @@ class _Reader:
         self.unreadable.append(path)
         return None
 
-    def _refuse(self, path: str, why: str) -> None:
-        shown = path if _is_text(path) else path.encode("utf-8", "backslashreplace").decode("utf-8")
-        self.unreadable.append(shown)
-        span = Source(shown, "").span()
-        self.diagnostics.append(diagnose("file-unreadable", span, f"{shown} {why}"))
+    def _refuse(self, path: str, problem: str) -> None:
+        name = path if _is_text(path) else path.encode("utf-8", "backslashreplace").decode("utf-8")
+        self.unreadable.append(name)
+        span = Source(name, "").span()
+        self.diagnostics.append(diagnose("file-unreadable", span, f"{name} {problem}"))
 
 
 def _read_regular(path: Path) -> bytes:
-    """The bytes of a regular file; never waits, whatever stands at the path."""
+    """The bytes of a regular file; anything else is refused without waiting, even a pipe."""
     fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     try:
         status = os.fstat(fd)
@@ -286,7 +289,7 @@ def _is_text(path: str) -> bool:
 
 
 def _guess(data: bytes) -> str:
-    """What the file may be instead."""
+    """The end of a sentence that guesses what the file is instead."""
     if data.startswith(_UTF16) or _is_every_other_zero(data[:1024]):
         return "; it looks like UTF-16"
     if b"\0" in data:
@@ -295,6 +298,6 @@ def _guess(data: bytes) -> str:
 
 
 def _is_every_other_zero(data: bytes) -> bool:
-    """As in UTF-16 without a byte order mark, where the letters are Latin."""
-    fewer, more = sorted((data[::2].count(0), data[1::2].count(0)))
-    return fewer == 0 and more > len(data) // 4
+    """Whether every other byte is zero, as in Latin UTF-16 without a byte order mark."""
+    least, most = sorted((data[::2].count(0), data[1::2].count(0)))
+    return least == 0 and most > len(data) // 4

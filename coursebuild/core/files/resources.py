@@ -1,11 +1,11 @@
-"""Where the files lie that come with the tool and are not Python.
+"""Files that come with the tool and are not Python.
 
-Entry points: `assets_dir`, for what the build of the package bundles for browsers, and `Bundle`,
-its files; `templates_dir`, for the pages' templates, and `template_texts`; `rules_page`, the page
-of all rules.
+Entry points: `assets_dir`, the folder of what is bundled for browsers, and `Bundle`, its files;
+`templates_dir`, the folder of the pages' templates, and `template_texts`; `rules_page`, the page of
+all rules.
 
-In an installed package all are inside it. In a source tree they are where they are made:
-`site/dist`, `templates` and `docs`.
+An installed package holds all of them. In a source tree they are in `site/dist`, `templates` and
+`docs`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ def assets_dir() -> Path:
     Raises:
         EffectError: this is a source tree where they have not been built.
     """
-    return _first(_PACKAGE / "assets", _TREE / "site" / "dist", "the browser's files are not built")
+    return _find_folder(
+        _PACKAGE / "assets", _TREE / "site" / "dist", "the browser's files are not built"
+    )
 
 
 def templates_dir() -> Path:
@@ -36,27 +38,31 @@ def templates_dir() -> Path:
     Raises:
         EffectError: the installation is broken.
     """
-    return _first(_PACKAGE / "templates", _TREE / "templates", "the page templates are missing")
+    return _find_folder(
+        _PACKAGE / "templates", _TREE / "templates", "the page templates are missing"
+    )
 
 
 def rules_page() -> str:
-    """The Markdown that has a section for each rule, with an example.
+    """The Markdown page with a section and an example for each rule.
 
     Raises:
         EffectError: the installation is broken.
     """
-    folder = _first(_PACKAGE / "docs", _TREE / "docs/reference", "the page of rules is missing")
+    folder = _find_folder(
+        _PACKAGE / "docs", _TREE / "docs/reference", "the page of rules is missing"
+    )
     return (folder / "rules.md").read_text(encoding="utf-8")
 
 
 class Bundle(Mapping[str, bytes]):
-    """The bundled files by path relative to `assets_dir()`, sorted; read when asked for."""
+    """The bundled files by path relative to `assets_dir()`, sorted; each is read on access."""
 
     def __init__(self) -> None:
         self._folder = assets_dir()
 
     def __getitem__(self, path: str) -> bytes:
-        try:  # most runs ask for one or two, and need not know which there are
+        try:  # without listing all, since most runs read one or two
             return (self._folder / path).read_bytes()
         except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:
             raise KeyError(path) from error
@@ -69,19 +75,18 @@ class Bundle(Mapping[str, bytes]):
 
     @functools.cached_property
     def _paths(self) -> tuple[str, ...]:
-        found = _paths(self._folder)
-        return tuple(path for path in found if Path(path).name != "stamp.json")
+        return tuple(path for path in _paths(self._folder) if Path(path).name != "stamp.json")
 
 
 def _paths(folder: Path) -> Iterator[str]:
     """The files below a folder by path relative to it, sorted."""
     top = len(f"{folder}/")
-    walked = os.walk(folder, onerror=_refuse)
-    found = (f"{at}/{name}"[top:] for at, _, names in walked for name in names)
-    yield from sorted(found, key=lambda path: path.split("/"))
+    walk = os.walk(folder, onerror=_raise)
+    paths = (f"{place}/{name}"[top:] for place, _, names in walk for name in names)
+    yield from sorted(paths, key=lambda path: path.split("/"))
 
 
-def _refuse(error: OSError) -> None:
+def _raise(error: OSError) -> None:
     raise error
 
 
@@ -95,11 +100,11 @@ def template_texts() -> tuple[tuple[str, str], ...]:
     )
 
 
-def _first(installed: Path, in_tree: Path, otherwise: str) -> Path:
+def _find_folder(installed: Path, in_tree: Path, problem: str) -> Path:
     for folder in (installed, in_tree):
         if folder.is_dir():
             return folder
     raise EffectError(
-        f"{otherwise}: there is no {installed}",
+        f"{problem}: there is no {installed}",
         help="in a source tree, run `make site`; otherwise install coursebuild again",
     )

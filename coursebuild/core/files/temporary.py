@@ -1,9 +1,9 @@
-"""Temporary folders, of which those that killed runs left are removed by the next.
+"""Temporary folders; those that killed runs left are removed by the next run.
 
 Entry point: `temporary_folder`.
 
-A folder is locked as long as it is used. One that is not is removed if it is empty, as killed runs
-leave them: what begins with the tool's name may be somebody else's.
+A folder is locked as long as it is used. One that is not locked is removed only if it is empty, as
+killed runs leave them, since it may be somebody else's in spite of its name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _PREFIX = "coursebuild-"
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[str]:
-    """A new folder, gone at the end with all that is in it.
+    """A new folder, removed at the end with everything in it.
 
     Raises:
         EffectError: there is no place for it.
@@ -40,7 +40,7 @@ def temporary_folder() -> Iterator[str]:
 
 
 def _make() -> tuple[str, int]:
-    """A new folder, and what holds it locked."""
+    """Make a folder and lock it; return it with the descriptor of its lock."""
     while True:
         folder = tempfile.mkdtemp(prefix=_PREFIX)
         with contextlib.suppress(FileNotFoundError):

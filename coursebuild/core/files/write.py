@@ -1,15 +1,14 @@
-"""Replacing a file of the course in one step, or not at all.
+"""Replacing a file of the course whole, or not at all.
 
 Entry points: `write_atomic`, `check_writable`, `check_unchanged`, `remove_leftovers`.
 
-1. The new bytes go into a temporary file in the same folder, locked so that others see that its
-   writer lives.
-2. They are brought to the disk, with the permissions and the owner of the file that they replace.
-3. If the file is still what the caller read, the temporary one takes its place by a rename.
+1. The new bytes go into a temporary file in the same folder, locked as long as its writer is alive.
+2. They are synced to the disk, with the permissions and the owner of the file that they replace.
+3. If the file is still what the caller read, the temporary file is renamed over it.
 
-A rename would replace a read-only file as well; an author who made it so means it, and it stays.
-Killed at any instant, the file is whole, old or new; at most a temporary file stays, which the next
-run removes.
+A read-only file is left alone, though a rename could replace it: its author meant it. If the tool
+is killed at any instant, the file is whole, old or new; at most a temporary file is left, which the
+next run removes.
 """
 
 from __future__ import annotations
@@ -24,30 +23,30 @@ from coursebuild.core.files.errors import EffectError, FileChangedError, Outside
 from coursebuild.core.files.locks import is_abandoned, try_lock
 
 PREFIX = ".coursebuild-tmp-"
-"""Names of temporary files begin so; the leading dot keeps them out of the course."""
+"""What names of temporary files begin with; the dot keeps them out of the course."""
 
 
 def write_atomic(
     root: Path, path: str, data: bytes, *, expected: bytes | None, durable: bool = True
 ) -> None:
-    """Make `data` the content of a file of the course; of the file it leads to, if it is a link.
+    """Make `data` the content of a file of the course, or of the file that a link there leads to.
 
     Args:
         root: the course folder.
         path: POSIX path relative to it.
         data: the new content.
-        expected: what the file held when it was read; `None` when there was none, and perhaps no
+        expected: the file's content when it was read; `None` if there was none, and perhaps no
             folder either.
-        durable: whether it is an author's file: its bytes must survive a power cut from now on, and
-            it stays as it is where it is read-only (a derived file can be made again).
+        durable: whether it is an author's file, whose bytes must survive a power cut and which is
+            left alone if it is read-only. (A derived file can be made again.)
 
     Raises:
-        FileChangedError: the file holds something else by now; it stays as it is.
+        FileChangedError: the file has changed since; it stays as it is.
         OutsideProjectError: the path, or a link there, leads out of the project.
         EffectError: it cannot be written.
     """
     target = check_writable(root, path) if durable else resolve_inside(root, path)
-    temporary = ""  # its path, as long as it is to be removed
+    temporary = ""  # its path, as soon as it has to be removed
     try:
         if target.exists() and not target.is_file():
             raise EffectError(f"{path} is not a regular file")
@@ -59,7 +58,7 @@ def write_atomic(
             if durable:
                 os.fsync(fd)
             check_unchanged(target, path, expected)
-            _put(temporary, target, path, new=expected is None)
+            _move(temporary, target, path, new=expected is None)
             if durable:
                 _sync_folder(target.parent)
                 remove_leftovers([target.parent])
@@ -74,10 +73,10 @@ def write_atomic(
 
 
 def resolve_inside(root: Path, path: str) -> Path:
-    """Where a path of the course really leads.
+    """Resolve a path of the course, with all links.
 
     Raises:
-        OutsideProjectError: out of the project.
+        OutsideProjectError: it leads out of the project.
     """
     target = Path(os.path.realpath(root / path))
     if not target.is_relative_to(os.path.realpath(root)):
@@ -86,16 +85,16 @@ def resolve_inside(root: Path, path: str) -> Path:
 
 
 def check_writable(root: Path, path: str) -> Path:
-    """Where a path of the course really leads, if an author lets the file there be replaced.
+    """Resolve a path of the course like `resolve_inside`, if the file there may be replaced.
 
-    The owner's bit tells what was meant: root may write every file.
+    The owner's permission decides, since root may write every file.
 
     Raises:
-        OutsideProjectError: out of the project.
+        OutsideProjectError: it leads out of the project.
         EffectError: the file is read-only.
     """
     target = resolve_inside(root, path)
-    with contextlib.suppress(OSError):  # told by who writes
+    with contextlib.suppress(OSError):  # writing will report it
         if not target.stat().st_mode & stat.S_IWUSR:
             help = "nothing was written to it; make it writable, and run the command again"
             raise EffectError(f"{path} is read-only", help=help)
@@ -122,7 +121,7 @@ def _remove_if_abandoned(path: Path) -> None:
 
 
 def _open_temporary(folder: Path) -> tuple[int, str]:
-    """A fresh locked file in a folder."""
+    """Make a new locked file in a folder; return its descriptor and path."""
     while True:
         path = folder / f"{PREFIX}{os.urandom(6).hex()}"
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
@@ -145,8 +144,8 @@ def _fill(fd: int, data: bytes, target: Path) -> None:
         os.fchmod(fd, stat.S_IMODE(old.st_mode))
 
 
-def _put(temporary: str, target: Path, path: str, *, new: bool) -> None:
-    if new:  # a link, unlike a rename, never takes the place of a file that somebody made just now
+def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
+    if new:  # a link, unlike a rename, never replaces a file that somebody just made
         try:
             os.link(temporary, target)
             return
@@ -158,10 +157,10 @@ def _put(temporary: str, target: Path, path: str, *, new: bool) -> None:
 
 
 def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
-    """Refuse to go on where a file does not hold what is expected; `None` is no file.
+    """Check that a file has the expected content; `None` stands for no file.
 
     Raises:
-        FileChangedError: it does not.
+        FileChangedError: it has another.
     """
     try:
         current: bytes | None = target.read_bytes()
@@ -179,7 +178,7 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Bring the rename to the disk; some file systems cannot, and the file is whole without."""
+    """Sync a rename to the disk; where that is not possible, the file is whole all the same."""
     with contextlib.suppress(OSError):
         fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
         try:

@@ -45,7 +45,7 @@ def test_it_depends_on_what_is_installed(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(sys, "path", [str(tmp_path / "nowhere"), str(site)])
 
     def name() -> str:
-        tool._installed.cache_clear()
+        tool._installed_packages.cache_clear()
         return tool._digest(str(folder))
 
     try:
@@ -55,7 +55,7 @@ def test_it_depends_on_what_is_installed(tmp_path: Path, monkeypatch: pytest.Mon
         (site / "Jinja2-3.1.6.dist-info").rename(site / "jinja2-3.1.7.dist-info")
         assert name() != first
     finally:
-        tool._installed.cache_clear()
+        tool._installed_packages.cache_clear()
 
 
 def test_content_counts_and_times_do_not(tmp_path: Path) -> None:
