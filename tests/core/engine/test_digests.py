@@ -1,4 +1,4 @@
-"""States of files: what changes shows."""
+"""States of files: every change shows."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_file_that_may_not_be_read(held_back: Path) -> None:
 def test_an_edit_of_the_same_size_and_time(
     file: Path, monkeypatch: pytest.MonkeyPatch, hours: int
 ) -> None:
-    """Of a file that was just written, and of one that is old enough to be known by its times."""
+    """A change shows in a file just written, and in one old enough to be judged by its times."""
     real = time.time_ns
     monkeypatch.setattr(module.time, "time_ns", lambda: real() + hours * 3_600_000_000_000)
     status = file.stat()

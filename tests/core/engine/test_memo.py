@@ -1,4 +1,4 @@
-"""Kept results: bytes flipped, entries cut, writers killed, many processes, pruned."""
+"""Kept results: flipped bytes, cut entries, killed writers, many processes, pruning."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def entry(root: Path, name: str = NAME) -> Path:
     return root / ".coursebuild" / name
 
 
-def heard(store: Memo) -> list[str]:
+def messages_of(store: Memo) -> list[str]:
     lines: list[str] = []
     store.listen(lines.append)
     return lines
@@ -38,16 +38,18 @@ def heard(store: Memo) -> list[str]:
 
 
 def test_every_position_of_an_entry_on_the_disk(tmp_path: Path) -> None:
-    """Each time the damage is told, the entry is gone, and the next result takes its place."""
+    """Each time the damage is reported, the entry is removed, and the next result replaces it."""
     store = Memo(tmp_path)
     store.put("kind", KEY, b"the result")
     whole = entry(tmp_path).read_bytes()
-    for at in range(len(whole)):
-        entry(tmp_path).write_bytes(whole[:at] + bytes([whole[at] ^ 0x10]) + whole[at + 1 :])
+    for position in range(len(whole)):
+        entry(tmp_path).write_bytes(
+            whole[:position] + bytes([whole[position] ^ 0x10]) + whole[position + 1 :]
+        )
         fresh = Memo(tmp_path)
         assert fresh.get("kind", KEY, bytes) is None
-        said = f"the entry kind/{KEY[:12]}… in .coursebuild is damaged: it is made again"
-        assert heard(fresh) == [said], "what was found before anybody listened is told later"
+        message = f"the entry kind/{KEY[:12]}… in .coursebuild is damaged: it is made again"
+        assert messages_of(fresh) == [message], "messages from before anybody listened come later"
         assert not entry(tmp_path).exists()
         assert fresh.get_or_create("kind", KEY, lambda: b"made again") == b"made again"
         assert Memo(tmp_path).get("kind", KEY, bytes) == b"made again"
@@ -61,9 +63,9 @@ def write_many(root: str, seed: int) -> None:
     for number in range(40):
         data = f"{number % 5}".encode() * 20_000
         store.put("kind", key(number % 5), data)
-        found = store.get("kind", key((number + seed) % 5), bytes)
-        if found is not None:
-            assert found == found[:1] * 20_000
+        result = store.get("kind", key((number + seed) % 5), bytes)
+        if result is not None:
+            assert result == result[:1] * 20_000
 
 
 @pytest.mark.site
@@ -122,7 +124,7 @@ def test_a_writer_that_was_killed_leaves_nothing_that_is_served_or_stays(tmp_pat
 
 
 @pytest.mark.parametrize("call", ["write_bytes", "replace"])
-def test_a_disk_that_takes_nothing_costs_time_and_is_told_once(
+def test_a_disk_that_takes_nothing_costs_time_and_is_reported_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
     def refuse(*_: object) -> None:
@@ -130,7 +132,7 @@ def test_a_disk_that_takes_nothing_costs_time_and_is_told_once(
 
     monkeypatch.setattr(Path, call, refuse)
     store = Memo(tmp_path)
-    lines = heard(store)
+    lines = messages_of(store)
     assert store.get_or_create("kind", KEY, lambda: b"a") == b"a"
     assert store.get_or_create("kind", key(2), lambda: b"b") == b"b"
     assert lines == ["results cannot be kept in .coursebuild: no space left on device"]
@@ -167,7 +169,7 @@ def test_what_fails_is_not_kept_and_nothing_is_a_result(tmp_path: Path) -> None:
 def test_a_fresh_store_makes_everything_again_and_says_what_differs(tmp_path: Path) -> None:
     Memo(tmp_path).put("kind", KEY, b"old")
     fresh = Memo(tmp_path, fresh=True)
-    lines = heard(fresh)
+    lines = messages_of(fresh)
     assert fresh.get("kind", KEY, bytes) is None
     assert fresh.get_or_create("kind", KEY, lambda: b"new") == b"new"
     assert lines == [f"the entry kind/{KEY[:12]}… was made again and is not what was kept"]
@@ -186,10 +188,10 @@ def test_a_group_lists_its_newest_and_drops_the_rest(tmp_path: Path) -> None:
     for number in range(12):
         store.put("kind", f"{group}/{key(number)}", b"x")
         os.utime(entry(tmp_path, f"kind/{group}/{key(number)}"), (1000 + number, 1000 + number))
-    listed = store.group("kind", group)
-    assert listed == [f"{group}/{key(number)}" for number in range(11, 3, -1)]
+    keys = store.group("kind", group)
+    assert keys == [f"{group}/{key(number)}" for number in range(11, 3, -1)]
     assert len(list((tmp_path / f".coursebuild/kind/{group}").iterdir())) == 8
-    assert store.get("kind", listed[0], bytes) == b"x"
+    assert store.get("kind", keys[0], bytes) == b"x"
     assert store.group("kind", key(99)) == []
 
 
@@ -203,15 +205,15 @@ def test_entries_are_cut_to_the_limit_the_oldest_first(tmp_path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"x" * 132)
         os.utime(path, (1000 + number, 1000 + number))
-    others = [folder / name for name in ("lock", "content.toml", "kind0/notes")]
-    for path in others:
+    foreign = [folder / name for name in ("lock", "content.toml", "kind0/notes")]
+    for path in foreign:
         path.write_text("not an entry")
     for _ in range(2):
         prune(folder, 66_000)
-        left = [path for path in folder.rglob("*") if path.is_file() and path not in others]
+        left = [path for path in folder.rglob("*") if path.is_file() and path not in foreign]
         assert len(left) == 450, "down to nine tenths of the limit, and then no further"
         assert min(path.stat().st_mtime for path in left) == 1000 + 550
-    assert all(path.exists() for path in others)
+    assert all(path.exists() for path in foreign)
 
 
 def test_what_is_used_stays(tmp_path: Path) -> None:
@@ -227,18 +229,18 @@ def test_what_is_used_stays(tmp_path: Path) -> None:
 def test_pruning_is_now_and_then(tmp_path: Path) -> None:
     folder = tmp_path / ".coursebuild"
 
-    def removed(written: int) -> bool:
-        """Whether there is room again when a command ends that wrote so many bytes."""
+    def prunes(size: int) -> bool:
+        """Whether a command that wrote so many bytes prunes as it ends."""
         store = Memo(tmp_path, size=100_000)
-        store.put("kind", key(written), b"x" * written)
+        store.put("kind", key(size), b"x" * size)
         (folder / "kind" / key(0)).write_bytes(b"x" * 200_000)
         store.close()
         return not (folder / "kind" / key(0)).exists()
 
-    assert removed(1)
-    assert not removed(2), "it was done a moment ago"
-    assert removed(10_000), "much was written"
+    assert prunes(1)
+    assert not prunes(2), "it was done a moment ago"
+    assert prunes(10_000), "much was written"
     for hours in (-2, 2):  # long ago; to come, since the clock was set back
-        when = time.time() + hours * 3600
-        os.utime(folder / "pruned", (when, when))
-        assert removed(3)
+        moment = time.time() + hours * 3600
+        os.utime(folder / "pruned", (moment, moment))
+        assert prunes(3)

@@ -28,7 +28,7 @@ def site(text: str) -> list[OutputFile]:
     return [OutputFile(path, f"{text} {path}".encode()) for path in PATHS]
 
 
-def published(text: str) -> dict[str, str]:
+def site_texts(text: str) -> dict[str, str]:
     return {path: f"{text} {path}" for path in PATHS}
 
 
@@ -69,7 +69,7 @@ def test_folder_keeps_its_permissions_and_a_link_its_place(root: Path, tmp_path:
         publish(root, root / "public", site(text))
         assert (root / "public").is_symlink()
         assert stat.S_IMODE((tmp_path / "www").stat().st_mode) == 0o2775
-        assert texts(tmp_path / "www") == published(text)
+        assert texts(tmp_path / "www") == site_texts(text)
     assert beside(tmp_path) == ["course", "www"]
 
 
@@ -78,7 +78,7 @@ def test_file_managers_may_look(root: Path) -> None:
     (root / "public/.DS_Store").touch()
     (root / "public/empty").mkdir()
     publish(root, root / "public", site("two"))
-    assert texts(root / "public") == published("two")
+    assert texts(root / "public") == site_texts("two")
 
 
 @pytest.mark.parametrize("call", ["fchmod", "mkdir"])
@@ -98,7 +98,7 @@ def test_full_disk(root: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> No
         patch.setattr(os, call, fail)
         with pytest.raises(EffectError, match="no space left on device"):
             publish(root, root / "public", site("two"))
-    assert texts(root / "public") == published("one")
+    assert texts(root / "public") == site_texts("one")
     assert beside(root) == ["content", "public"]
 
 
@@ -111,46 +111,46 @@ def test_paths_that_no_site_has_or_that_are_in_each_others_way(root: Path) -> No
     for paths in (("a", "a"), ("a", "a/b"), ("a/b", "a")):
         with pytest.raises((ValueError, EffectError)):
             publish(root, root / "public", [OutputFile(path, b"") for path in paths])
-    assert texts(root / "public") == published("one")
+    assert texts(root / "public") == site_texts("one")
     assert beside(root) == ["content", "public"]
 
 
 @pytest.mark.site
 def test_every_instant_has_a_whole_site(root: Path, exchanges: bool) -> None:
-    """Somebody reads the page all the time while it is published over and over."""
+    """A reader finds a whole page at any time while it is published over and over."""
     out = root / "public"
     publish(root, out, site("0"))
     stop = threading.Event()
-    seen: set[str | None] = set()
+    texts_seen: set[str | None] = set()
 
     def read() -> None:
         while not stop.is_set():
             try:
-                seen.add((out / "index.html").read_text())
+                texts_seen.add((out / "index.html").read_text())
             except FileNotFoundError:
-                seen.add(None)
+                texts_seen.add(None)
 
     reader = threading.Thread(target=read)
     reader.start()
     for i in range(60):
         publish(root, out, site(str(i % 7)))
-        while not seen and reader.is_alive():
+        while not texts_seen and reader.is_alive():
             time.sleep(0.001)
     publish(root, out, site("last"))
-    while "last index.html" not in seen and reader.is_alive():
+    while "last index.html" not in texts_seen and reader.is_alive():
         time.sleep(0.001)
     stop.set()
     reader.join()
     # Without an exchange there is an instant between two renames, and nothing can be done.
-    allowed = {f"{i} index.html" for i in (*range(7), "last")}
-    assert seen <= (allowed if exchanges else {*allowed, None})
+    expected = {f"{i} index.html" for i in (*range(7), "last")}
+    assert texts_seen <= (expected if exchanges else {*expected, None})
 
 
 # --- places where no site goes
 
 
 def refusal(root: Path, out: Path) -> str:
-    """What is said of a place, which stays as it was."""
+    """The reason why a place is refused; nothing there changes."""
     before = texts(root.parent)
     with pytest.raises(PublishRefusedError) as caught:
         publish(root, out, site("one"))
@@ -166,13 +166,13 @@ AUTHORED = (
 
 def test_places_of_the_author_are_refused(root: Path) -> None:
     for name in (".", "..", "../..", "/"):
-        why = "is the project itself" if name == "." else "holds the project"
-        assert refusal(root, root / name) == why
+        reason = "is the project itself" if name == "." else "holds the project"
+        assert refusal(root, root / name) == reason
     (root / "link").symlink_to("content")
     inside = {name: name.partition("/")[0] for name in AUTHORED}
     for name, folder in (inside | {"public/../models": "models", "link": "content"}).items():
-        why = f"lies in {folder}/ of the project, where no site may go"
-        assert refusal(root, root / name) == why
+        reason = f"lies in {folder}/ of the project, where no site may go"
+        assert refusal(root, root / name) == reason
 
 
 def test_files_of_somebody_are_never_published_over(root: Path, tmp_path: Path) -> None:
@@ -223,8 +223,8 @@ def test_two_builds_at_once(root: Path, exchanges: bool) -> None:
         )
         for name in ("a", "b")
     ]
-    said = [build.communicate(timeout=600)[1] for build in builds]
-    assert [build.returncode for build in builds] == [0, 0], "".join(said)
+    errors = [build.communicate(timeout=600)[1] for build in builds]
+    assert [build.returncode for build in builds] == [0, 0], "".join(errors)
     assert len(set(texts(root / "public").values())) == 1
     assert len(texts(root / "public")) == 20
     publish(root, root / "public", site("one"))

@@ -1,4 +1,4 @@
-"""Publishing again: what has the key it had, and is whole, is not made a second time."""
+"""Publishing again: a whole file with the same key is not made a second time."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from support.published_sites import root as root
 
 def test_where_nothing_differs_the_site_stays(root: Path, pages: Pages) -> None:
     out = root / "public"
-    both = [*pages(a="1"), OutputFile("x.css", b"x")]
-    publish(root, out, both)
+    files = [*pages(a="1"), OutputFile("x.css", b"x")]
+    publish(root, out, files)
     before = out.stat().st_ino
-    assert publish(root, out, both) == ()
+    assert publish(root, out, files) == ()
     assert out.stat().st_ino == before
     assert publish(root, out, [*pages(a="1"), OutputFile("x.css", b"y")]) == ("x.css",)
     assert out.stat().st_ino != before
@@ -43,24 +43,24 @@ def test_a_damaged_record_is_not_believed(root: Path, pages: Pages) -> None:
     out = root / "public"
     publish(root, out, pages(a="1", b="1"))
     [record] = (p for p in (root / ".coursebuild/published").iterdir() if p.is_file())
-    for where in range(0, 200, 7):
+    for position in range(0, 200, 7):
         data = bytearray(record.read_bytes())
-        data[where % len(data)] ^= 1
-        for damaged in (data, data[: where % len(data)], b"\xff" * 99):
+        data[position % len(data)] ^= 1
+        for damaged in (data, data[: position % len(data)], b"\xff" * 99):
             record.write_bytes(damaged)
-            written = publish(root, out, pages(a="1", b="1"))
-            assert written == ("a.html", "b.html"), where
+            paths = publish(root, out, pages(a="1", b="1"))
+            assert paths == ("a.html", "b.html"), position
 
 
 def test_a_project_that_moves_keeps_its_site_and_a_copy_makes_it_again(
     root: Path, tmp_path: Path, pages: Pages
 ) -> None:
-    """A copy's files are others, which nobody has looked at."""
+    """The files of a copy have other inodes, so the manifest does not know them."""
     publish(root, root / "public", pages(a="1"))
-    moved, copy = root.rename(tmp_path / "moved"), tmp_path / "copy"
-    assert publish(moved, moved / "public", pages(a="1")) == ()
+    new_root, copy = root.rename(tmp_path / "moved"), tmp_path / "copy"
+    assert publish(new_root, new_root / "public", pages(a="1")) == ()
     assert pages.made == ["a.html"]
-    shutil.copytree(moved, copy)
+    shutil.copytree(new_root, copy)
     assert publish(copy, copy / "public", pages(a="1")) == ("a.html",)
 
 

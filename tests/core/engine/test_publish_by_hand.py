@@ -18,22 +18,22 @@ from support.published_sites import spared as spared
 
 
 def edit(file: Path) -> None:
-    """In place, as long as it was: the site has the same file."""
+    """Change a file in place without its length; the site holds the same inode."""
     before = file.stat()
-    with file.open("r+") as opened:
-        opened.write("b/X")
+    with file.open("r+") as stream:
+        stream.write("b/X")
     os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns + 1))
 
 
 def lengthen(file: Path) -> None:
     before = file.stat()
-    with file.open("a") as opened:
-        opened.write("!")
+    with file.open("a") as stream:
+        stream.write("!")
     os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
-def other(file: Path) -> None:
-    """Another file with the size and time of this one."""
+def replace(file: Path) -> None:
+    """Put another file of the same size and time in its place."""
     before = file.stat()
     file.with_name("other").write_text("b/X.html 1")
     file.with_name("other").replace(file)
@@ -45,47 +45,58 @@ def link(file: Path) -> None:
     file.symlink_to("elsewhere")
 
 
-def folder(file: Path) -> None:
+def make_folder(file: Path) -> None:
     file.unlink()
     file.mkdir()
     (file / "x").write_text("x")
 
 
-def pipe(file: Path) -> None:
+def make_pipe(file: Path) -> None:
     file.unlink()
     os.mkfifo(file)
 
 
-def more(file: Path) -> None:
+def add_files(file: Path) -> None:
     file.with_name("more").write_text("more")
     (file.parent / ".DS_Store").write_text("more")
     (file.parent / "empty/empty").mkdir(parents=True)
 
 
-def no_folder(file: Path) -> None:
+def remove_folder(file: Path) -> None:
     shutil.rmtree(file.parent)
 
 
-def file_for_folder(file: Path) -> None:
+def replace_folder_by_file(file: Path) -> None:
     shutil.rmtree(file.parent)
     file.parent.write_text("x")
 
 
-def rights(file: Path) -> None:
+def make_read_only(file: Path) -> None:
     file.parent.chmod(0o500)
 
 
-BY_HAND = [edit, lengthen, other, link, folder, pipe, more, no_folder, file_for_folder, rights]
+BY_HAND = [
+    edit,
+    lengthen,
+    replace,
+    link,
+    make_folder,
+    make_pipe,
+    add_files,
+    remove_folder,
+    replace_folder_by_file,
+    make_read_only,
+]
 
 
 @pytest.mark.parametrize("change", [*BY_HAND, Path.unlink])
-@pytest.mark.parametrize("where", [SPARE, "public"])
+@pytest.mark.parametrize("place", [SPARE, "public"])
 def test_changes_by_hand(
-    spared: Path, pages: Pages, change: Callable[[Path], None], where: str
+    spared: Path, pages: Pages, change: Callable[[Path], None], place: str
 ) -> None:
     out = spared / "public"
-    change(spared / where / "b/c.html")
-    for path in out.rglob("*"):  # what nobody may have there by the rules of publishing
+    change(spared / place / "b/c.html")
+    for path in out.rglob("*"):  # foreign files, which publishing would refuse
         if path.name in ("more", "x", "other", "elsewhere") or (
             path.is_file() and path.name == "b"
         ):
@@ -102,39 +113,39 @@ def test_changes_by_hand(
 
 
 def test_what_is_unlinked_in_the_spare_stays_in_the_site(spared: Path, pages: Pages) -> None:
-    with (spared / "public/b/c.html").open() as opened:
+    with (spared / "public/b/c.html").open() as stream:
         publish(spared, spared / "public", pages(**MANY | {"b__c": "2"}))
         publish(spared, spared / "public", pages(**MANY | {"b__c": "3"}))
-        assert opened.read() == "b/c.html 1"
+        assert stream.read() == "b/c.html 1"
 
 
-@pytest.mark.parametrize("where", ["b", "e/f", "new"])
+@pytest.mark.parametrize("place", ["b", "e/f", "new"])
 def test_a_link_to_a_folder_leads_nowhere(
-    spared: Path, tmp_path: Path, pages: Pages, where: str
+    spared: Path, tmp_path: Path, pages: Pages, place: str
 ) -> None:
-    """What it leads to is neither removed nor published, even if it is as the site should be."""
+    """Its folder is neither removed nor published, even if it is what a site needs."""
     elsewhere = tmp_path / "elsewhere"
-    shutil.move(spared / SPARE / where, elsewhere) if where != "new" else elsewhere.mkdir()
+    shutil.move(spared / SPARE / place, elsewhere) if place != "new" else elsewhere.mkdir()
     (elsewhere / "mine").write_text("mine")
     before = texts(elsewhere)
-    (spared / SPARE / where).symlink_to(elsewhere)
+    (spared / SPARE / place).symlink_to(elsewhere)
     publish(spared, spared / "public", pages(**MANY | {"a": "2"}))
     assert texts(spared / "public") == TEXTS | {"a.html": "a.html 2"}
     assert not any(p.is_symlink() for p in (spared / "public").rglob("*"))
     assert texts(elsewhere) == before
 
 
-@pytest.mark.parametrize("what", ["a link", "a file", "empty", "of another site"])
-def test_something_else_for_a_spare(spared: Path, tmp_path: Path, pages: Pages, what: str) -> None:
+@pytest.mark.parametrize("kind", ["a link", "a file", "empty", "of another site"])
+def test_something_else_for_a_spare(spared: Path, tmp_path: Path, pages: Pages, kind: str) -> None:
     spare, elsewhere = spared / SPARE, tmp_path / "elsewhere"
     spare.rename(elsewhere)
-    if what == "a link":
+    if kind == "a link":
         spare.symlink_to(elsewhere)
-    elif what == "a file":
+    elif kind == "a file":
         spare.write_text("x")
     else:
         spare.mkdir()
-        if what == "of another site":
+        if kind == "of another site":
             (spare / "b").write_text("x")
             (spare / "a.html").mkdir()
             (spare / MARKER).write_text("x")

@@ -1,4 +1,4 @@
-"""The folder of the site before last: it saves work, whatever becomes of it or of its builder."""
+"""The folder of the site before last: it saves work, and cannot spoil a site."""
 
 from __future__ import annotations
 
@@ -53,11 +53,9 @@ def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: st
     before: dict[str, str] = {}
     for _ in range(60):
         pages = Pages()
-        written = publish(
-            tmp_path, tmp_path / "public", [pages.one(*item) for item in site.items()]
-        )
-        assert sorted(written) == sorted(pages.made)
-        assert set(written) == {path for path, key in site.items() if before.get(path) != key}
+        paths = publish(tmp_path, tmp_path / "public", [pages.one(*item) for item in site.items()])
+        assert sorted(paths) == sorted(pages.made)
+        assert set(paths) == {path for path, key in site.items() if before.get(path) != key}
         assert texts(tmp_path / "public") == {path: f"{path} {key}" for path, key in site.items()}
         assert (tmp_path / "public" / MARKER).read_text().split("\n")[1:-1] == sorted(site)
         assert all(any(p.iterdir()) for p in (tmp_path / "public").rglob("*") if p.is_dir())
@@ -146,18 +144,18 @@ def test_a_site_that_may_only_be_read_leaves_nothing_beside_it(held_back: Path) 
 def test_many_files_are_written_as_by_one_process_whatever_becomes_of_the_others(
     tmp_path: Path,
 ) -> None:
-    here = os.getpid()
+    main_process = os.getpid()
 
     def die() -> bytes:
-        if os.getpid() != here:
+        if os.getpid() != main_process:
             os.kill(os.getpid(), signal.SIGKILL)
         return b"written in the end"
 
     def files(last: bytes) -> list[SiteFile]:
-        found: list[SiteFile] = [OutputFile(f"a/{n}", b"%d" % n) for n in range(150)]
-        found += [CachedFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]
-        found += [CachedFile(f"died {n}", "k", die) for n in range(2)]
-        return [*found, OutputFile("last", last)]
+        entries: list[SiteFile] = [OutputFile(f"a/{n}", b"%d" % n) for n in range(150)]
+        entries += [CachedFile(f"b/{n}", "k", lambda n=n: b"%d" % n * n) for n in range(150)]
+        entries += [CachedFile(f"died {n}", "k", die) for n in range(2)]
+        return [*entries, OutputFile("last", last)]
 
     for jobs in (1, 3):
         (tmp_path / str(jobs)).mkdir()
@@ -168,7 +166,7 @@ def test_many_files_are_written_as_by_one_process_whatever_becomes_of_the_others
     def full() -> bytes:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    more: list[SiteFile] = [CachedFile(f"c/{n}", "k", full) for n in range(150)]
+    failing: list[SiteFile] = [CachedFile(f"c/{n}", "k", full) for n in range(150)]
     with pytest.raises(EffectError, match="no space left"):
-        publish(tmp_path / "3", tmp_path / "3/public", [*files(b"z"), *more], jobs=3)
+        publish(tmp_path / "3", tmp_path / "3/public", [*files(b"z"), *failing], jobs=3)
     assert (tmp_path / "3/public/last").read_bytes() == b"y"

@@ -31,11 +31,11 @@ def machine(tmp_path: Path, name: str, shared: SharedCache) -> tuple[Memo, list[
 
 def get_or_create(store: Memo, key: str, make: Callable[[], bytes]) -> bytes:
     """A result of a kind that is shared."""
-    found = store.get("labs", key, bytes, shared=True)
-    if found is None:
-        found = make()
-        store.put("labs", key, found, shared=True)
-    return found
+    data = store.get("labs", key, bytes, shared=True)
+    if data is None:
+        data = make()
+        store.put("labs", key, data, shared=True)
+    return data
 
 
 def never() -> bytes:
@@ -43,7 +43,7 @@ def never() -> bytes:
 
 
 @pytest.fixture(params=["folder", "file", "memory"])
-def where(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+def address(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     folder = tmp_path / "sha red"
     return {
         "folder": str(folder),
@@ -52,43 +52,43 @@ def where(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     }[request.param]
 
 
-def test_what_one_machine_makes_another_has(tmp_path: Path, where: str) -> None:
-    one, told_one = machine(tmp_path, "one", shared_cache(where))
-    assert get_or_create(one, KEY, lambda: b"\0made\xff") == b"\0made\xff"
-    one.put("scripts", f"{GROUP}/{KEY}", b"a result", shared=True)
-    one.put("digests", KEY, b"of this machine")
-    one.close()
-    two, told_two = machine(tmp_path, "two", shared_cache(where))
-    assert get_or_create(two, KEY, never) == b"\0made\xff"
-    assert two.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
-    assert two.get("scripts", f"{GROUP}/{KEY}", bytes, shared=True) == b"a result"
-    assert two.get("digests", KEY, bytes, shared=True) is None
-    assert two.shared_group("scripts", KEY) == []
+def test_what_one_machine_makes_another_has(tmp_path: Path, address: str) -> None:
+    first, first_messages = machine(tmp_path, "one", shared_cache(address))
+    assert get_or_create(first, KEY, lambda: b"\0made\xff") == b"\0made\xff"
+    first.put("scripts", f"{GROUP}/{KEY}", b"a result", shared=True)
+    first.put("digests", KEY, b"of this machine")
+    first.close()
+    second, second_messages = machine(tmp_path, "two", shared_cache(address))
+    assert get_or_create(second, KEY, never) == b"\0made\xff"
+    assert second.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
+    assert second.get("scripts", f"{GROUP}/{KEY}", bytes, shared=True) == b"a result"
+    assert second.get("digests", KEY, bytes, shared=True) is None
+    assert second.shared_group("scripts", KEY) == []
     alone = Memo(tmp_path / "two")  # what was fetched is kept here too
     assert alone.get("labs", KEY, bytes, shared=True) == b"\0made\xff"
     assert alone.group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
-    assert told_one == told_two == []
+    assert first_messages == second_messages == []
 
 
 def test_a_damaged_shared_entry_is_not_served_and_made_good(tmp_path: Path) -> None:
     place = tmp_path / "shared"
-    one, _ = machine(tmp_path, "one", shared_cache(str(place)))
-    one.put("labs", KEY, b"made", shared=True)
-    one.close()
+    first, _ = machine(tmp_path, "one", shared_cache(str(place)))
+    first.put("labs", KEY, b"made", shared=True)
+    first.close()
     path = place / UPPER / "labs" / KEY
     whole = path.read_bytes()
-    for at in range(len(whole)):
-        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
-        two, told = machine(tmp_path, f"two{at}", shared_cache(str(place)))
-        assert get_or_create(two, KEY, lambda: b"made") == b"made"
-        two.close()
-        said = f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"
-        assert told == [said]
+    for position in range(len(whole)):
+        path.write_bytes(whole[:position] + bytes([whole[position] ^ 1]) + whole[position + 1 :])
+        second, messages = machine(tmp_path, f"two{position}", shared_cache(str(place)))
+        assert get_or_create(second, KEY, lambda: b"made") == b"made"
+        second.close()
+        message = f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"
+        assert messages == [message]
         assert path.read_bytes() == whole
 
 
 class Broken(FolderPlace):
-    """A place with which everything goes wrong, in its own way."""
+    """A place where every call runs into trouble."""
 
     def __init__(self, trouble: Callable[[], object]) -> None:
         self.trouble, self.calls = trouble, 0
@@ -109,7 +109,7 @@ class Broken(FolderPlace):
 
 
 class CloudError(Exception):
-    """What the library of a cloud raises."""
+    """An exception that the library of a cloud raises."""
 
 
 def failing(error: Exception) -> Callable[[], object]:
@@ -121,23 +121,23 @@ def failing(error: Exception) -> Callable[[], object]:
 
 def test_signed_entries_are_believed_by_those_who_have_the_key(tmp_path: Path) -> None:
     place = tmp_path / "shared"
-    for name, key, made in (("one", b"secret", b"ours"), ("other", b"", b"theirs")):
+    for name, key, result in (("one", b"secret", b"ours"), ("other", b"", b"theirs")):
         store, _ = machine(tmp_path, name, shared_cache(str(place), key))
-        store.put("labs", KEY, made, shared=True)
+        store.put("labs", KEY, result, shared=True)
         store.close()
     signed, plain = (place / f"{UPPER}{end}/labs" / KEY for end in ("-signed", ""))
-    said = [f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"]
-    readers = {b"secret": (b"ours", []), b"": (b"theirs", []), b"guess": (None, said)}
-    for key, (found, told) in readers.items():
+    damage = [f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"]
+    readers = {b"secret": (b"ours", []), b"": (b"theirs", []), b"guess": (None, damage)}
+    for key, (expected, messages) in readers.items():
         store, lines = machine(tmp_path, f"reader {key!r}", shared_cache(str(place), key))
-        assert (store.get("labs", KEY, bytes, shared=True), lines) == (found, told)
+        assert (store.get("labs", KEY, bytes, shared=True), lines) == (expected, messages)
     signed.write_bytes(plain.read_bytes())
     store, lines = machine(tmp_path, "victim", shared_cache(str(place), b"secret"))
-    assert (store.get("labs", KEY, bytes, shared=True), lines) == (None, said)
+    assert (store.get("labs", KEY, bytes, shared=True), lines) == (None, damage)
     assert Memo(tmp_path / "victim").get("labs", KEY, bytes) is None
 
 
-def test_a_place_that_fails_or_hangs_is_told_of_once_and_left_alone(tmp_path: Path) -> None:
+def test_a_place_that_fails_or_hangs_is_reported_once_and_left_alone(tmp_path: Path) -> None:
     stop = threading.Event()
     troubles: dict[str, Callable[[], object]] = {
         "network is unreachable": failing(OSError(101, "Network is unreachable")),
@@ -148,12 +148,12 @@ def test_a_place_that_fails_or_hangs_is_told_of_once_and_left_alone(tmp_path: Pa
     }
     for words, trouble in troubles.items():
         place = Broken(trouble)
-        store, told = machine(tmp_path, words, SharedCache("s3://there", place, timeout=0.2))
+        store, messages = machine(tmp_path, words, SharedCache("s3://there", place, timeout=0.2))
         for number in range(20):
             assert get_or_create(store, f"{number:064x}", lambda: b"made") == b"made"
         assert store.shared_group("scripts", GROUP) == []
         store.close()
-        assert told == [f"the shared cache s3://there cannot be used: {words}"]
+        assert messages == [f"the shared cache s3://there cannot be used: {words}"]
         assert place.calls == 1
     stop.set()
 
@@ -161,33 +161,33 @@ def test_a_place_that_fails_or_hangs_is_told_of_once_and_left_alone(tmp_path: Pa
 def test_sending_ends_when_it_takes_too_long(tmp_path: Path) -> None:
     stop = threading.Event()
     shared = SharedCache("s3://there", Broken(lambda: stop.wait(600)))
-    store, told = machine(tmp_path, "one", shared)
+    store, messages = machine(tmp_path, "one", shared)
     store.put("labs", KEY, b"made", shared=True)
     shared.flush(0.2)
     stop.set()
     trouble = "1 results could not be sent in 0.2 s"
-    assert told == [f"the shared cache s3://there cannot be used: {trouble}"]
+    assert messages == [f"the shared cache s3://there cannot be used: {trouble}"]
 
 
 def test_all_that_is_written_arrives_and_no_thread_stays(tmp_path: Path) -> None:
     before = threading.active_count()
     place = tmp_path / "shared"
-    store, told = machine(tmp_path, "one", shared_cache(str(place)))
+    store, messages = machine(tmp_path, "one", shared_cache(str(place)))
     for number in range(300):
         store.put("labs", f"{number:064x}", b"x", shared=True)
     store.close()
     assert len(list((place / UPPER / "labs").iterdir())) == 300
     wait_until(lambda: threading.active_count() <= before, "the end of the threads")
-    assert told == []
+    assert messages == []
 
 
 def test_a_folder_whose_parent_is_not_there_is_not_made(tmp_path: Path) -> None:
-    """A network's folder that is not mounted must not be filled where it would be."""
+    """If a network folder is not mounted, nothing is written to its mount point."""
     place = tmp_path / "not mounted" / "cache"
-    store, told = machine(tmp_path, "one", shared_cache(str(place)))
+    store, messages = machine(tmp_path, "one", shared_cache(str(place)))
     assert get_or_create(store, KEY, lambda: b"made") == b"made"
     store.close()
-    assert told == [f"the shared cache {place} cannot be used: no such file or directory"]
+    assert messages == [f"the shared cache {place} cannot be used: no such file or directory"]
     assert not place.parent.exists()
 
 

@@ -1,4 +1,4 @@
-"""A tool whose code, templates or libraries are others has another name."""
+"""A tool with other code, templates or libraries has another digest."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def fill(folder: Path) -> Path:
 
 
 def test_it_depends_on_every_file_and_not_on_their_place(tmp_path: Path) -> None:
-    folder, other = fill(tmp_path / "one"), fill(tmp_path / "two")
+    folder, second = fill(tmp_path / "one"), fill(tmp_path / "two")
     names = {tool._digest(str(folder))}
-    (other / "__pycache__").mkdir()
-    (other / "__pycache__" / "a.pyc").write_text("x")
-    assert names == {tool._digest(str(other))}
+    (second / "__pycache__").mkdir()
+    (second / "__pycache__" / "a.pyc").write_text("x")
+    assert names == {tool._digest(str(second))}
     os.utime(folder / "inner" / "b.html", ns=(2, 2))
     names.add(tool._digest(str(folder)))
     (folder / "a.py").write_text("xy")
@@ -60,15 +60,15 @@ def test_it_depends_on_what_is_installed(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_content_counts_and_times_do_not(tmp_path: Path) -> None:
     (tmp_path / "part" / "inner").mkdir(parents=True)
-    module, other = tmp_path / "part" / "inner" / "a.py", tmp_path / "other.py"
+    module, file = tmp_path / "part" / "inner" / "a.py", tmp_path / "other.py"
     module.write_text("x = 1\n")
-    other.write_text("y = 1\n")
+    file.write_text("y = 1\n")
     first = code_digest("part", root=tmp_path)
     module.touch()
-    other.write_text("y = 2\n")
+    file.write_text("y = 2\n")
     assert code_digest("part", root=tmp_path) == first
-    both = code_digest("part", "other.py", root=tmp_path)
-    other.write_text("y = 3\n")
-    assert code_digest("part", "other.py", root=tmp_path) != both
+    digest = code_digest("part", "other.py", root=tmp_path)
+    file.write_text("y = 3\n")
+    assert code_digest("part", "other.py", root=tmp_path) != digest
     module.rename(tmp_path / "part" / "a.py")
     assert code_digest("part", root=tmp_path) != first

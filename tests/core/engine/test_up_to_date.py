@@ -1,4 +1,4 @@
-"""A run with nothing to do: it must know that nothing changed, and never believe it wrongly."""
+"""A run with nothing to do: it must notice that nothing changed, and never miss a change."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LESSON, MODEL = "content/lessons/1.1-a.md", "models/m.xml"
 
 
 def age(*paths: Path, seconds: float = 3600, coarse: bool = False) -> None:
-    """Let files be as old as that, at times that no coarse clock gives, or at such."""
+    """Set the times of files back, to whole milliseconds if the clock is to look coarse."""
     for path in paths:
         if not path.is_symlink():
             then = time.time_ns() - int(seconds * 1e9)
@@ -30,8 +30,8 @@ def age(*paths: Path, seconds: float = 3600, coarse: bool = False) -> None:
 @pytest.fixture
 def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path / "course"
-    made = ("public/index.html", "examples/a.py")
-    for path in (LESSON, "content/course.toml", MODEL, "data/d.csv", *made):
+    outputs = ("public/index.html", "examples/a.py")
+    for path in (LESSON, "content/course.toml", MODEL, "data/d.csv", *outputs):
         (root / path).parent.mkdir(parents=True, exist_ok=True)
         (root / path).write_text(path)
     (tmp_path / "site-packages/numpy-2.0.dist-info").mkdir(parents=True)
@@ -40,22 +40,22 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-def keep(root: Path, said: str = WELL, during: Callable[[Path], object] = bool) -> bool:
-    """Whether a command could note how all was when it had done its work."""
+def keep(root: Path, message: str = WELL, during: Callable[[Path], object] = bool) -> bool:
+    """Whether a command could record the state when its work was done."""
     watcher = Watcher(str(root), COMMAND)
     during(root)
-    return watcher.keep(said, ["data/d.csv", "data/not-there.csv"], ["public", "examples"])
+    return watcher.keep(message, ["data/d.csv", "data/not-there.csv"], ["public", "examples"])
 
 
-def said(root: Path) -> str | None:
+def last_message(root: Path) -> str | None:
     return unchanged(str(root), COMMAND)
 
 
-def test_what_was_said_is_said_again(root: Path) -> None:
-    assert said(root) is None
+def test_the_last_message_is_repeated(root: Path) -> None:
+    assert last_message(root) is None
     for text in (WELL, "", "é\n\nwarning: x\n", "\n\n\n", "\udc80\n"):
         assert keep(root, text)
-        assert [said(root), said(root)] == [text, text]
+        assert [last_message(root), last_message(root)] == [text, text]
 
 
 def rewrite(path: str) -> Callable[[Path], None]:
@@ -67,7 +67,7 @@ def rewrite(path: str) -> Callable[[Path], None]:
 
 
 def replace(root: Path) -> None:
-    """Another file with the same name, size and time."""
+    """Put another file of the same name, size and time in its place."""
     status = (root / MODEL).stat()
     new = root / "models/new"
     new.write_bytes((root / MODEL).read_bytes())
@@ -76,7 +76,7 @@ def replace(root: Path) -> None:
 
 
 def put_the_time_back(root: Path) -> None:
-    """After another text, as long as it was."""
+    """Change the text, but neither its length nor its time."""
     before = (root / MODEL).stat()
     rewrite(MODEL)(root)
     os.utime(root / MODEL, ns=(before.st_atime_ns, before.st_mtime_ns))
@@ -129,14 +129,14 @@ CHANGES: dict[str, Callable[[Path], object]] = {
 def test_any_change_is_seen(root: Path, change: Callable[[Path], object]) -> None:
     assert keep(root)
     change(root)
-    assert said(root) is None
+    assert last_message(root) is None
 
 
 def test_what_decides_which_code_runs_is_seen(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("MUJOCO_GL", "PYTHONPATH"):
         assert keep(root)
         monkeypatch.setenv(name, "/elsewhere")
-        assert said(root) is None, name
+        assert last_message(root) is None, name
 
 
 def test_what_is_no_part_of_the_course_is_not_looked_at(root: Path) -> None:
@@ -146,7 +146,7 @@ def test_what_is_no_part_of_the_course_is_not_looked_at(root: Path) -> None:
     (root / "content/__pycache__").mkdir()
     (root / "README.md").touch()
     (root / ".git").mkdir()
-    assert said(root) == WELL
+    assert last_message(root) == WELL
 
 
 @pytest.mark.parametrize("change", [add, remove, rewrite(MODEL), rewrite("data/d.csv")])
@@ -154,20 +154,20 @@ def test_what_changes_during_the_work_is_not_kept(
     root: Path, change: Callable[[Path], None]
 ) -> None:
     assert not keep(root, during=change)
-    assert said(root) is None
+    assert last_message(root) is None
 
 
 def test_what_the_work_writes_may_be_new(root: Path) -> None:
     assert keep(root, during=rewrite("public/index.html"))
-    assert said(root) == WELL
+    assert last_message(root) == WELL
 
 
 def test_a_file_whose_time_says_nothing_is_not_kept(root: Path) -> None:
     """Changed just before the work began, or where the clock is coarse, or in the future."""
     cases = (1, False, True), (-10, False, False), (1, True, False), (3, True, True)
-    for seconds, coarse, kept in cases:
+    for seconds, coarse, is_kept in cases:
         age(root / MODEL, seconds=seconds, coarse=coarse)
-        assert keep(root) is kept, (seconds, coarse)
+        assert keep(root) is is_kept, (seconds, coarse)
 
 
 def test_a_link_to_a_file_is_followed_and_one_to_a_folder_is_not_kept(root: Path) -> None:
@@ -175,7 +175,7 @@ def test_a_link_to_a_file_is_followed_and_one_to_a_folder_is_not_kept(root: Path
     for _ in range(2):
         assert keep(root)  # also where it leads nowhere
         (root / "data/other.csv").write_text("1")
-        assert said(root) is None
+        assert last_message(root) is None
         age(root / "data/other.csv")
     (root / "content/linked").symlink_to(root / "data")
     assert not keep(root)
@@ -185,16 +185,19 @@ def test_a_damaged_note_is_not_believed(root: Path) -> None:
     assert keep(root)
     [file] = (root / ".coursebuild/unchanged").iterdir()
     whole = file.read_bytes()
-    for at in range(0, len(whole), 7):
-        for damaged in (whole[:at] + bytes((whole[at] ^ 4,)) + whole[at + 1 :], whole[:at]):
+    for position in range(0, len(whole), 7):
+        for damaged in (
+            whole[:position] + bytes((whole[position] ^ 4,)) + whole[position + 1 :],
+            whole[:position],
+        ):
             file.write_bytes(damaged)
-            assert said(root) is None, at
+            assert last_message(root) is None, position
 
 
 def test_a_note_that_cannot_be_written_costs_only_time(root: Path) -> None:
     (root / ".coursebuild").write_text("in the way")
     assert not keep(root)
-    assert said(root) is None
+    assert last_message(root) is None
 
 
 def test_looking_imports_next_to_nothing() -> None:
@@ -204,14 +207,14 @@ def test_looking_imports_next_to_nothing() -> None:
         "large = {'argparse', 'collections', 'contextlib', 'pathlib', 're', 'typing'}\n"
         "print(sorted(large & set(sys.modules)))\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-S", "-c", code],
         capture_output=True,
         text=True,
         check=True,
         env={**os.environ, "PYTHONPATH": str(Path(up_to_date.__file__).parents[3])},
     )
-    assert done.stdout.splitlines() == [
+    assert process.stdout.splitlines() == [
         "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
         "'coursebuild.core', 'coursebuild.core.engine', 'coursebuild.core.engine.up_to_date', "
         "'coursebuild.core.files', 'coursebuild.core.files.course_root']",

@@ -1,4 +1,4 @@
-"""Work in forked processes: done in order, whatever the workers do, and none of them stays."""
+"""Work in forked processes: results come in order, and no worker stays."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[3]
 HERE = os.getpid()
 
 
-def where(task: object) -> tuple[object, int]:
+def with_process(task: object) -> tuple[object, int]:
     return task, os.getpid()
 
 
@@ -40,11 +40,11 @@ def test_answers_come_in_the_order_of_the_tasks() -> None:
 
 
 def test_a_task_goes_to_the_worker_that_it_names_and_finds_what_that_remembers() -> None:
-    seen: list[int] = []
+    numbers: list[int] = []
 
     def remember(number: int) -> tuple[int, list[int]]:
-        seen.append(number)
-        return os.getpid(), list(seen)
+        numbers.append(number)
+        return os.getpid(), list(numbers)
 
     with Workers(remember, 2) as workers:
         first, by = zip(*workers.map([(None, n) for n in range(8)]), strict=True)
@@ -52,14 +52,14 @@ def test_a_task_goes_to_the_worker_that_it_names_and_finds_what_that_remembers()
     for n in range(8):
         assert first[n][0] == again[n][0]
         assert again[n][1].count(n) == 2
-    assert seen == []
+    assert numbers == []
 
 
 def test_what_a_worker_did_not_answer_is_answered_here() -> None:
     def dies(number: int) -> tuple[object, int]:
         if (number >= 20 or number % 5 == 3) and os.getpid() != HERE:
             os.kill(os.getpid(), signal.SIGKILL)
-        return where(number)
+        return with_process(number)
 
     def tasks() -> Iterator[tuple[int | None, int]]:
         for number in range(30):
@@ -95,7 +95,7 @@ def test_what_is_raised_in_a_worker_is_raised_here() -> None:
 
 
 def test_where_standard_input_is_closed() -> None:
-    """A pipe of the worker may then have its number."""
+    """A worker's pipe may then have the number of standard input."""
     code = (
         "import os\n"
         "from coursebuild.core.engine.workers import Workers\n"
@@ -103,8 +103,8 @@ def test_where_standard_input_is_closed() -> None:
         "    print(os.getpid() not in [p for p, _ in workers.map([(None, 1), (None, 2)])])\n"
     )
     shell = ["sh", "-c", 'exec "$0" -c "$1" <&-', sys.executable, code]
-    done = subprocess.run(shell, capture_output=True, text=True, check=True)
-    assert done.stdout == "True\n", done.stderr
+    process = subprocess.run(shell, capture_output=True, text=True, check=True)
+    assert process.stdout == "True\n", process.stderr
 
 
 def test_after_a_failure_no_answer_is_taken_for_another() -> None:
@@ -124,7 +124,7 @@ def test_after_a_failure_no_answer_is_taken_for_another() -> None:
 def test_a_signal_at_the_moment_of_a_fork_is_for_the_process_that_forks(
     number: signal.Signals, tmp_path: Path
 ) -> None:
-    """As one that a terminal sends to all of its processes comes to both, in the worker at once."""
+    """A terminal sends a signal to all of its processes; the worker gets it at once."""
     code = (
         "import os, signal, sys\n"
         "from coursebuild.core.engine.workers import Workers\n"
@@ -138,11 +138,11 @@ def test_a_signal_at_the_moment_of_a_fork_is_for_the_process_that_forks(
         "    answers = [a for a, _ in workers.map([(None, 1)])]\n"
         "    print(answers, signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
     )
-    done = run_code(code, int(number))
-    # SIGTERM ends the worker, as it would a moment later: what it was to answer is answered here.
+    process = run_code(code, int(number))
+    # SIGTERM ends the worker, as it would a moment later: its task is done here.
     answered_here = number == signal.SIGTERM
-    assert done.stdout == f"heard by True\n[(1, {answered_here})] set()\n"
-    assert (done.stderr, done.returncode) == ("", 0)
+    assert process.stdout == f"heard by True\n[(1, {answered_here})] set()\n"
+    assert (process.stderr, process.returncode) == ("", 0)
 
 
 def test_a_process_with_threads_is_not_copied() -> None:
@@ -156,9 +156,9 @@ def test_a_process_with_threads_is_not_copied() -> None:
         thread.join()
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
-def test_workers_end_with_the_process(how: signal.Signals, tmp_path: Path) -> None:
-    """Also where it cannot say so, and one that works ends when it is done."""
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_workers_end_with_the_process(number: signal.Signals, tmp_path: Path) -> None:
+    """Even if the process is killed; a worker in the middle of a task ends after it."""
     script = tmp_path / "p.py"
     script.write_text(
         "import os, time\n"
@@ -176,6 +176,6 @@ def test_workers_end_with_the_process(how: signal.Signals, tmp_path: Path) -> No
     ) as process:
         assert process.stdout is not None
         workers = [int(process.stdout.readline()) for _ in range(2)]
-        process.send_signal(how)
+        process.send_signal(number)
         process.wait()
         assert all(map(gone, workers))

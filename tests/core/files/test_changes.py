@@ -13,8 +13,8 @@ from coursebuild.core.files.locks import project_lock
 
 
 def files(root: Path) -> dict[str, bytes]:
-    found = (path for path in root.rglob("*") if ".coursebuild" not in path.parts)
-    return {p.relative_to(root).as_posix(): p.read_bytes() for p in found if p.is_file()}
+    paths = (path for path in root.rglob("*") if ".coursebuild" not in path.parts)
+    return {p.relative_to(root).as_posix(): p.read_bytes() for p in paths if p.is_file()}
 
 
 @pytest.fixture
@@ -52,9 +52,9 @@ def test_all_are_changed(root: Path) -> None:
 )
 def test_where_one_cannot_be_changed_none_is(root: Path, bad: FileChange, message: str) -> None:
     before = files(root)
-    with pytest.raises(EffectError) as raised:
+    with pytest.raises(EffectError) as caught:
         change_files(root, (*GOOD[:2], bad))
-    assert raised.value.message == message
+    assert caught.value.message == message
     assert files(root) == before
     assert not (root / "new").exists()
     assert not (root / JOURNAL).exists()
@@ -72,16 +72,16 @@ def test_undoing_waits_for_a_command_at_work_and_spares_later_edits(root: Path) 
     journal = root / JOURNAL
     (root / "b.md").write_bytes(b"edited since")
     with project_lock(root):
-        journal.write_bytes(encoded((*GOOD[:1], FileChange("b.md", b"b", b"B"))))
-        waiting = threading.Thread(target=undo_changes, args=(root,))
-        waiting.start()
+        journal.write_bytes(encode((*GOOD[:1], FileChange("b.md", b"b", b"B"))))
+        thread = threading.Thread(target=undo_changes, args=(root,))
+        thread.start()
         assert journal.exists()
-    waiting.join()
+    thread.join()
     assert files(root) == {"a.md": b"a\r\n", "b.md": b"edited since"}
     assert not journal.exists()
 
 
-def encoded(changes: tuple[FileChange, ...]) -> bytes:
+def encode(changes: tuple[FileChange, ...]) -> bytes:
     import msgspec
 
     return msgspec.msgpack.encode(changes)

@@ -47,9 +47,9 @@ def test_files_are_written_once_and_without_scripts_nothing_is_there(tmp_path: P
 def test_edited_by_hand(tmp_path: Path) -> None:
     write(tmp_path, A, B)
     (tmp_path / A[0]).write_bytes(b"print(1)\nprint('mine')")
-    for wanted, diverged in ((A, False), (NEXT, True)):
+    for script, diverged in ((A, False), (NEXT, True)):
         for _ in range(2):  # it stays so until somebody decides
-            report = write_examples(tmp_path, dict([wanted, B]))
+            report = write_examples(tmp_path, dict([script, B]))
             assert summary(report) == ((), (B[0],), (), (A[0],))
             (blocked,) = report.blocked
             assert (blocked.obstacle, blocked.diverged) == (Obstacle.EDITED, diverged)
@@ -176,7 +176,7 @@ def test_folder_that_leads_out_or_is_a_file(tmp_path: Path) -> None:
 
 
 class Scripts(dict[str, bytes]):
-    """Scripts with which something happens once the disk was looked at."""
+    """Scripts whose first access, after the disk was read, runs a function."""
 
     def __init__(self, scripts: list[tuple[str, bytes]], happens: Callable[[], object]) -> None:
         super().__init__(scripts)
@@ -205,11 +205,11 @@ def test_saved_while_we_work(tmp_path: Path) -> None:
 
 
 def test_two_runs_at_once_write_the_same(tmp_path: Path) -> None:
-    """As they do where a file system has no locks: nobody edited anything."""
-    other: list[Summary] = []
-    scripts = Scripts([A, B], lambda: other.append(write(tmp_path, A, B)))
-    found = summary(write_examples(tmp_path, scripts))
-    assert [found, *other] == [((A[0], B[0]), (), (), ())] * 2
+    """As on a file system without locks: nobody edited anything."""
+    reports: list[Summary] = []
+    scripts = Scripts([A, B], lambda: reports.append(write(tmp_path, A, B)))
+    report = summary(write_examples(tmp_path, scripts))
+    assert [report, *reports] == [((A[0], B[0]), (), (), ())] * 2
     assert write(tmp_path, A, B) == ((), (A[0], B[0]), (), ())
 
 

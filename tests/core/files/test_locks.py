@@ -58,16 +58,16 @@ def test_free_lock_says_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.site
-@pytest.mark.parametrize("removed", [False, True])
-def test_second_run_says_so_and_waits(tmp_path: Path, removed: bool) -> None:
+@pytest.mark.parametrize("is_removed", [False, True])
+def test_second_run_says_so_and_waits(tmp_path: Path, is_removed: bool) -> None:
     """Also where somebody removes the lock meanwhile; a lock dies with its holder."""
     with holder(tmp_path) as first:
         assert line(first) == "held"
         with holder(tmp_path) as second:
-            who = f"another coursebuild (process {first.pid})"
-            assert line(second) == f"{who} is at work on this course; waiting for it"
+            holder_name = f"another coursebuild (process {first.pid})"
+            assert line(second) == f"{holder_name} is at work on this course; waiting for it"
             assert second.poll() is None
-            if removed:
+            if is_removed:
                 shutil.rmtree(tmp_path / ".coursebuild")
             first.send_signal(signal.SIGKILL)
             assert line(second) == "held"
@@ -79,7 +79,7 @@ def test_another_thread_waits(tmp_path: Path) -> None:
     order: list[str] = []
 
     def work() -> None:
-        with project_lock(tmp_path, lambda said: order.append("waits")):
+        with project_lock(tmp_path, lambda message: order.append("waits")):
             order.append("second")
 
     with project_lock(tmp_path):
@@ -92,7 +92,7 @@ def test_another_thread_waits(tmp_path: Path) -> None:
 
 
 def test_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(fd: int, how: int) -> None:
+    def refuse(fd: int, operation: int) -> None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", refuse)

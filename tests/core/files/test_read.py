@@ -29,11 +29,11 @@ def fill(root: Path, files: Mapping[str, bytes | str]) -> None:
 
 
 def unreadable(root: Path) -> dict[str, str]:
-    """What is said of each path that cannot be read."""
-    found = read_course(root)
-    assert all(d.rule == "file-unreadable" for d in found.diagnostics)
-    assert sorted(found.value.unreadable) == sorted(d.span.path for d in found.diagnostics)
-    return {d.span.path: d.message.removeprefix(f"{d.span.path} ") for d in found.diagnostics}
+    """The message for each path that cannot be read."""
+    parsed = read_course(root)
+    assert all(d.rule == "file-unreadable" for d in parsed.diagnostics)
+    assert sorted(parsed.value.unreadable) == sorted(d.span.path for d in parsed.diagnostics)
+    return {d.span.path: d.message.removeprefix(f"{d.span.path} ") for d in parsed.diagnostics}
 
 
 # --- what there is
@@ -49,43 +49,43 @@ def test_everything_in_its_place_and_sorted(root: Path, tmp_path: Path) -> None:
     fill(root, files | {"content/lessons/pictures/p.png": "p", "models/robots/arm.stl": b"\xff"})
     (tmp_path / "link").symlink_to("course")
     for folder in (root, tmp_path / "link"):
-        found = read_course(folder)
-        assert found.diagnostics == () and found.value.map is not None
-        assert [s.path for s in found.value.lessons] == [f"content/lessons/{n}" for n in lessons]
-        assert [s.path for s in found.value.pages] == [f"content/pages/{name}" for name in pages]
-        assert [(m.name, m.source.path) for m in found.value.models] == [
+        parsed = read_course(folder)
+        assert parsed.diagnostics == () and parsed.value.map is not None
+        assert [s.path for s in parsed.value.lessons] == [f"content/lessons/{n}" for n in lessons]
+        assert [s.path for s in parsed.value.pages] == [f"content/pages/{name}" for name in pages]
+        assert [(m.name, m.source.path) for m in parsed.value.models] == [
             (name, f"models/{name}.xml") for name in models
         ]
-        assert "content/lessons/pictures/p.png" in found.value.files
-        assert list(found.value.files) == sorted(found.value.files)
+        assert "content/lessons/pictures/p.png" in parsed.value.files
+        assert list(parsed.value.files) == sorted(parsed.value.files)
 
 
 def test_editors_droppings_are_no_files(root: Path) -> None:
     names = "1.1-a.md~", ".1.1-a.md.swp", "#1.1-a.md#", ".hidden.md", "4913~", "__pycache__/a.pyc"
     fill(root, {f"content/lessons/{name}": b"\xff" for name in names})
     (root / "content/lessons/.#1.1-a.md").symlink_to("author@host.1234:5678")
-    found = read_course(root)
-    assert (found.diagnostics, found.value.lessons) == ((), ())
-    assert found.value.files == ("content/course.toml",)
+    parsed = read_course(root)
+    assert (parsed.diagnostics, parsed.value.lessons) == ((), ())
+    assert parsed.value.files == ("content/course.toml",)
 
 
 def test_odd_names(root: Path) -> None:
     names = ["1 a b", "ünï-日本", "a\nb", "a'\"`$", "-rf", "a\\b", "a" * 250]
     fill(root, {f"content/lessons/{name}.md": name for name in names})
-    found = read_course(root)
-    assert found.diagnostics == ()
-    assert {(s.path, s.text) for s in found.value.lessons} == {
+    parsed = read_course(root)
+    assert parsed.diagnostics == ()
+    assert {(s.path, s.text) for s in parsed.value.lessons} == {
         (f"content/lessons/{name}.md", name) for name in names
     }
     Path(os.fsdecode(os.fsencode(root) + b"/content/lessons/b\xff.md")).write_bytes(b"x")
-    shown = "content/lessons/b\\udcff.md"
-    assert unreadable(root) == {shown: "has a name that is not UTF-8"}
+    escaped_path = "content/lessons/b\\udcff.md"
+    assert unreadable(root) == {escaped_path: "has a name that is not UTF-8"}
 
 
 def test_missing_map(tmp_path: Path) -> None:
-    found = read_course(tmp_path)
-    assert found.value.map is None
-    assert [(d.rule, d.span.path, d.message) for d in found.diagnostics] == [
+    parsed = read_course(tmp_path)
+    assert parsed.value.map is None
+    assert [(d.rule, d.span.path, d.message) for d in parsed.diagnostics] == [
         ("map-missing", "content/course.toml", "there is no content/course.toml")
     ]
 
@@ -127,18 +127,18 @@ def test_bytes_that_are_not_utf8_are_shown_and_what_is_no_text_is_read_no_furthe
 ) -> None:
     for data, line, column, message, guess in WRONG:
         fill(root, {LESSON: data})
-        found = read_course(root)
-        [diagnostic] = found.diagnostics
+        parsed = read_course(root)
+        [diagnostic] = parsed.diagnostics
         assert diagnostic.rule == "file-encoding"
         assert (diagnostic.span.line, diagnostic.span.column) == (line, column), data
         assert diagnostic.message == message, data
         assert diagnostic.help == f"save the file as UTF-8; it {guess}", data
         if guess != LATIN:
-            assert (found.value.lessons, found.value.unreadable) == ((), (LESSON,)), data
+            assert (parsed.value.lessons, parsed.value.unreadable) == ((), (LESSON,)), data
             continue
         # The rest of the file is there for other stages, and can never be written back as it is.
         assert diagnostic.span.text == "\ufffd"
-        (source,) = found.value.lessons
+        (source,) = parsed.value.lessons
         assert source.text.encode() != data
 
 
@@ -165,10 +165,10 @@ def test_links_lead_nowhere_but_into_the_project(root: Path, tmp_path: Path) -> 
     (root / "models").mkdir()
     (root / "models/m").symlink_to("../shared/m")
     (root / "models/m/loop").symlink_to("..")
-    found = read_course(root)
-    assert found.diagnostics == ()
-    assert [s.text for s in found.value.lessons] == ["shared"]
-    assert [m.name for m in found.value.models] == ["m/a"]
+    parsed = read_course(root)
+    assert parsed.diagnostics == ()
+    assert [s.text for s in parsed.value.lessons] == ["shared"]
+    assert [m.name for m in parsed.value.models] == ["m/a"]
 
 
 def test_things_that_are_no_files(root: Path) -> None:

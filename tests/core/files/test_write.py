@@ -156,8 +156,8 @@ def test_the_system_refuses_or_somebody_interrupts(
     monkeypatch.setattr(os, call, trouble)
     with pytest.raises((EffectError, KeyboardInterrupt)) as caught:
         write_atomic(tmp_path, "a.md", b"new", expected=b"old")
-    told = "a.md cannot be written: no space left on device" if trouble is full else ""
-    assert str(caught.value) == told
+    message = "a.md cannot be written: no space left on device" if trouble is full else ""
+    assert str(caught.value) == message
     assert path.read_bytes() == b"old"
     assert names(tmp_path) == ["a.md"]
 
@@ -175,10 +175,10 @@ def test_leftovers_go_and_files_in_use_stay(tmp_path: Path, path: Path) -> None:
     (tmp_path / f"{PREFIX}dead").write_bytes(b"half")
     (tmp_path / f"{PREFIX}folder").mkdir()
     (tmp_path / f"{PREFIX}link").symlink_to("a.md")
-    others = {"a.md", f"{PREFIX}folder", f"{PREFIX}link"}
+    files = {"a.md", f"{PREFIX}folder", f"{PREFIX}link"}
     fd, alive = write._open_temporary(tmp_path)
     remove_leftovers([tmp_path, tmp_path / "none"])
-    assert set(names(tmp_path)) == {*others, Path(alive).name}
+    assert set(names(tmp_path)) == {*files, Path(alive).name}
     os.close(fd)
     remove_leftovers([tmp_path])
-    assert set(names(tmp_path)) == others
+    assert set(names(tmp_path)) == files
