@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 
 from coursebuild.core.model import Label, Meaning
-from coursebuild.core.syntax.spans import trimmed
+from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt
 from coursebuild.core.text.units import check_unit
@@ -33,7 +33,7 @@ _LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
 _MARK_HELP = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
 
 
-def folded(text: str) -> str:
+def collapse_spaces(text: str) -> str:
     """A text in one line, each run of white space a blank."""
     return _SPACES.sub(" ", text).strip()
 
@@ -50,8 +50,9 @@ def _read(
     while text[at:end].strip():
         pair = _PAIR.match(text, at, end)
         if pair is None:
-            rest = trimmed(braces.slice(at, end))
-            return diagnose(rule, rest.span(), f"`{folded(rest.text)}` cannot be read", help=help)
+            rest = trim(braces.slice(at, end))
+            message = f"`{collapse_spaces(rest.text)}` cannot be read"
+            return diagnose(rule, rest.span(), message, help=help)
         key, span = pair[1], braces.span(*pair.span(1))
         if key not in keys:
             near = did_you_mean(key, keys) if len(keys) > 1 else ""
@@ -98,7 +99,7 @@ def read_meaning(braces: Excerpt, report: Report) -> tuple[Meaning | None, str |
 
 
 def _text(value: Excerpt | None) -> str:
-    return "" if value is None else folded(value.text)
+    return "" if value is None else collapse_spaces(value.text)
 
 
 def read_label(braces: Excerpt, report: Report) -> Label | None:

@@ -12,7 +12,7 @@ from collections.abc import Collection
 
 from msgspec import Struct
 
-from coursebuild.core.syntax.spans import trimmed
+from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -39,7 +39,7 @@ def read_head(paragraph: Excerpt, known: Collection[str]) -> Parsed[Head] | None
     found = _HEAD.match(paragraph.text)
     if found is None:
         return None
-    written, name, wrong = trimmed(paragraph.slice(*found.span(1))), FALLBACK, None
+    written, name, wrong = trim(paragraph.slice(*found.span(1))), FALLBACK, None
     if found[3][:1].strip():
         start = found.start(3)
         message = f"`{found[3][0]}` cannot follow the kind of a callout"
@@ -53,6 +53,6 @@ def read_head(paragraph: Excerpt, known: Collection[str]) -> Parsed[Head] | None
         message = f"no callout kind `{written.text}`" if written.text else message
         help = did_you_mean(written.text.lower(), known) or f"known: {kinds}"
         wrong = diagnose("callout-unknown", written.span(), message, help=help)
-    title, rest = trimmed(paragraph.slice(*found.span(3))), trimmed(paragraph.slice(found.end()))
+    title, rest = trim(paragraph.slice(*found.span(3))), trim(paragraph.slice(found.end()))
     head = Head(name, written.span(), title, bool(found[2]), rest)
     return Parsed(head, () if wrong is None else (wrong,))

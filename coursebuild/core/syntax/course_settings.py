@@ -14,7 +14,7 @@ from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.course_schema import CalloutTable, CourseFile, VerifyTable
 from coursebuild.core.syntax.decode import Decoding
 from coursebuild.core.syntax.nodes import NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.wording import named
+from coursebuild.core.syntax.wording import format_name
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.patterns import pattern_mistake
 from coursebuild.core.text.rules import RULES
@@ -27,21 +27,21 @@ _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     """Everything that the types of these tables cannot say."""
     verify = root.object("verify")
-    for node, fields in decoding.each([verify], VerifyTable):
+    for node, fields in decoding.valid_structs([verify], VerifyTable):
         yield from _check_verify(node, fields)
-    for node, filter in decoding.each(verify.objects("filter"), Filter):
+    for node, filter in decoding.valid_structs(verify.objects("filter"), Filter):
         yield from _check_filter(node, filter)
     for member in verify.object("env").members:
         if not _VARIABLE.fullmatch(member.key.value):
-            message = f"{named(member.key.value)} cannot be set for scripts"
+            message = f"{format_name(member.key.value)} cannot be set for scripts"
             help = "expected: a name of your own, as in `FAST`"
             yield diagnose("field-value", member.key.span, message, help=help)
     for member in root.object("callouts").members:
         if not _CALLOUT.fullmatch(member.key.value):
-            message = f"{named(member.key.value)} cannot be a kind of callout"
+            message = f"{format_name(member.key.value)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
-    for node, silence in decoding.each(root.objects("silence"), Silence):
+    for node, silence in decoding.valid_structs(root.objects("silence"), Silence):
         yield from _check_silence(node, silence)
 
 
@@ -104,7 +104,7 @@ def _check_silence(node: ObjectNode, fields: Silence) -> Iterator[Diagnostic]:
     rule = RULES.get(fields.rule)
     if rule is None:
         warning_names = [name for name, known in RULES.items() if known.severity == "warning"]
-        message = f"there is no rule {named(fields.rule)}"
+        message = f"there is no rule {format_name(fields.rule)}"
         help = did_you_mean(fields.rule, warning_names)
         yield diagnose("silence-rule", node.place("rule"), message, help=help)
     elif rule.severity == "error":

@@ -29,11 +29,11 @@ from coursebuild.core.syntax.course_schema import (
 )
 from coursebuild.core.syntax.course_settings import callout_kinds, check_settings, comparison
 from coursebuild.core.syntax.decode import Decoding, decode
-from coursebuild.core.syntax.fields import repeated
+from coursebuild.core.syntax.fields import check_unique
 from coursebuild.core.syntax.nodes import Node, NumberNode, ObjectNode, StringNode
 from coursebuild.core.syntax.theme import ThemeTable, check_contrast, theme
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.syntax.wording import TOML, short
+from coursebuild.core.syntax.wording import TOML, shorten
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Note,
@@ -127,9 +127,9 @@ def _levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Level]
     """The levels, with those of their lessons whose fields are right."""
     for node in root.objects("level"):
         name = _id(node.get("id"))
-        inner = decoding.each(node.objects("lesson"), LessonTable)
+        inner = decoding.valid_structs(node.objects("lesson"), LessonTable)
         lessons = tuple(_lesson(*lesson, name) for lesson in inner)
-        fields = next((fields for _, fields in decoding.each([node], LevelTable)), None)
+        fields = next((fields for _, fields in decoding.valid_structs([node], LevelTable)), None)
         title, summary = ("", "") if fields is None else (fields.title, fields.summary)
         yield Level(node.span, name, title, summary, lessons)
 
@@ -170,10 +170,10 @@ def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diag
             first, span = known.setdefault(name.casefold(), (name, place.span))
             if not name or span == place.span:
                 continue
-            message = f"the {kind} id `{short(name)}` is used twice"
+            message = f"the {kind} id `{shorten(name)}` is used twice"
             if name != first:
                 differ = "differ in upper and lower case only"
-                message = f"the {kind} ids `{short(first)}` and `{short(name)}` {differ}"
+                message = f"the {kind} ids `{shorten(first)}` and `{shorten(name)}` {differ}"
             notes = (Note("the first one is here", span),)
             yield diagnose("id-repeated", place.span, message, notes=notes)
 
@@ -182,16 +182,16 @@ def _check_places(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[
     """Each lesson stands in the level that its id begins with."""
     for level in root.objects("level"):
         name = _id(level.get("id"))
-        for node, fields in decoding.each(level.objects("lesson"), LessonTable):
+        for node, fields in decoding.valid_structs(level.objects("lesson"), LessonTable):
             if name and not fields.id.startswith(f"{name}."):
-                message = f"the lesson `{fields.id}` stands in the level `{short(name)}`"
-                help = f"an id in this level begins with `{short(name)}.`"
+                message = f"the lesson `{fields.id}` stands in the level `{shorten(name)}`"
+                help = f"an id in this level begins with `{shorten(name)}.`"
                 yield diagnose("field-value", node.place("id"), message, help=help)
 
 
 def _check_files(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     files: list[tuple[str, Span]] = []
-    for node, fields in decoding.each(root.objects("page"), PageTable):
+    for node, fields in decoding.valid_structs(root.objects("page"), PageTable):
         place = node.place("file")
         files.append((fields.file, place))
         if fields.id in _TAKEN:
@@ -200,10 +200,10 @@ def _check_files(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[D
             yield diagnose("field-value", node.place("id"), message, help=help)
         problem = _path_problem(fields.file)
         if problem:
-            message = f"`{short(fields.file)}` {problem}"
+            message = f"`{shorten(fields.file)}` {problem}"
             help = "a path relative to the project, as in `content/pages/about.md`"
             yield diagnose("field-value", place, message, help=help)
-    yield from repeated(files, "field-value", "two pages have the file `{}`")
+    yield from check_unique(files, "field-value", "two pages have the file `{}`")
 
 
 def _path_problem(path: str) -> str:
@@ -234,10 +234,10 @@ def _check_prerequisites(lessons: list[Lesson], ids: Iterable[str]) -> Iterator[
     names = {*known, *ids}
     for lesson in lessons:
         pairs = list(zip(lesson.prerequisites, lesson.prerequisite_spans, strict=True))
-        yield from repeated(pairs, "field-value", "the prerequisite `{}` is named twice")
+        yield from check_unique(pairs, "field-value", "the prerequisite `{}` is named twice")
         for name, span in pairs:
             if name not in names:
-                message = f"no lesson of the map has the id `{short(name)}`"
+                message = f"no lesson of the map has the id `{shorten(name)}`"
                 help = did_you_mean(name, names)
                 yield diagnose("prerequisite-unknown", span, message, help=help)
     graph = {lesson.id: known[lesson.id].prerequisites for lesson in lessons}

@@ -1,6 +1,6 @@
 """From nodes to declared structs, with every mistake at its place.
 
-Entry points: `decode(node, type, name, format)` → `Decoding`; `description` of a field.
+Entry points: `decode(node, type, name, format)` → `Decoding`; `field_description` of a field.
 
 1. One walk over the nodes, led by what `msgspec.inspect` says of the type, reports everything that
    is wrong in one go: unknown and missing fields, wrong types, impossible values. (Repeated fields
@@ -36,8 +36,8 @@ from coursebuild.core.syntax.nodes import (
 from coursebuild.core.syntax.wording import (
     Format,
     accepts,
-    named,
-    quoted,
+    format_name,
+    format_value,
     type_help,
     wrong_type,
 )
@@ -63,7 +63,9 @@ class Decoding(Struct, Generic[S], frozen=True):
     texts: tuple[tuple[StringNode, str], ...]
     """Every string that is Markdown, with `blocks` or `inlines`."""
 
-    def each(self, nodes: Iterable[ObjectNode], type: type[T]) -> Iterator[tuple[ObjectNode, T]]:
+    def valid_structs(
+        self, nodes: Iterable[ObjectNode], type: type[T]
+    ) -> Iterator[tuple[ObjectNode, T]]:
         """Those of some objects whose own fields are right, each with its struct."""
         for node in nodes:
             struct = self.structs.get(node)
@@ -146,9 +148,9 @@ class _Decoder:
         value = node.value
         blank = type.pattern == NOT_BLANK
         if len(value) < (type.min_length or 0) or (blank and not value.strip()):
-            return self.report("field-value", node.mark, f"{named(name)} is empty")
+            return self.report("field-value", node.mark, f"{format_name(name)} is empty")
         if type.pattern and not blank and re.fullmatch(type.pattern, value) is None:
-            message = f"{named(name)} cannot be {quoted(node)}"
+            message = f"{format_name(name)} cannot be {format_value(node)}"
             help = f"expected: {remarks.get('expects', '')}"
             return self.report("field-value", node.mark, message, help)
         if "text" in remarks:
@@ -158,7 +160,7 @@ class _Decoder:
     def literal(self, node: StringNode, type: inspect.LiteralType, name: str) -> object:
         if node.value in type.values:
             return node.value
-        message = f"{named(name)} cannot be {quoted(node)}"
+        message = f"{format_name(name)} cannot be {format_value(node)}"
         help = did_you_mean(node.value, map(str, type.values))
         return self.report("field-value", node.mark, message, help)
 
@@ -168,7 +170,7 @@ class _Decoder:
         value = node.value if isinstance(type, inspect.IntType) else _double(node.value)
         problem = _not_a_double(node) or _out_of_bounds(value, node, type)
         if problem:
-            return self.report("field-value", node.mark, f"{named(name)} {problem}")
+            return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
         return value
 
     # ------------------------------------------------------------------------------- containers
@@ -187,7 +189,7 @@ class _Decoder:
                 problem = f"needs at least {least} entries, and has {length}"
                 problem = problem if length else "is empty"
         if problem:
-            return self.report("field-value", node.mark, f"{named(name)} {problem}")
+            return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
         values = [
             self.value(item, type, f"{name}[{i}]")
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))
@@ -256,7 +258,7 @@ class _Decoder:
                 help = f"it is a field of {names}"
             else:
                 help = did_you_mean(key.value, fields)
-            self.report("field-unknown", key.span, f"unknown field {named(key.value)}", help)
+            self.report("field-unknown", key.span, f"unknown field {format_name(key.value)}", help)
         return meant
 
     def tagged(self, node: ObjectNode, variants: Mapping[str, inspect.StructType]) -> object:
@@ -269,7 +271,7 @@ class _Decoder:
             return self.wrong_type(given, inspect.StrType(), tag, did_you_mean("", variants))
         if given.value in variants:
             return self.struct(node, variants[given.value], variants)
-        message = f"{named(tag)} cannot be {quoted(given)}"
+        message = f"{format_name(tag)} cannot be {format_value(given)}"
         help = did_you_mean(given.value, variants)
         return self.report("field-value", given.mark, message, help)
 
@@ -280,7 +282,7 @@ class _Decoder:
         owners = {member.key.value: _owners(member.key.value, variants) for member in node.members}
         for key in (member.key for member in node.members):
             if not owners[key.value] and nearest(key.value, [tag], cutoff=0.7):
-                message = f"unknown field {named(key.value)}"
+                message = f"unknown field {format_name(key.value)}"
                 return self.report("field-unknown", key.span, message, f"did you mean `{tag}`?")
         help = did_you_mean("", variants)
         implied = next((t for t, v in variants.items() if getattr(v.cls, "implied", False)), None)
@@ -292,14 +294,14 @@ class _Decoder:
         return self.report("field-missing", node.mark, f"`{tag}` is missing", help)
 
 
-def description(type: inspect.Type) -> str:
+def field_description(type: inspect.Type) -> str:
     """What a field of this type is, as its declaration says."""
     extra = type.extra_json_schema if isinstance(type, inspect.Metadata) else None
     return str((extra or {}).get("description", ""))
 
 
 def _described(name: str, type: inspect.Type) -> str:
-    about = description(type)
+    about = field_description(type)
     return about and f"`{name}`: {about}"
 
 

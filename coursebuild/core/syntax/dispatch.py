@@ -13,9 +13,9 @@ import re
 from coursebuild.core.features import FenceKind
 from coursebuild.core.model import Block, CodeBlock, FeatureBlock, Mjcf, Script
 from coursebuild.core.registry import fence_kind
-from coursebuild.core.syntax.fence import Fence, kind_doubts
+from coursebuild.core.syntax.fence import Fence, check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.recording import stray_keys
+from coursebuild.core.syntax.recording import check_stray_keys
 from coursebuild.core.syntax.script import parse_python
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Note, diagnose
@@ -28,20 +28,20 @@ _HEAD_RULES = frozenset(
 
 def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block:
     """The block of a fence that records no output."""
-    if not fence.closed or fence.inner is not None:
+    if not fence.is_closed or fence.inner is not None:
         return _unclosed(fence, session)
     match fence.kind:
         case "python":
             return _python(fence, session)
         case "text":
-            stray_keys(fence, session)
+            check_stray_keys(fence, session)
             return fence.code()
         case "mjcf":
             return _mjcf(fence, session)
         case name if (kind := fence_kind(name)) is not None:
             return _of_feature(kind, fence, session, texts)
         case _:
-            session.diagnostics += kind_doubts(fence)
+            session.diagnostics += check_kind(fence)
             return fence.code()
 
 
@@ -59,7 +59,7 @@ def _unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
         notes = [Note("this line is read as text of the fence above it", fence.inner)]
     session.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))
     if fence.kind == "python" or fence.inner is not None:
-        session.script, session.script_wrong = None, True
+        session.script, session.has_invalid_script = None, True
     return fence.code()
 
 
@@ -67,11 +67,11 @@ def _python(fence: Fence, session: ParsingState) -> Block:
     parsed = parse_python(fence)
     session.diagnostics += parsed.diagnostics
     if isinstance(parsed.value, Script):
-        session.script, session.script_wrong = parsed.value.path, False
+        session.script, session.has_invalid_script = parsed.value.path, False
         names = (figure.name for figure in parsed.value.figures)
         session.figures += [name for name in names if not name.endswith(".csv")]
     elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed.diagnostics):
-        session.script, session.script_wrong = None, True
+        session.script, session.has_invalid_script = None, True
     return parsed.value
 
 

@@ -30,7 +30,7 @@ from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import blocks_elsewhere
 from coursebuild.core.syntax.headings import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.spans import whole
+from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Source
@@ -51,7 +51,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     of their places; the document holds all that could be read.
     """
     session = ParsingState(callouts, lesson)
-    base = _without_front_matter(whole(source), session)
+    base = _without_front_matter(read_markdown(source), session)
     title = None if lesson else title_line(source)
     if title is not None:
         base = base.slice(len(base.text.partition("\n")[0]))

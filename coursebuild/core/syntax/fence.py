@@ -1,6 +1,6 @@
 """Fences: a code block of the text, and what makes one of ours out of it.
 
-Entry points: `read_fence` (a token into a `Fence`), `kind_doubts` (of a kind that looks misspelt,
+Entry points: `read_fence` (a token into a `Fence`), `check_kind` (of a kind that looks misspelt,
 or that a feature would read that is not installed).
 """
 
@@ -15,8 +15,8 @@ from msgspec import Struct
 
 from coursebuild.core.model import CodeBlock
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
-from coursebuild.core.syntax.info import FenceKeys, kind_of, read_keys, words_of
-from coursebuild.core.syntax.spans import PositionedToken, locate, trimmed
+from coursebuild.core.syntax.info import FenceKeys, kind_of, read_keys, split_words
+from coursebuild.core.syntax.spans import PositionedToken, locate, trim
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -45,7 +45,7 @@ class Fence(Struct, frozen=True):
     """Those lines in the source, from the start of the first to that of the closing line."""
     prefix: str
     """What stands before each of those lines in the source."""
-    closed: bool
+    is_closed: bool
     nested: bool
     """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
     inner: Span | None
@@ -57,17 +57,17 @@ class Fence(Struct, frozen=True):
         return kind_of(self.info).text
 
     def keys(
-        self, *, values: Sequence[str] = (), flags: Sequence[str] = (), named: bool = False
+        self, *, values: Sequence[str] = (), flags: Sequence[str] = (), has_name: bool = False
     ) -> Parsed[FenceKeys]:
         """What the info string says beside the kind; see `read_keys`."""
-        return read_keys(self.info, values=values, flags=flags, named=named)
+        return read_keys(self.info, values=values, flags=flags, has_name=has_name)
 
     def code(self) -> CodeBlock:
         """It as a code block of no special kind."""
         return CodeBlock(self.span, unescapeAll(self.kind), unescapeAll(self.info.text), self.body)
 
 
-def is_ours(kind: str) -> bool:
+def is_known_kind(kind: str) -> bool:
     """Whether a block of a kind is more than code."""
     return kind in CORE_FENCES or kind in fence_names()
 
@@ -77,16 +77,16 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     assert token.map is not None
     info_at = token.start + len(token.markup)
     info_end = info_at + len(token.info)
-    info = trimmed(base.slice(info_at, info_end))
-    closed = len(token.rows) == token.map[1] - token.map[0] - 2
+    info = trim(base.slice(info_at, info_end))
+    is_closed = len(token.rows) == token.map[1] - token.map[0] - 2
     body = locate(base, token.rows) if token.rows else base.slice(info_end + 1, info_end + 1)
     if token.rows and not body.text.endswith("\n"):
         body = Excerpt(base.source, body.text + "\n", body.pieces)
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_at + len(token.info.rstrip()))
-    body_span, prefix = (body.span(), "") if nested else _lines(span, head, closed)
+    body_span, prefix = (body.span(), "") if nested else _lines(span, head, is_closed)
     inner = _inner(body, token.markup)
-    return Fence(span, head, info, body, body_span, prefix, closed, nested, inner)
+    return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner)
 
 
 def _inner(body: Excerpt, marks: str) -> Span | None:
@@ -98,11 +98,11 @@ def _inner(body: Excerpt, marks: str) -> Span | None:
     return None if found is None else body.span(found.start(1), found.end(1))
 
 
-def _lines(span: Span, head: Span, closed: bool) -> tuple[Span, str]:
+def _lines(span: Span, head: Span, is_closed: bool) -> tuple[Span, str]:
     """The whole lines between the fences, and what new ones must begin with."""
     source, last = span.source, span.end_line
     start = source.line_start(head.line + 1)
-    end = source.line_start(last if closed else last + 1)
+    end = source.line_start(last if is_closed else last + 1)
     return Span(source, start, max(start, end)), line_prefix(head)
 
 
@@ -113,7 +113,7 @@ def line_prefix(place: Span) -> str:
     return prefix + " " if prefix.endswith(">") else prefix
 
 
-def kind_doubts(fence: Fence) -> Iterator[Diagnostic]:
+def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     """What looks wrong with a code block that is none of ours."""
     package = missing_package(fence.kind)
     if package:
@@ -124,7 +124,7 @@ def kind_doubts(fence: Fence) -> Iterator[Diagnostic]:
     near = "lab simlab" if name == "simlab" else nearest(name, known, cutoff=0.75)
     if not name:
         return
-    words = words_of(fence.info).value
+    words = split_words(fence.info).value
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
         help = "a script is a block of kind `python`"

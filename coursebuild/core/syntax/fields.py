@@ -1,6 +1,6 @@
 """Checks of how the fields of a declaration hang together.
 
-Entry points: `has_value`, `one_of`, `repeated`.
+Entry points: `has_value`, `require_one_of`, `check_unique`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from msgspec import Struct
 
 from coursebuild.core.syntax.nodes import NullNode, ObjectNode
-from coursebuild.core.syntax.wording import short
+from coursebuild.core.syntax.wording import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, nearest
 from coursebuild.core.text.source import Span
 
@@ -21,7 +21,7 @@ def has_value(node: ObjectNode, name: str) -> bool:
     return value is not None and not isinstance(value, NullNode)
 
 
-def one_of(
+def require_one_of(
     node: ObjectNode, type: type[Struct], names: tuple[str, ...], *, only: bool = True
 ) -> Iterator[Diagnostic]:
     """One of the fields is needed and, with `only`, no more than one is taken."""
@@ -42,7 +42,7 @@ def _misspelt(node: ObjectNode, type: type[Struct], names: tuple[str, ...]) -> b
     return any(nearest(key, names) for key in keys if key not in type.__struct_fields__)
 
 
-def repeated(
+def check_unique(
     named: Iterable[tuple[str | float, Span]], rule: str, message: str, *, help: str = ""
 ) -> Iterator[Diagnostic]:
     """Each name that stands there again; `{}` in the message is the name."""
@@ -50,5 +50,5 @@ def repeated(
     for name, span in named:
         if first.setdefault(name, span) is not span:
             notes = (Note("the first one is here", first[name]),)
-            text = message.format(short(name) if isinstance(name, str) else f"{name:g}")
+            text = message.format(shorten(name) if isinstance(name, str) else f"{name:g}")
             yield diagnose(rule, span, text, help=help, notes=notes)

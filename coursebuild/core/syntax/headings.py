@@ -1,7 +1,7 @@
 """Headings: the attributes after them, and the anchors of a document.
 
 Entry points: `read_attributes` (`## Title {#id .class}`), `Anchors` (unique ids), `slug`,
-`heading_mistakes`.
+`check_heading`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from unicodedata import normalize
 from msgspec import Struct, field
 
 from coursebuild.core.model import Image, Inline, plain_text, walk_inlines
-from coursebuild.core.syntax.spans import trimmed
+from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -43,7 +43,7 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
     found = _CANDIDATE.search(content.text) if "{" in content.text else None
     if found is None:
         return Parsed(Attributes(content))
-    title, braces = trimmed(content.slice(0, found.start())), trimmed(content.slice(found.start()))
+    title, braces = trim(content.slice(0, found.start())), trim(content.slice(found.start()))
     if not found[1]:
         return _mistake(title, braces, "the attributes of this heading are never closed")
     name, classes, inner = None, list[str](), braces.slice(1, len(braces.text) - 1)
@@ -120,7 +120,7 @@ class Anchors(Struct):
         return name
 
 
-def heading_mistakes(
+def check_heading(
     span: Span, level: int, above: int | None, children: tuple[Inline, ...], *, lesson: bool
 ) -> list[Diagnostic]:
     """What is wrong with a heading; `above` is the level before it, where that counts."""

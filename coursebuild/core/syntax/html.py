@@ -1,6 +1,6 @@
 """Raw HTML: its tags, whether they balance, and the files that it shows.
 
-Entry points: `tags` and `tag_at` (scan), `Balance` (what is open), `media_of`.
+Entry points: `tags` and `tag_at` (scan), `Balance` (what is open), `find_media`.
 
 Balance is judged with care: elements whose end tag may be left out, void elements, comments and raw
 text never give a false alarm. An element must be closed in the block, list item or emphasis that it
@@ -164,7 +164,7 @@ class Balance:
         self._report(diagnose("html-unbalanced", span, message))
 
 
-def media_of(html: Excerpt) -> tuple[MediaAddress, ...]:
+def find_media(html: Excerpt) -> tuple[MediaAddress, ...]:
     """The addresses of files that HTML shows."""
     text = html.text
     return tuple(

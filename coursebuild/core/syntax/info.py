@@ -1,7 +1,7 @@
 r"""Info strings of fences: `kind [name] [key=value | key="value with spaces" | flag]…`.
 
 Entry point: `read_keys`, the words after the kind against the keys that it has; `Fence.keys` is the
-same for a fence at hand. `words_of` splits without a judgement.
+same for a fence at hand. `split_words` splits without a judgement.
 
 In a quoted value `\"` is a quote and `\\` a backslash. Mistakes are diagnostics at the word that
 is wrong; the rest is still read.
@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.syntax.spans import trimmed
+from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -50,7 +50,7 @@ class Word(Struct, frozen=True):
         """The parts of a value that have commas between them, without white space around them."""
         value = self.value_text
         found = () if value is None else _PART.finditer(value.text)
-        return [] if value is None else [trimmed(value.slice(*part.span())) for part in found]
+        return [] if value is None else [trim(value.slice(*part.span())) for part in found]
 
 
 class FenceKeys(Struct, frozen=True):
@@ -83,15 +83,15 @@ def kind_of(info: Excerpt) -> Excerpt:
 
 
 def read_keys(
-    info: Excerpt, *, values: Sequence[str] = (), flags: Sequence[str] = (), named: bool = False
+    info: Excerpt, *, values: Sequence[str] = (), flags: Sequence[str] = (), has_name: bool = False
 ) -> Parsed[FenceKeys]:
     """Sort the words of a fence of ours: which keys take a value, which are flags, which are both.
 
-    With `named` a first word without `=` is a name.
+    With `has_name` a first word without `=` is a name.
     """
-    kind, split = kind_of(info).text, words_of(info)
+    kind, split = kind_of(info).text, split_words(info)
     words, diagnostics = list(split.value), list(split.diagnostics)
-    name = words.pop(0) if named and words and words[0].value is None else None
+    name = words.pop(0) if has_name and words and words[0].value is None else None
     known = [*values, *flags]
     kept: dict[str, Word] = {}
     for word in words:
@@ -115,7 +115,7 @@ def read_keys(
     return Parsed(FenceKeys(name, tuple(kept.values())), tuple(diagnostics))
 
 
-def words_of(info: Excerpt) -> Parsed[tuple[Word, ...]]:
+def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
     """The words after the kind."""
     words: list[Word] = []
     diagnostics: list[Diagnostic] = []

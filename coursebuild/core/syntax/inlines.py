@@ -37,21 +37,21 @@ from coursebuild.core.model import (
     Term,
     plain_text,
 )
-from coursebuild.core.syntax.attributes import folded, read_label, read_meaning, read_term
+from coursebuild.core.syntax.attributes import collapse_spaces, read_label, read_meaning, read_term
 from coursebuild.core.syntax.headings import term_id
-from coursebuild.core.syntax.html import LITERAL, Balance, media_of, tags
+from coursebuild.core.syntax.html import LITERAL, Balance, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
 from coursebuild.core.syntax.links import (
     TextPiece,
     check_scheme,
     classify,
+    link_mentions,
     may_mention,
-    plain,
-    with_mentions,
+    text_inlines,
 )
 from coursebuild.core.syntax.markdown import References
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.safe_html import forbidden_in
+from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import unread_markup
 from coursebuild.core.text.diagnostics import diagnose
@@ -146,9 +146,9 @@ class _Pass:
         self.run = []
         nodes = self.stack[-1].nodes
         if not self.links and not self.code:
-            nodes += with_mentions(run, self.content)
+            nodes += link_mentions(run, self.content)
         else:
-            nodes += plain(run, self.content)
+            nodes += text_inlines(run, self.content)
 
     def _unclosed_math(self, token: PositionedToken) -> None:
         span = self.content.span(token.start, token.end)
@@ -201,7 +201,7 @@ class _Pass:
         given = read_term(self.content.slice(*closed.map), report)
         if given is None:
             return None
-        name = given or folded(plain_text(children))
+        name = given or collapse_spaces(plain_text(children))
         if not term_id(name):
             report(diagnose("term-attribute", span, "the term has no letters and no digits"))
             return None
@@ -297,7 +297,7 @@ class _Pass:
             start, end = start + 1, end - 1
         place = self.content.span(start, end)
         if token.type == "number_given":
-            return NumberBinding(span, token.content, place, None, folded(token.info))
+            return NumberBinding(span, token.content, place, None, collapse_spaces(token.info))
         return NumberBinding(span, token.content, place, token.info or None)
 
     def _html(self, token: PositionedToken, span: Span) -> RawInline:
@@ -309,7 +309,7 @@ class _Pass:
                 self.links = max(0, self.links + step)
             elif tag.name in LITERAL:
                 self.code = max(0, self.code + step)
-        return RawInline(span, html.text, media_of(html), forbidden_in(html))
+        return RawInline(span, html.text, find_media(html), find_forbidden(html))
 
     def _image(self, token: PositionedToken, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])

@@ -1,6 +1,6 @@
 r"""JSON in a fence, read strictly, every value with its place.
 
-Entry points: `parse_json(body, place)`; `one_line`, a value without its layout.
+Entry points: `parse_json(body, place)`; `to_one_line`, a value without its layout.
 
 1. One pass over the text gives the nodes. The grammar is RFC 8259 and nothing more; nesting is
    limited to `MAX_DEPTH`.
@@ -29,7 +29,7 @@ from coursebuild.core.syntax.nodes import (
     odd_character,
     tex_word,
 )
-from coursebuild.core.syntax.wording import short
+from coursebuild.core.syntax.wording import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -73,7 +73,7 @@ def parse_json(body: Excerpt, place: Span) -> Parsed[Node | None]:
     return Parsed(value, tuple(reader.diagnostics))
 
 
-def one_line(node: Node) -> Excerpt:
+def to_one_line(node: Node) -> Excerpt:
     """A value on one line, each of its parts as it is written and with its place."""
     text, pieces = "", []
     for token in _TOKEN.finditer(node.body.text, node.start, node.end):
@@ -150,7 +150,7 @@ class _Reader:
             key = self.string()
             first = known.setdefault(key.value, key)
             if first is not key:
-                message = f"`{short(key.value)}` is given twice"
+                message = f"`{shorten(key.value)}` is given twice"
                 notes = (Note("the first one is here", first.span),)
                 self.diagnostics.append(diagnose("field-repeated", key.span, message, notes=notes))
             self.colon(key)
@@ -175,7 +175,7 @@ class _Reader:
         if char == "=":
             self.report(self.at, self.at + 1, "`=` where JSON has `:`", "write `:`")
         elif char != ":":
-            self.expected(f"`:` after the key `{short(key.value)}`")
+            self.expected(f"`:` after the key `{shorten(key.value)}`")
         self.at += 1
 
     def separator(self, opened: int, closer: str) -> bool:
@@ -219,7 +219,7 @@ class _Reader:
         elif written.lstrip("+-") in _NOT_FINITE:
             message, help = f"JSON has no `{written}`", "write a finite number"
         elif written[0] in "+-.0123456789":
-            message, help = f"`{short(written)}` is not a number of JSON", _number_help(written)
+            message, help = f"`{shorten(written)}` is not a number of JSON", _number_help(written)
         else:
             self.at = start
             self.expected("a value")
@@ -282,7 +282,7 @@ class _Reader:
         notes: tuple[Note, ...] = ()
         if opened is not None and found in "]}":
             notes = (Note(f"`{text[opened]}` is opened here", self.body.span(opened, opened + 1)),)
-        name = "a string" if found == '"' else f"`{short(found)}`"
+        name = "a string" if found == '"' else f"`{shorten(found)}`"
         help = _help(found, what)
         self.report(at, at + len(found), f"expected {what}, found {name}", help, notes)
         raise _LostError
@@ -325,7 +325,7 @@ def _help(found: str, what: str) -> str:
     if what.startswith("`,`") and (char.isalnum() or char == "\\"):
         return 'a double quote inside a string is written `\\"`'
     if what == "a key in double quotes" and letter:
-        return f'write `"{short(found)}"`'
+        return f'write `"{shorten(found)}"`'
     if what == "a value" and letter:
         return "text stands between double quotes"
     return ""
@@ -338,5 +338,5 @@ def _number_help(written: str) -> str:
             value = read()
         except ValueError:
             continue
-        return "" if "n" in str(value) else f"write `{short(str(value))}`"  # inf, nan
+        return "" if "n" in str(value) else f"write `{shorten(str(value))}`"  # inf, nan
     return ""

@@ -1,7 +1,7 @@
 """Where links lead: destinations, schemes that a page must not have, and mentions.
 
-Entry points: `classify`, `check_scheme`, `check_raw_scheme`; `may_mention`, `plain` and
-`with_mentions`, by which "Lesson 2.2" and "Level 18" in prose become links by themselves.
+Entry points: `classify`, `check_scheme`, `check_raw_scheme`; `may_mention`, `text_inlines` and
+`link_mentions`, by which "Lesson 2.2" and "Level 18" in prose become links by themselves.
 
 Text and soft line ends that follow each other make one run, so that a mention may be broken over
 two lines. Each becomes a `Link`, whose `target_span` is the number; what is around it becomes
@@ -118,7 +118,7 @@ def may_mention(text: str) -> bool:
     return "Lesson" in text or "Level" in text
 
 
-def plain(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
+def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts and soft line ends."""
     out: list[Inline] = []
     for is_line_end, group in groupby(run, key=lambda piece: piece.text == "\n"):
@@ -131,7 +131,7 @@ def plain(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     return out
 
 
-def with_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
+def link_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
     joined = "".join([item.text for item in run])
     starts = [0, *accumulate(len(item.text) for item in run)]
@@ -141,15 +141,15 @@ def with_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
         for number in _NUMBER.finditer(joined, *mentions.span()):
             first = at <= mentions.start()  # whose link begins with the word
             start = mentions.start() if first else number.start()
-            out += plain(_cut(run, starts, at, start), content)
-            children = plain(_cut(run, starts, start, number.end()), content)
+            out += text_inlines(_cut(run, starts, at, start), content)
+            children = text_inlines(_cut(run, starts, start, number.end()), content)
             target = LessonTarget(number[0], None) if mentions[1] else LevelTarget(number[0])
             digits = _cut(run, starts, *number.span())
             place = content.span(digits[0].start, digits[-1].end)
             span = children[0].span.to(children[-1].span)
             out.append(Link(span, target, place, "", tuple(children), mention=True))
             at = number.end()
-    return out + plain(_cut(run, starts, at, len(joined)), content)
+    return out + text_inlines(_cut(run, starts, at, len(joined)), content)
 
 
 def _cut(run: Sequence[TextPiece], starts: list[int], start: int, end: int) -> list[TextPiece]:

@@ -35,7 +35,7 @@ class ParsingState:
         """The path of the nearest script above."""
         self.figures: list[str] = []
         """Names of figures of scripts above that no paragraph has shown yet."""
-        self.script_wrong = False
+        self.has_invalid_script = False
         """Whether the nearest script above has no path that it may have."""
         self.closes_indented = False
         """Whether a fence above was indented, so that what closes it seems to open one."""
@@ -44,7 +44,7 @@ class ParsingState:
         self.notes = FootnoteList(self.report)
         self.anchors = Anchors(self.report)
 
-    def apart(self, read: Callable[[], T]) -> Parsed[T]:
+    def collect_diagnostics(self, read: Callable[[], T]) -> Parsed[T]:
         """What `read` gives, with the diagnostics that it raised, for the caller to pass on."""
         before = len(self.diagnostics)
         value = read()
@@ -53,7 +53,7 @@ class ParsingState:
         return Parsed(value, found)
 
 
-class Written(Struct):
+class FootnoteText(Struct):
     """A footnote that is written."""
 
     label: str
@@ -74,12 +74,12 @@ class FootnoteList(Struct):
     """
 
     report: Callable[[Diagnostic], None]
-    written: dict[str, Written] = field(default_factory=dict)
+    written: dict[str, FootnoteText] = field(default_factory=dict)
     """By label, without case."""
-    referred: list[Written] = field(default_factory=list)
+    referred: list[FootnoteText] = field(default_factory=list)
     """In the order of their numbers."""
 
-    def write(self, note: Written) -> None:
+    def write(self, note: FootnoteText) -> None:
         """Take note of a footnote's text."""
         first = self.written.setdefault(note.label.casefold(), note)
         if first is not note:

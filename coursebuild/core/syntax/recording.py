@@ -1,8 +1,7 @@
 """What scripts print and draw: `Output…:` above a `text` fence or a table, and `Figure:`.
 
-Entry points: `is_caption`, `near_caption`, `record_fence`, `record_table` (a caption and its body),
-`no_body` and `nothing_recorded` (what follows is none), `no_caption` and `stray_keys` (on a fence
-that records nothing); `read_figure`.
+Entry points: `is_caption`; `record_fence` and `record_table`, which read a caption and its body;
+`read_figure`; and diagnostics of captions and bodies without each other.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from decimal import Decimal
 
 from coursebuild.core.model import Comparison, Image, Inline, Mode, Recording, Table, plain_text
 from coursebuild.core.model.blocks import volatile_pattern
-from coursebuild.core.syntax.fence import Fence, is_ours
+from coursebuild.core.syntax.fence import Fence, is_known_kind
 from coursebuild.core.syntax.info import FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
@@ -45,7 +44,7 @@ def is_caption(inlines: tuple[Inline, ...]) -> bool:
     return _CAPTION.fullmatch(plain_text(inlines)) is not None
 
 
-def near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> list[Diagnostic]:
+def check_near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> list[Diagnostic]:
     """A warning where a block of a kind looks recorded, and is compared with nothing."""
     text = plain_text(inlines)
     near = kind == "text" and _NEAR_CAPTION.fullmatch(text)
@@ -56,7 +55,7 @@ def near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> list[Dia
     return [diagnose("recording-caption", span, message, help=help)]
 
 
-def no_caption(fence: Span) -> Diagnostic:
+def diagnose_missing_caption(fence: Span) -> Diagnostic:
     """A warning where a `text` block stands directly below a script."""
     message = "this looks like the output of the script above it, and nothing is compared"
     help = "write a paragraph `Output:` between the two"
@@ -67,14 +66,14 @@ def record_fence(
     caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: ParsingState
 ) -> Recording | None:
     """The recording whose body may be this fence."""
-    if not fence.closed or fence.inner is not None:
+    if not fence.is_closed or fence.inner is not None:
         return None
     if fence.kind != "text":
-        if is_ours(fence.kind):
-            session.diagnostics += nothing_recorded(caption, caption_span)
+        if is_known_kind(fence.kind):
+            session.diagnostics += check_missing_body(caption, caption_span)
         else:
             what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
-            session.report(no_body(fence.head, what))
+            session.report(diagnose_wrong_body(fence.head, what))
         return None
     keys = fence.keys(values=_VALUES, flags=_FLAGS)
     wrong = list(keys.diagnostics)
@@ -105,7 +104,7 @@ def record_table(
     return Recording(span, caption, caption_span, table, table.span, "", None, script)
 
 
-def nothing_recorded(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
+def check_missing_body(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
     """The mistake of a caption without a body, where it can be nothing but a caption."""
     if plain_text(caption).strip() != "Output:":
         return []
@@ -114,7 +113,7 @@ def nothing_recorded(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic
     return [diagnose("recording-body", span, message, help=help)]
 
 
-def no_body(span: Span, what: str) -> Diagnostic:
+def diagnose_wrong_body(span: Span, what: str) -> Diagnostic:
     """The mistake of a caption that something else follows."""
     message = f"the recorded output is {what}, not of kind `text`"
     help = (
@@ -126,7 +125,7 @@ def no_body(span: Span, what: str) -> Diagnostic:
 
 def _script(caption_span: Span, session: ParsingState) -> str | None:
     """The script that a recording belongs to."""
-    if session.script is None and not session.script_wrong:
+    if session.script is None and not session.has_invalid_script:
         message = "no script stands above this recorded output"
         help = "it records what the nearest ```` ```python file=examples/….py ```` above it prints"
         session.report(diagnose("recording-orphan", caption_span, message, help=help))
@@ -150,7 +149,7 @@ def _comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | 
     return Comparison(mode, rtol or Decimal(0), atol or Decimal(0), ellipsis, volatile)
 
 
-def stray_keys(fence: Fence, session: ParsingState) -> None:
+def check_stray_keys(fence: Fence, session: ParsingState) -> None:
     """Report keys on a `text` fence that records no output."""
     keys = fence.keys(values=_VALUES, flags=_FLAGS)
     session.diagnostics += keys.diagnostics

@@ -1,6 +1,6 @@
 """Raw HTML that runs nothing, loads nothing from other hosts and cannot imitate the interface.
 
-Entry point: `forbidden_in`.
+Entry point: `find_forbidden`.
 
 1. HTML may hold text, comments, and the elements and attributes that are named here, in a form that
    every parser reads alike.
@@ -70,7 +70,7 @@ _PLAIN = re.compile(
 """Text, the end of an element, a comment."""
 
 
-def forbidden_in(html: Excerpt) -> tuple[ForbiddenHtml, ...]:
+def find_forbidden(html: Excerpt) -> tuple[ForbiddenHtml, ...]:
     """The parts of HTML that a page must not hold."""
     found = _forbidden(html.text)
     return tuple(ForbiddenHtml(html.span(start, end), message) for start, end, message in found)

@@ -34,10 +34,10 @@ from coursebuild.core.model.scenarios import (
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
 from coursebuild.core.syntax.decode import Decoding, decode
-from coursebuild.core.syntax.fields import repeated
+from coursebuild.core.syntax.fields import check_unique
 from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.syntax.wording import TOML, short
+from coursebuild.core.syntax.wording import TOML, shorten
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Parsed,
@@ -130,14 +130,16 @@ def _check_names(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Di
         ("sweep", SweepTable, "name", "two sweeps have the name `{}`"),
         ("keep", KeepTable, "finding", "the finding `{}` is kept twice"),
     ):
-        found = decoding.each(root.objects(kind), table)
+        found = decoding.valid_structs(root.objects(kind), table)
         named = [(getattr(one, field), node.place(field)) for node, one in found]
-        yield from repeated(named, "field-value", message)
+        yield from check_unique(named, "field-value", message)
 
 
 def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    known = [table.name for _, table in decoding.each(root.objects("scenario"), ScenarioTable)]
-    for node, table in decoding.each(root.objects("sweep"), SweepTable):
+    known = [
+        table.name for _, table in decoding.valid_structs(root.objects("scenario"), ScenarioTable)
+    ]
+    for node, table in decoding.valid_structs(root.objects("sweep"), SweepTable):
         if table.scenario is not None and table.scenario not in known:
             message = f"no scenario is called `{table.scenario}`"
             help = did_you_mean(table.scenario, known)
@@ -153,7 +155,7 @@ def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[D
 
 
 def _check_scenarios(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    for node, table in decoding.each(root.objects("scenario"), ScenarioTable):
+    for node, table in decoding.valid_structs(root.objects("scenario"), ScenarioTable):
         yield from _check_times(node, table)
         yield from _check_timesteps(node, table)
         yield from _check_controls(node, table)
@@ -183,7 +185,7 @@ def _check_timesteps(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnos
             message = f"the timestep {step:g} s does not divide `{name}` ({length:g} s)"
             help = "every timestep must end at the same times, or errors cannot be compared"
             yield diagnose("field-value", span, message, help=help)
-    yield from repeated(pairs, "field-value", "the timestep {} s is named twice")
+    yield from check_unique(pairs, "field-value", "the timestep {} s is named twice")
 
 
 def _lengths(table: ScenarioTable) -> Sequence[tuple[float, str]]:
@@ -218,6 +220,6 @@ def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnost
 
 def _check_reference(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
     if table.closed and table.closed not in CLOSED_FORMS:
-        message = f"no hard case with a closed form is called `{short(table.closed)}`"
+        message = f"no hard case with a closed form is called `{shorten(table.closed)}`"
         help = did_you_mean(table.closed, CLOSED_FORMS)
         yield diagnose("field-value", node.place("reference"), message, help=help)

@@ -17,7 +17,7 @@ from functools import lru_cache
 from coursebuild.core.model import PlainCode, Script, SourcePart
 from coursebuild.core.model.blocks import FigureName
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.info import FenceKeys, Word, words_of
+from coursebuild.core.syntax.info import FenceKeys, Word, split_words
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -47,7 +47,7 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     keys = fence.keys(values=("file", "show", *_VALUES), flags=(*_FLAGS, "fragment"))
     diagnostics = list(keys.diagnostics)
     file, fragment = keys.value.get("file"), keys.value.get("fragment")
-    has_file = any(word.key == "file" for word in words_of(fence.info).value)
+    has_file = any(word.key == "file" for word in split_words(fence.info).value)
     if file is None and not diagnostics:
         for word in (keys.value.get(key) for key in (*_VALUES, *_FLAGS)):
             if word is not None:

@@ -146,7 +146,7 @@ def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
     return Excerpt.join(parts)
 
 
-def trimmed(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
+def trim(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
     """The excerpt without white space at its ends."""
     given = excerpt.text
     if not given or (given[0] not in chars and given[-1] not in chars):
@@ -156,13 +156,13 @@ def trimmed(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
     return excerpt.slice(lead, lead + len(text.rstrip(chars)))
 
 
-def whole(source: Source) -> Excerpt:
+def read_markdown(source: Source) -> Excerpt:
     """All of a file as Markdown sees it: LF, U+FFFD for NUL, no byte order mark."""
     excerpt = source.excerpt()
-    return normalized(excerpt.slice(1) if excerpt.text.startswith("\ufeff") else excerpt)
+    return normalize(excerpt.slice(1) if excerpt.text.startswith("\ufeff") else excerpt)
 
 
-def normalized(excerpt: Excerpt) -> Excerpt:
+def normalize(excerpt: Excerpt) -> Excerpt:
     """An excerpt with CommonMark's line ends and without NUL, each character where it was."""
     text = excerpt.text.replace("\r\n", " \n").replace("\r", "\n").replace("\0", "\ufffd")
     return excerpt if text == excerpt.text else Excerpt(excerpt.source, text, excerpt.pieces)

@@ -13,7 +13,7 @@ from typing import Literal
 from markdown_it.common.utils import MD_TRIM_CHARS
 
 from coursebuild.core.model import Cell, Inline, Table
-from coursebuild.core.syntax.spans import PositionedToken, trimmed
+from coursebuild.core.syntax.spans import PositionedToken, trim
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -81,4 +81,4 @@ def _split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
     cells[-1].append(base.slice(at, end))
     found = [Excerpt.join(parts) for parts in cells]
     found = found[not found[0].text :]
-    return [trimmed(cell) for cell in (found if found and found[-1].text else found[:-1])]
+    return [trim(cell) for cell in (found if found and found[-1].text else found[:-1])]

@@ -54,7 +54,7 @@ class Prose(Struct, frozen=True):
         """The inlines of a string; none for a field that is not given."""
         return () if node is None else self._read.get(node, ())
 
-    def each(self, node: Node | None) -> tuple[tuple[Any, ...], ...]:
+    def each_item(self, node: Node | None) -> tuple[tuple[Any, ...], ...]:
         """What the strings of an array hold, blocks or inlines, one after the other."""
         items = node.items if isinstance(node, ArrayNode) else ()
         return tuple(self._read.get(item, ()) for item in items)

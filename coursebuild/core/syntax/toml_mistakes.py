@@ -1,6 +1,6 @@
 """What is wrong with a text that is not TOML, and how to mend it.
 
-Entry points: `mistake_of` (from what `tomllib` says), `place_of`.
+Entry points: `diagnose_syntax` (from what `tomllib` says), `error_offset`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from coursebuild.core.syntax.nodes import odd_character, tex_word
-from coursebuild.core.syntax.wording import short
+from coursebuild.core.syntax.wording import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -26,7 +26,7 @@ _NOTHING = frozenset(("null", "None", "nil", "Null", "NULL"))
 _STRAIGHT = "TOML knows only the straight quotes `\"` and `'`"
 
 
-def place_of(text: str, message: str) -> int:
+def error_offset(text: str, message: str) -> int:
     """The offset that a message of `tomllib` names; the end of the text where it names none."""
     place = _PLACE.search(message)
     if place is None or place[1] is None:
@@ -40,7 +40,7 @@ def double_backslash(command: str) -> str:
     return f"double the backslash: `\\\\{command}`, or put the text between single quotes"
 
 
-def mistake_of(body: Excerpt, message: str, rule: str) -> Diagnostic:
+def diagnose_syntax(body: Excerpt, message: str, rule: str) -> Diagnostic:
     """What is wrong with a text of which `tomllib` says `message`, as a diagnostic of a rule."""
     start, end, words, help = _mistake(body.text, message)
     return diagnose(rule, body.span(start, end), words, help=help)
@@ -51,7 +51,7 @@ _Mistake = tuple[int, int, str, str]
 
 
 def _mistake(text: str, message: str) -> _Mistake:
-    at = place_of(text, message)
+    at = error_offset(text, message)
     char, words = text[at : at + 1], _PLACE.sub("", message)
     if odd := "a lone carriage return" if char == "\r" else odd_character(char):
         help = "remove it" if at == 0 else "replace it by a plain space, or remove it"
@@ -109,7 +109,7 @@ def _no_value(text: str, start: int) -> _Mistake:
     written = scalar[0].rstrip() if scalar else ""
     if not written:
         return start, start, "a value is missing", 'an empty text is written `""`'
-    message = f"`{short(written)}` is not a value of TOML"
+    message = f"`{shorten(written)}` is not a value of TOML"
     return start, start + len(written), message, _value_help(written)
 
 
@@ -124,7 +124,7 @@ def _value_help(written: str) -> str:
         return "a number has no leading zeros, and digits on both sides of its point"
     if '"' in written or "'" in written:
         return ""
-    return f'text stands between quotes: `"{short(written)}"`'
+    return f'text stands between quotes: `"{shorten(written)}"`'
 
 
 def _after_value(text: str, at: int, closer: str) -> _Mistake:
@@ -140,5 +140,5 @@ def _after_value(text: str, at: int, closer: str) -> _Mistake:
 
 def _expected(text: str, at: int, what: str, help: str) -> _Mistake:
     word = _WORD.match(text, at)
-    found = f"`{short(word[0])}`" if word else "the end of the line"
+    found = f"`{shorten(word[0])}`" if word else "the end of the line"
     return at, word.end() if word else at, f"expected {what}, found {found}", help

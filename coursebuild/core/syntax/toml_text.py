@@ -1,6 +1,6 @@
 """TOML, every value with its place.
 
-Entry points: `parse_toml(source)`; `quoted`, a string as TOML has it.
+Entry points: `parse_toml(source)`; `toml_string`, a string as TOML has it.
 
 1. `tomllib` says whether the text is TOML. What is wrong otherwise is told by `toml_mistakes`.
 2. tree-sitter says where keys, values and headers stand. Of these come the nodes that JSON gives
@@ -29,7 +29,7 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
     escaped_string,
 )
-from coursebuild.core.syntax.toml_mistakes import double_backslash, mistake_of, place_of
+from coursebuild.core.syntax.toml_mistakes import diagnose_syntax, double_backslash, error_offset
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Source
 
@@ -55,11 +55,11 @@ def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode
     except RecursionError:
         wrong = diagnose(rule, body.span(0, 0), "tables, arrays or keys nest too deep")
     except ValueError as error:
-        wrong = _repeated_key(body, str(error)) or mistake_of(body, str(error), rule)
+        wrong = _repeated_key(body, str(error)) or diagnose_syntax(body, str(error), rule)
     return Parsed(None, (wrong,))
 
 
-def quoted(text: str) -> str:
+def toml_string(text: str) -> str:
     """A basic string of TOML, which takes the escapes of JSON."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
@@ -68,7 +68,7 @@ def _repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
     """The diagnostic for a key or table that is given twice, if that is what `tomllib` says."""
     if not message.startswith(("Cannot", "Duplicate")):
         return None
-    end = body.text.find("\n", place_of(body.text, message))
+    end = body.text.find("\n", error_offset(body.text, message))
     reader = _Reader(body.slice(0, end if end >= 0 else len(body.text)))
     if reader.root.has_error:
         return None
@@ -226,7 +226,7 @@ class _Reader:
                 return DateNode(self.body, start, end)
 
     def string(self, node: tree_sitter.Node) -> StringNode:
-        quoted = start, end = node.byte_range
+        toml_string = start, end = node.byte_range
         quote = self.text[start]
         width = 3 if end - start >= 6 and self.text.startswith(quote * 3, start) else 1
         content = (start + width, end - width)
@@ -234,7 +234,7 @@ class _Reader:
             content = (content[0] + 1, content[1])
         escapes = _ESCAPE.finditer(self.text, *content) if quote == '"' else ()
         return escaped_string(
-            self.body, quoted, content, escapes, _meaning, double_backslash, self.diagnostics
+            self.body, toml_string, content, escapes, _meaning, double_backslash, self.diagnostics
         )
 
 

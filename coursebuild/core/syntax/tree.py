@@ -19,25 +19,25 @@ from coursebuild.core import model
 from coursebuild.core.syntax.attributes import LABEL, read_label
 from coursebuild.core.syntax.callout import Head, read_head
 from coursebuild.core.syntax.dispatch import fence_block
-from coursebuild.core.syntax.fence import INDENTED_FENCE, is_ours, read_fence
-from coursebuild.core.syntax.headings import Attributes, heading_mistakes, read_attributes
-from coursebuild.core.syntax.html import Balance, media_of, tags
+from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
+from coursebuild.core.syntax.headings import Attributes, check_heading, read_attributes
+from coursebuild.core.syntax.html import Balance, find_media, tags
 from coursebuild.core.syntax.inlines import InlineReader
 from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
-from coursebuild.core.syntax.parsing_state import ParsingState, Written
+from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
+    check_missing_body,
+    check_near_caption,
+    diagnose_missing_caption,
+    diagnose_wrong_body,
     is_caption,
-    near_caption,
-    no_body,
-    no_caption,
-    nothing_recorded,
     read_figure,
     record_fence,
     record_table,
 )
-from coursebuild.core.syntax.safe_html import forbidden_in
-from coursebuild.core.syntax.spans import PositionedToken, locate, normalized, trimmed
+from coursebuild.core.syntax.safe_html import find_forbidden
+from coursebuild.core.syntax.spans import PositionedToken, locate, normalize, trim
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
@@ -67,7 +67,7 @@ class TextReader:
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
                 read = self._later(i + 1)
-                self.session.notes.write(Written(label, label_span, self._span(token), read))
+                self.session.notes.write(FootnoteText(label, label_span, self._span(token), read))
         deep = next((token for token in self.tokens if token.info == TOO_DEEP), None)
         if deep is not None:
             message = "quotes, lists or footnotes nest too deep here"
@@ -111,7 +111,7 @@ class TextReader:
 
     def _content(self, token: PositionedToken) -> Excerpt:
         """The content of a block, without white space at its ends."""
-        return trimmed(locate(self.base, token.rows))
+        return trim(locate(self.base, token.rows))
 
     # -- leaves
 
@@ -125,7 +125,7 @@ class TextReader:
             if recording is not None:
                 return recording
         elif not self.nested and (kind := self._next_kind()) is not None:
-            self.session.diagnostics += near_caption(children, span, kind)
+            self.session.diagnostics += check_near_caption(children, span, kind)
         if not self.nested and content.text.startswith(FIGURE):
             children, shown = read_figure(children, span, self.session.figures)
             return model.Paragraph(span, children, token.hidden, shown)
@@ -149,7 +149,7 @@ class TextReader:
         children = self.inlines.read(attributes.value.title, mentions=False)
         level = int(token.tag[1:])
         session, above = self.session, None if self.nested else self.session.level
-        session.diagnostics += heading_mistakes(span, level, above, children, lesson=session.lesson)
+        session.diagnostics += check_heading(span, level, above, children, lesson=session.lesson)
         if not self.nested:
             session.level = level
         return model.Heading(
@@ -175,7 +175,7 @@ class TextReader:
         if isinstance(block, model.Script) and not block.norun and self._next_kind() == "text":
             below = self.tokens[self.at]
             if below.info.split() == ["text"]:  # its keys are told as what they are
-                self.session.report(no_caption(self._span(below)))
+                self.session.report(diagnose_missing_caption(self._span(below)))
         return block
 
     def _code(self, token: PositionedToken) -> model.CodeBlock:
@@ -191,7 +191,7 @@ class TextReader:
         if opening is None:
             return
         closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
-        if closed and not is_ours(opening[2]):
+        if closed and not is_known_kind(opening[2]):
             return
         message = "this fence is indented by a tab or four blanks, so its block is shown as text"
         help = "take the white space before it away"
@@ -203,7 +203,7 @@ class TextReader:
         """Raw HTML, kept as it is unless it holds formulas."""
         html = locate(self.base, token.rows)
         if self.nested or "$" in html.text:
-            content = trimmed(html, " \t\n")
+            content = trim(html, " \t\n")
             children = self.inlines.read(content, html=True)
             if self.nested or any(isinstance(child, model.Math) for child in children):
                 return model.HtmlFlow(content.span(), children)
@@ -211,7 +211,7 @@ class TextReader:
             for tag in tags(html.text):
                 self.balance.add(tag, html)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
-        return model.HtmlBlock(self._span(token), text, media_of(html), forbidden_in(html))
+        return model.HtmlBlock(self._span(token), text, find_media(html), find_forbidden(html))
 
     def _rule(self, token: PositionedToken) -> model.ThematicBreak:
         return model.ThematicBreak(self._span(token))
@@ -221,7 +221,7 @@ class TextReader:
         start, end = text.text.index("$$") + 2, len(text.text)
         if token.info != "unclosed":
             end = text.text.rindex("$$")
-        tex = trimmed(text.slice(start, end), " \t\n")
+        tex = trim(text.slice(start, end), " \t\n")
         if token.info == "unclosed":
             help = "close it with `$$` on a line below, with no empty line before it"
             place, message = text.span(start - 2, start), "display math is never closed"
@@ -305,9 +305,9 @@ class TextReader:
                 return recording
             case PositionedToken(type="code_block") as token:
                 place = self._span(token).first_line()
-                self.session.report(no_body(place, "an indented block"))
+                self.session.report(diagnose_wrong_body(place, "an indented block"))
             case _:
-                self.session.diagnostics += nothing_recorded(caption, span)
+                self.session.diagnostics += check_missing_body(caption, span)
         return None
 
 
@@ -335,15 +335,15 @@ class Texts:
 
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[model.Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
-        base = normalized(excerpt)
-        return self._session.apart(
+        base = normalize(excerpt)
+        return self._session.collect_diagnostics(
             lambda: TextReader(base, self._session, self._references(), nested=True).read()
         )
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[model.Inline, ...]]:
         """The inlines of a text that is one paragraph at most."""
-        content = trimmed(normalized(excerpt))
-        return self._session.apart(lambda: self._read_inlines(content))
+        content = trim(normalize(excerpt))
+        return self._session.collect_diagnostics(lambda: self._read_inlines(content))
 
     def _read_inlines(self, content: Excerpt) -> tuple[model.Inline, ...]:
         balance = Balance(self._session.report)

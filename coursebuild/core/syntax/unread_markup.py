@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from coursebuild.core.syntax.wording import short
+from coursebuild.core.syntax.wording import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -157,7 +157,7 @@ def _foreign(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Dia
             help = help.replace("note", written.strip("![]?+: \t{}").lower())
         rule = "binding-attribute" if kind == "binding" else "markup-foreign"
         span = content.span(start, start + len(written))
-        yield diagnose(rule, span, f"`{short(written)}` {what}", help=help)
+        yield diagnose(rule, span, f"`{shorten(written)}` {what}", help=help)
 
 
 def _blank(text: str) -> str:

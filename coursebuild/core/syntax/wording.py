@@ -1,7 +1,7 @@
 """How messages call types and the author's values.
 
-Entry points: `Format` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `named`,
-`quoted`, `short`.
+Entry points: `Format` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `format_name`,
+`format_value`, `shorten`.
 """
 
 from __future__ import annotations
@@ -106,20 +106,20 @@ def accepts(type: inspect.Type, node: Node) -> bool:
     return isinstance(node, ArrayNode if kind == "array" else _SIMPLE[kind][2])
 
 
-def short(text: str) -> str:
+def shorten(text: str) -> str:
     """A stretch of the author's text that fits into a message."""
     line = " ".join(text.split())
     return line if len(line) <= _SHORT else line[: _SHORT - 1] + "…"
 
 
-def named(name: str) -> str:
+def format_name(name: str) -> str:
     """A field's name in a message; "the quiz" is no field's, and stays as it is."""
-    return name if name.startswith("the ") else f"`{short(name)}`"
+    return name if name.startswith("the ") else f"`{shorten(name)}`"
 
 
-def quoted(node: Node) -> str:
+def format_value(node: Node) -> str:
     """A value in a message, as the author wrote it."""
-    return f"`{short(node.value if isinstance(node, StringNode) else node.raw)}`"
+    return f"`{shorten(node.value if isinstance(node, StringNode) else node.raw)}`"
 
 
 def wrong_type(node: Node, name: str, type: inspect.Type, format: Format) -> str:
@@ -127,7 +127,7 @@ def wrong_type(node: Node, name: str, type: inspect.Type, format: Format) -> str
     wrong = f"must be {_in_words(type)[0]}, not {_found(node)}"
     if format == TOML:
         wrong = wrong.replace("an object", "a table").replace("objects", "tables")
-    return f"{named(name)} {wrong}"
+    return f"{format_name(name)} {wrong}"
 
 
 def _found(node: Node) -> str:
@@ -139,11 +139,11 @@ def _found(node: Node) -> str:
         case StringNode():
             return "a string"
         case NumberNode():
-            return f"the number {short(node.raw)}"
+            return f"the number {shorten(node.raw)}"
         case DateNode():
             return "a date or time"
         case BoolNode() | NullNode() | ErrorNode():
-            return f"`{short(node.raw)}`"
+            return f"`{shorten(node.raw)}`"
         case _:
             assert_never(node)
 

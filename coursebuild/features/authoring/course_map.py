@@ -17,7 +17,7 @@ from coursebuild.core.model import Course, Lesson
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode
-from coursebuild.core.syntax.toml_text import parse_toml, quoted
+from coursebuild.core.syntax.toml_text import parse_toml, toml_string
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
 from coursebuild.core.text.source import Source
 
@@ -34,7 +34,8 @@ def with_lesson(course: Course, id: str, slug: str, title: str) -> str:
     """
     _check_free(course, id)
     fields = {"id": id, "slug": slug, "title": title, "status": "draft"}
-    lines = ["[[level.lesson]]", *(f"{name} = {quoted(value)}" for name, value in fields.items())]
+    rows = (f"{name} = {toml_string(value)}" for name, value in fields.items())
+    lines = ["[[level.lesson]]", *rows]
     return _checked(course, _inserted(course, id, lines), id)
 
 
@@ -80,12 +81,12 @@ def with_feature(course: Course, path: str) -> str:
         raise UsageError(f"{source.path} cannot be read")
     array = table.get("features")
     if isinstance(array, ArrayNode) and array.items:
-        edit = Edit(array.items[-1].span, f"{array.items[-1].raw}, {quoted(path)}")
+        edit = Edit(array.items[-1].span, f"{array.items[-1].raw}, {toml_string(path)}")
     elif array is not None:
-        edit = Edit(array.span, f"[{quoted(path)}]")
+        edit = Edit(array.span, f"[{toml_string(path)}]")
     else:
         title = table.place("title")
-        line = f"{_line_end(source.text)}features = [{quoted(path)}]"
+        line = f"{_line_end(source.text)}features = [{toml_string(path)}]"
         end = _end_of_line(source.text, title.end)
         edit = Edit(source.span(end, end), line)
     text = apply_edits(source.text, [edit])

@@ -23,7 +23,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.fence import Fence, line_prefix, read_fence
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.markdown import block_tokens
-from coursebuild.core.syntax.spans import PositionedToken, whole
+from coursebuild.core.syntax.spans import PositionedToken, read_markdown
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import fingerprint
@@ -112,7 +112,7 @@ class _Layout:
 
     def __init__(self, source: Source, width: int) -> None:
         self.source, self.width = source, width
-        self.base = whole(source)
+        self.base = read_markdown(source)
         self.tokens = block_tokens(self.base, {})
         self.lines = [source.line_text(n + 1) for n in range(len(source.line_starts))]
         self.done: set[int] = set()

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from coursebuild.core.syntax.json_text import one_line
+from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import ArrayNode, Member, Node, ObjectNode
 
 
 def lay_out(node: Node, width: int, column: int = 0, indent: int = 0) -> str:
     """A value that begins at a column, in an object or list whose members are indented so far."""
-    line = one_line(node).text
+    line = to_one_line(node).text
     parts = _parts(node)
     if not parts or ("\n" not in node.raw and column + len(line) <= width):
         return line

@@ -21,7 +21,7 @@ from coursebuild.core.model import (
     resolve,
 )
 from coursebuild.core.syntax.nodes import ObjectNode, StringNode
-from coursebuild.core.syntax.toml_text import parse_toml, quoted
+from coursebuild.core.syntax.toml_text import parse_toml, toml_string
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.authoring.course_map import id_order
@@ -54,13 +54,13 @@ def _map_edits(course: Course, lesson: Lesson, new: str) -> Iterator[Edit]:
         for node in level.objects("lesson"):
             id = node.get("id")
             if isinstance(id, StringNode) and id.value == lesson.id:
-                yield Edit(id.span, quoted(new))
+                yield Edit(id.span, toml_string(new))
     for other in course.lessons:
         named = zip(other.prerequisites, other.prerequisite_spans, strict=True)
-        yield from (Edit(span, quoted(new)) for name, span in named if name == lesson.id)
+        yield from (Edit(span, toml_string(new)) for name, span in named if name == lesson.id)
     for path in _silenced(root):
         if path.value == lesson.path:
-            yield Edit(path.span, quoted(replace(lesson, id=new).path))
+            yield Edit(path.span, toml_string(replace(lesson, id=new).path))
 
 
 def doubtful_places(

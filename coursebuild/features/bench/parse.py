@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import Word, kind_of
-from coursebuild.core.syntax.spans import trimmed
+from coursebuild.core.syntax.spans import trim
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
 from coursebuild.features.bench.model import PARTS, Bench, BenchPart
@@ -21,7 +21,7 @@ _DEFAULT: tuple[BenchPart, ...] = ("plot", "table")
 
 def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
     """The block; none of a fence that says in a wrong way what to show."""
-    parsed = fence.keys(values=("scenario", "sweep", "show"), named=True)
+    parsed = fence.keys(values=("scenario", "sweep", "show"), has_name=True)
     keys, wrong = parsed.value, list(parsed.diagnostics)
     if keys.name is None:
         message = "a bench needs the name of a model"
@@ -29,7 +29,7 @@ def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
         wrong.append(diagnose("fence-info", kind_of(fence.info).span(), message, help=help))
     show = keys.get("show")
     shows = _DEFAULT if show is None else _parts(show, wrong)
-    body = trimmed(fence.body, " \t\n")
+    body = trim(fence.body, " \t\n")
     if body.text:
         message = "a bench shows what was recorded, and has no text of its own"
         help = "write the text before or after it"

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from msgspec.structs import replace
 
 from coursebuild.core.syntax.course_schema import slug_of
-from coursebuild.core.syntax.toml_text import quoted
+from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.lesson import read_segments
 from coursebuild.features.importer.values import Files, ImportedCourse, ImportedText, title_of_file
 
@@ -69,7 +69,7 @@ def map_lines(
     yield from ("", "[verify]", 'compare = "digits"')
     if callouts:
         yield from ("", "[callouts]")
-        yield from (f"{quoted(kind)} = {quoted(label)}" for kind, label in callouts.items())
+        yield from (f"{toml_string(k)} = {toml_string(label)}" for k, label in callouts.items())
     for level in course.levels:
         yield from ("", "[[level]]")
         yield from _field_lines(id=level.id, title=level.title, summary=level.summary)
@@ -99,8 +99,8 @@ def _status(lesson: ImportedText) -> str:
 def _field_lines(**values: str | tuple[str, ...] | int | None) -> Iterator[str]:
     for name, value in values.items():
         if isinstance(value, tuple) and value:
-            yield f"{name} = [{', '.join(map(quoted, value))}]"
+            yield f"{name} = [{', '.join(map(toml_string, value))}]"
         elif isinstance(value, str) and value:
-            yield f"{name} = {quoted(value)}"
+            yield f"{name} = {toml_string(value)}"
         elif isinstance(value, int):
             yield f"{name} = {value}"

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import FeatureBlock, Inline
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.spans import trimmed
+from coursebuild.core.syntax.spans import trim
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
@@ -87,7 +87,7 @@ def _parts(body: Excerpt) -> list[_Part]:
 def _stray(part: _Part) -> Iterator[Diagnostic]:
     for line in [line for line in part.lines if line.text.strip()][:1]:
         help = "begin with a line `INPUT: …`"
-        span, message = trimmed(line).span(), "this text belongs to no line of the io block"
+        span, message = trim(line).span(), "this text belongs to no line of the io block"
         yield diagnose("io-stray", span, message, help=help)
 
 
@@ -117,5 +117,5 @@ def _missing(
 
 def _text(lines: list[Excerpt]) -> Excerpt | None:
     """The lines of a part as one text without indentation and empty lines; `None` where none is."""
-    parts = [trimmed(line) for line in lines if line.text.strip()]
+    parts = [trim(line) for line in lines if line.text.strip()]
     return Excerpt.join(parts, "\n") if parts else None

@@ -20,7 +20,7 @@ from coursebuild.core.model.fields import Positive
 from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import Word, kind_of
-from coursebuild.core.syntax.json_text import one_line, parse_json
+from coursebuild.core.syntax.json_text import parse_json, to_one_line
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
@@ -51,7 +51,7 @@ _KEYS = {
 
 def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
     """The lab of a fence; its kind may stand after the word `lab`."""
-    keys = fence.keys(named=True)
+    keys = fence.keys(has_name=True)
     name = keys.value.name
     if name is not None and name.key == MJCF:
         return _parse_mjcf(fence, name)
@@ -62,7 +62,7 @@ def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
 
 def _parse_mjcf(fence: Fence, name: Word) -> Parsed[Lab | None]:
     """A lab whose model the reader edits."""
-    keys = fence.keys(values=tuple(_KEYS), flags=("dock", "deep"), named=True)
+    keys = fence.keys(values=tuple(_KEYS), flags=("dock", "deep"), has_name=True)
     found, given = list(keys.diagnostics), dict[str, Any]()
     for word in keys.value.words:
         type, what = _KEYS.get(word.key, (bool, ""))
@@ -102,7 +102,7 @@ def parse_lab(
             common = decoding.value
             fields = SimLab(title=common.title, height=common.height, dock=common.dock)
             note = prose.blocks(node.get("note"))
-            lab = Lab(span, kind, kind_span, one_line(node).text, fields, note)
+            lab = Lab(span, kind, kind_span, to_one_line(node).text, fields, note)
     return Parsed(None if found else lab, sort_diagnostics(found))
 
 
@@ -121,7 +121,7 @@ def sim_lab(
         span=span,
         kind=SIMLAB,
         kind_span=kind_span,
-        config=one_line(node).text,
+        config=to_one_line(node).text,
         fields=fields,
         note=prose.blocks(node.get("note")),
         goal=prose.inlines(goal.get("text") if isinstance(goal, ObjectNode) else None),

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.syntax.fields import one_of, repeated
+from coursebuild.core.syntax.fields import check_unique, require_one_of
 from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.wording import quoted
+from coursebuild.core.syntax.wording import format_value
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.schema import Button, Expect, Plot, Select, SimLab, Slider
 
@@ -25,22 +25,22 @@ Known = Mapping[str, Struct | None]
 
 def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
     """Everything that the types of the fields cannot say."""
-    yield from one_of(node, SimLab, ("model", "xml"))
+    yield from require_one_of(node, SimLab, ("model", "xml"))
     for name in ("toggles", "overlays"):
         strings = [(item.value, item.span) for item in node.strings(name)]
-        yield from repeated(strings, "field-value", "the overlay `{}` is named twice")
+        yield from check_unique(strings, "field-value", "the overlay `{}` is named twice")
     controls = node.objects("controls")
     labels = [(c.get("label"), structs.get(c)) for c in controls]
     named = [(label, struct) for label, struct in labels if isinstance(label, StringNode)]
     spans = [(label.value, label.span) for label, _ in named]
-    yield from repeated(spans, "field-value", "two controls are called `{}`")
+    yield from check_unique(spans, "field-value", "two controls are called `{}`")
     for control in controls:
         match structs.get(control):
             case Slider() as slider:
-                yield from one_of(control, Slider, ("set", "apply", "param"))
+                yield from require_one_of(control, Slider, ("set", "apply", "param"))
                 yield from _check_slider(control, slider)
             case Select() as select:
-                yield from one_of(control, Select, ("set", "apply", "param"))
+                yield from require_one_of(control, Select, ("set", "apply", "param"))
                 yield from _check_select(control, select)
             case _:
                 pass
@@ -79,9 +79,9 @@ def _check_slider(node: ObjectNode, slider: Slider) -> Iterator[Diagnostic]:
 def _check_select(node: ObjectNode, select: Select) -> Iterator[Diagnostic]:
     pairs = [pair.items for pair in node.items("options") if isinstance(pair, ArrayNode)]
     labels = [(o[0], pair[0].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from repeated(labels, "field-value", "two options are called `{}`")
+    yield from check_unique(labels, "field-value", "two options are called `{}`")
     values = [(o[1], pair[1].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from repeated(values, "field-value", "two options have the value `{}`")
+    yield from check_unique(values, "field-value", "two options have the value `{}`")
     given = node.get("value")
     if select.value is not None and given is not None:
         yield from _check_choice(given, "value", select.value, select)
@@ -96,7 +96,7 @@ def _check_choice(
     help = f"the options have {', '.join(f'`{text}`' for text in texts.values())}"
     if value in texts:
         help = f"`{value}` is the label of an option whose value is `{texts[str(value)]}`"
-    message = f"`{name}` cannot be {quoted(node)}: no option has this value"
+    message = f"`{name}` cannot be {format_value(node)}: no option has this value"
     yield diagnose("field-value", node.mark, message, help=help)
 
 
@@ -104,9 +104,9 @@ def _check_expect(node: ObjectNode, known: Known, structs: Structs) -> Iterator[
     claim = structs.get(node)
     if not isinstance(claim, Expect):
         return
-    yield from one_of(node, Expect, ("expr", "diverges"))
+    yield from require_one_of(node, Expect, ("expr", "diverges"))
     if claim.expr is not None:
-        yield from one_of(node, Expect, ("min", "max"), only=False)
+        yield from require_one_of(node, Expect, ("min", "max"), only=False)
     elif claim.min is not None or claim.max is not None:
         name = "min" if claim.min is not None else "max"
         message = f"`{name}` bounds an `expr`, and this claim has none"
@@ -187,7 +187,7 @@ def _check_moved(label: StringNode, value: Node, known: Known) -> Iterator[Diagn
                 yield diagnose("field-value", value.mark, message)
             elif not slider.min <= value.value <= slider.max:
                 bounds = f"{slider.min:g} to {slider.max:g}"
-                message = f"`{label.value}` goes from {bounds}, and cannot be {quoted(value)}"
+                message = f"`{label.value}` goes from {bounds}, and cannot be {format_value(value)}"
                 yield diagnose("field-value", value.mark, message)
         case Select() as select:
             if isinstance(value, NumberNode | StringNode):

@@ -20,8 +20,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.fields import has_value, repeated
-from coursebuild.core.syntax.json_text import one_line, parse_json
+from coursebuild.core.syntax.fields import check_unique, has_value
+from coursebuild.core.syntax.json_text import parse_json, to_one_line
 from coursebuild.core.syntax.nodes import Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
@@ -126,7 +126,7 @@ def _check_ids(nodes: tuple[ObjectNode, ...]) -> Iterator[Diagnostic]:
     named = [(id.value, id.span) for id in given if isinstance(id, StringNode)]
     help = "a learner's answer is kept under it; give each question its own, or none"
     message = "the question id `{}` is used twice in this quiz"
-    yield from repeated(named, "question-id-repeated", message, help=help)
+    yield from check_unique(named, "question-id-repeated", message, help=help)
 
 
 def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnostic]:
@@ -159,7 +159,7 @@ def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterat
         if not 0 <= number < count:
             message = f"there is no option {number}: they are numbered 0 to {count - 1}"
             yield diagnose("quiz-answer", span, message)
-    yield from repeated(named, "quiz-answer", "the option {} is named twice")
+    yield from check_unique(named, "quiz-answer", "the option {} is named twice")
     if fields.feedback is not None and len(fields.feedback) != count:
         texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
         message = f"`feedback` has {texts} for {count} options"
@@ -169,7 +169,7 @@ def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterat
 
 def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagnostic]:
     named = ((item.value.strip(), item.span) for item in node.strings(name))
-    yield from repeated(named, "field-value", message)
+    yield from check_unique(named, "field-value", message)
 
 
 # ------------------------------------------------------------------------------------- questions
@@ -182,7 +182,7 @@ def _question(
     if not isinstance(fields, AnyFields):
         return None
     text, explain = prose.blocks(node.get("q")), prose.blocks(node.get("explain"))
-    common = (node.span, key, fields.label, text, explain, prose.each(node.get("hints")))
+    common = (node.span, key, fields.label, text, explain, prose.each_item(node.get("hints")))
     match fields:
         case MultipleChoice() | Predict():
             sim = node.get("sim")
@@ -201,7 +201,7 @@ def _question(
                 predict=isinstance(fields, Predict),
                 gate=isinstance(fields, Predict) and fields.gate,
                 gate_span=node.place("gate"),
-                run=None if run is None else one_line(run),
+                run=None if run is None else to_one_line(run),
             )
         case Numeric():
             answer: Node | None = node.get("answer")
@@ -215,13 +215,13 @@ def _question(
             return OutputQuestion(*common, fields.of, script, fields.line, line)
         case OrderFields():
             keys = tuple(unique_keys(("item", text) for text in fields.items))
-            return OrderQuestion(*common, prose.each(node.get("items")), keys)
+            return OrderQuestion(*common, prose.each_item(node.get("items")), keys)
         case _:
             assert_never(fields)
 
 
 def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[Choice, ...]:
-    feedback = prose.each(node.get("feedback"))
+    feedback = prose.each_item(node.get("feedback"))
     keys = unique_keys(("option", text) for text in texts)
     return tuple(
         Choice(item.span, key, prose.inlines(item), text)

@@ -15,7 +15,7 @@ from lsprotocol.types import CompletionItemKind as Kind
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.pages.library import Library
 from coursebuild.core.registry import CORE_FENCES, fence_names
-from coursebuild.core.syntax.decode import description
+from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.engine import members
@@ -127,7 +127,7 @@ def _fields(library: Library, place: FieldPlace) -> Mapping[str, str]:
     match place.key:
         case "":
             missing = {n: one for n, one in place.fields.items() if n not in place.given}
-            return {f"{quote}{name}{quote}": description(one.type) for name, one in missing.items()}
+            return {f"{quote}{n}{quote}": field_description(f.type) for n, f in missing.items()}
         case "rule":
             warnings = (rule for rule in RULES.values() if rule.severity == "warning")
             return {f'"{one.name}"': one.summary for one in warnings}

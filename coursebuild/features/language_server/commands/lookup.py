@@ -24,7 +24,7 @@ from coursebuild.core.model.results import Formula, ModelFacts
 from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.scripts.bindings import Printed
 from coursebuild.core.scripts.bound_numbers import Shown
-from coursebuild.core.syntax.decode import description
+from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.glossary.sentences import definition_of
@@ -100,7 +100,7 @@ def _of_field(library: Library, source: Source, offset: int) -> Referent | None:
         return Referent(place.span, title, at, model.LessonTarget(lesson.id, None))
     if key == "rule" and place.text in RULES:
         return Referent(place.span, RULES[place.text].summary)
-    said = "" if key else description(place.field.type)
+    said = "" if key else field_description(place.field.type)
     return Referent(place.span, f"`{place.text}`: {said}") if said else None
 
 

@@ -22,7 +22,7 @@ from coursebuild.core import model
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.pages.library import Library
-from coursebuild.core.syntax.attributes import folded
+from coursebuild.core.syntax.attributes import collapse_spaces
 from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source, Span
@@ -131,7 +131,7 @@ def _term(texts: OpenTexts, id: str, span: Span) -> _Name | None:
         if new != id and new in texts.library.terms:
             raise JsonRpcInvalidParams(f"there is a term `{new}` already")
         start = term.span.start + term.span.text.rindex("{")
-        same = name == folded(model.plain_text(term.children))
+        same = name == collapse_spaces(model.plain_text(term.children))
         edits = [Edit(term.span.source.span(start, term.span.end), _TERM[same].format(name))]
         for link, target in _links(texts):
             if isinstance(target, model.TermTarget) and target.id == id:
