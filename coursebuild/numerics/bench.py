@@ -2,13 +2,13 @@
 
 Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 
-1. A first run in small steps says what acts in a scenario and how far it can be told (`pilot`).
-2. The reference is made, and made again in another way (`references`).
+1. A first run in small steps shows what acts in a scenario and how long its motion can be
+   predicted (`pilot`).
+2. The reference is computed twice, in two ways (`references`).
 3. Every setting is run, judged and compared, then timed beside the model's own (`timing`). The
-   error of a run that was lost is not given; no other is below ten floors of the reference. Errors
-   count to the horizon, and what should be conserved is watched to the end. Errors are also said as
-   a learner sees them: by how far bodies are displaced or turned in a picture, where 1 is just
-   visible.
+   error of a lost run is not given; no other is below ten floors of the reference. Errors count to
+   the horizon, and what should be conserved is watched to the end. Errors are also given as a
+   learner sees them: how far bodies are displaced or turned in a picture, where 1 is just visible.
 4. Orders are fitted, stability limits looked for, the front drawn (`front`).
 """
 
@@ -33,16 +33,16 @@ from coursebuild.numerics.engine import (
     simulate,
 )
 from coursebuild.numerics.front import front, verdict
-from coursebuild.numerics.measure import energy_drift, errors, fitted_orders, momentum_drift
-from coursebuild.numerics.observe import quantity_name, quantity_values, slip, visible_error
-from coursebuild.numerics.pilot import Pilot, pilot
+from coursebuild.numerics.measure import energy_drift, errors, fit_orders, momentum_drift
+from coursebuild.numerics.observe import measure_slip, quantity_name, quantity_values, visible_error
+from coursebuild.numerics.pilot import Pilot, run_pilot
 from coursebuild.numerics.problem import STANDARD, Sizes
 from coursebuild.numerics.references import (
     Cone,
     KnownMotion,
-    energy_beyond,
     find_conserved,
-    references,
+    find_references,
+    mean_late_energy,
 )
 from coursebuild.numerics.reports.bench import (
     FLOORS,
@@ -54,30 +54,30 @@ from coursebuild.numerics.reports.bench import (
 )
 from coursebuild.numerics.reports.text import setting_text
 from coursebuild.numerics.scene import Scene, thickness
-from coursebuild.numerics.settings import own_setting, settings, stable, with_setting
+from coursebuild.numerics.settings import own_setting, settings, stable_rows, with_setting
 from coursebuild.numerics.stability import run_trial
 from coursebuild.numerics.timing import Clock, costs
 from mjcourse.spatial import angular_distance
 
 
 class Basis(Struct, frozen=True, eq=False):
-    """All that is known of a scene before its settings are measured."""
+    """What is known of a scene before its settings are measured."""
 
     model: Any
-    first: Pilot
-    own: MeasuredSetting
+    pilot: Pilot
+    baseline: MeasuredSetting
     """The scene's own setting."""
     cones: Mapping[str, Cone]
     energy: float | None
     """What changes of energy are large against, J; `None` where energy is not conserved."""
     momentum_conserved: bool
-    beyond: float | None
-    """Mean kinetic energy beyond the horizon, J; `None` where nothing is beyond."""
+    late_energy: float | None
+    """Mean kinetic energy after the horizon, J; `None` where it is the end."""
 
     @property
-    def known(self) -> KnownMotion:
+    def reference(self) -> KnownMotion:
         """The reference of the scene's own setting."""
-        return self.cones[self.own.cone].known
+        return self.cones[self.baseline.cone].reference
 
 
 def measure_scenario(
@@ -95,125 +95,132 @@ def measure_scenario(
         scene: the scenario.
         quick: fewer timesteps, fewer repeats.
         clock: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
-        tell: is told what is being done.
+        tell: gets a line about each stage.
 
     Raises:
         SceneError: the scenario does not fit the model, or diverges at every timestep.
     """
     tell(f"{scene.name}: a first run")
-    first = pilot(model, scene)
+    pilot = run_pilot(model, scene)
     tell(f"{scene.name}: the reference")
-    cones = references(model, first, quick=quick)
-    own = own_setting(model, first)
-    known = cones[own.cone].known
-    conserved, beyond = find_conserved(model, first, known), energy_beyond(model, first, known)
-    basis = Basis(model, first, own, cones, *conserved, beyond)
-    found = []
-    for setting in settings(model, first, quick=quick):
+    cones = find_references(model, pilot, quick=quick)
+    baseline = own_setting(model, pilot)
+    reference = cones[baseline.cone].reference
+    conserved, late_energy = (
+        find_conserved(model, pilot, reference),
+        mean_late_energy(model, pilot, reference),
+    )
+    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy)
+    measurements = []
+    for setting in settings(model, pilot, quick=quick):
         tell(f"{scene.name}: {setting_text(setting)}")
-        found.append(_measured(basis, setting))
-    rows = tuple(row for row, _ in found)
+        measurements.append(_measure_setting(basis, setting))
+    rows = tuple(row for row, _ in measurements)
     if clock is not None:
         tell(f"{scene.name}: times")
-        rows = _timed(basis, rows, clock, quick)
+        rows = _with_costs(basis, rows, clock, quick)
     tell(f"{scene.name}: stable timesteps")
-    largest = stable(model, first, quick=quick)
+    largest = stable_rows(model, pilot, quick=quick)
     rows = front(rows)
-    judged = verdict(rows, [noticeable for _, noticeable in found])
+    judgement = verdict(rows, [noticeable for _, noticeable in measurements])
     if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
         rows = tuple(replace(row, cost=None) for row in rows)
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
         duration=scene.scenario.duration,
-        horizon=known.horizon,
+        horizon=reference.horizon,
         hold=scene.scenario.hold,
-        reference=known.kind,
-        source=known.source,
-        floor=known.floor.place,
-        velocity_floor=known.floor.velocity,
-        second=known.second,
-        agreement=known.agreement,
-        lyapunov=first.lyapunov,
-        horizons=None if first.lyapunov is None else first.horizons,
-        smooth=first.smooth,
+        reference=reference.kind,
+        source=reference.source,
+        floor=reference.floor.place,
+        velocity_floor=reference.floor.velocity,
+        second=reference.second,
+        agreement=reference.agreement,
+        lyapunov=pilot.lyapunov,
+        horizons=None if pilot.lyapunov is None else pilot.horizons,
+        smooth=pilot.smooth,
         notes=_notes(basis, largest),
         figure=quantity_name(model, scene),
         rows=rows,
-        orders=_orders(basis, rows) if first.smooth else (),
+        orders=_fit_orders(basis, rows) if pilot.smooth else (),
         stable=largest,
-        verdict=judged,
+        verdict=judgement,
     )
 
 
 def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
     """What to know when reading the figures."""
-    model, first, known = basis.model, basis.first, basis.known
-    notes = [known.note]
-    if first.jumps:
-        reasons = ", ".join(first.jumps)
+    model, pilot, reference = basis.model, basis.pilot, basis.reference
+    notes = [reference.note]
+    if pilot.jumps:
+        reasons = ", ".join(pilot.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
-    if known.horizon < first.scene.scenario.duration * (1 - 1e-9):
-        notes.append(f"errors count until {known.horizon:.6g} s: the motion is not known beyond")
-    driven = driving_force(model, first.scene.scenario)
+    if reference.horizon < pilot.scene.scenario.duration * (1 - 1e-9):
+        notes.append(
+            f"errors count until {reference.horizon:.6g} s: the motion is not known beyond"
+        )
+    driven = driving_force(model, pilot.scene.scenario)
     if driven:
         notes.append(f"energy is not judged: {driven}")
-    states = np.abs(np.hstack([known.states.qpos, known.states.qvel, known.states.act]))
+    states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
     if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
         notes.append("the state holds subnormal numbers, with which processors are slow")
-    soft = refsafe_from(model) if first.constrained else math.inf
-    if any((one.searched[1] if one.largest is None else one.largest) > soft for one in largest):
+    soft = refsafe_from(model) if pilot.constrained else math.inf
+    if any((row.searched[1] if row.largest is None else row.largest) > soft for row in largest):
         notes.append(f"beyond {soft:.6g} s refsafe softens constraints: stable, but another model")
     return tuple(note for note in notes if note)
 
 
-def _timed(
+def _with_costs(
     basis: Basis, rows: Sequence[WorkPrecisionRow], clock: Clock, quick: bool
 ) -> tuple[WorkPrecisionRow, ...]:
-    """Rows with what usable settings cost; where the own one is not, relative to the first."""
+    """Add the costs of usable settings, relative to the scene's own, or to the first without it."""
     usable = [index for index, row in enumerate(rows) if row.status == "ok"]
     if not usable:
         return tuple(rows)
-    own = next((n for n, index in enumerate(usable) if rows[index].own), 0)
+    baseline = next((n for n, index in enumerate(usable) if rows[index].own), 0)
     settings = [rows[index].setting for index in usable]
-    scene = basis.first.scene
-    spent = costs(basis.model, scene, settings, own, clock, quick=quick)
-    found = list(rows)
-    for index, timing in zip(usable, spent, strict=True):
+    scene = basis.pilot.scene
+    timings = costs(basis.model, scene, settings, baseline, clock, quick=quick)
+    timed_rows = list(rows)
+    for index, timing in zip(usable, timings, strict=True):
         seconds = timing.nanoseconds.scaled(1e-9 / scene.scenario.duration)
-        found[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
-    return tuple(found)
+        timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
+    return tuple(timed_rows)
 
 
-def _orders(basis: Basis, found: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
-    own, known = basis.own, basis.known
-    motion = known.motion
-    turned = angular_distance(motion.attitude[:1], motion.attitude)
+def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
+    baseline, reference = basis.baseline, basis.reference
+    motion = reference.motion
+    angles = angular_distance(motion.attitude[:1], motion.attitude)
     extent = Sizes(
         float(np.linalg.norm(np.ptp(motion.position, axis=0))),
-        float(turned.max(initial=0.0)),
+        float(angles.max(initial=0.0)),
         float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
     )
     orders = []
     for integrator in STANDARD:
         runs = [
             (row.setting.timestep, row)
-            for row in found
-            if (row.setting.integrator, row.setting.solving) == (integrator.value, own.solving)
+            for row in rows
+            if (row.setting.integrator, row.setting.solving) == (integrator.value, baseline.solving)
         ]
-        orders.append(fitted_orders(integrator.value, runs, known.floor, extent))
+        orders.append(fit_orders(integrator.value, runs, reference.floor, extent))
     return tuple(orders)
 
 
-def _measured(basis: Basis, setting: MeasuredSetting) -> tuple[WorkPrecisionRow, bool | None]:
-    """Run a scene under a setting, and compare it with its reference; its cost is not known yet.
+def _measure_setting(
+    basis: Basis, setting: MeasuredSetting
+) -> tuple[WorkPrecisionRow, bool | None]:
+    """Run a scene under a setting and compare it with its reference; the cost is added later.
 
-    Also whether a learner sees the error of the setting, for the scene's own with that of its cone;
-    `None` where the reference is not known well enough.
+    The flag says whether a learner sees the error, for the scene's own setting with that of its
+    cone; `None` where the reference is not known well enough.
     """
-    model, first, cone = basis.model, basis.first, basis.cones[setting.cone]
-    one = with_setting(model, setting)
-    steps, energy = round(first.scene.scenario.duration / setting.timestep), basis.energy
+    model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
+    variant = with_setting(model, setting)
+    steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
     unknown = dict.fromkeys(("figure", "energy_drift", "momentum_drift", "slip", "cost", "seconds"))
     unknown |= dict.fromkeys(("position", "attitude", "velocity", "growth", "dominated_by"))
     row = WorkPrecisionRow(  # as of a run that MuJoCo refuses
@@ -223,13 +230,13 @@ def _measured(basis: Basis, setting: MeasuredSetting) -> tuple[WorkPrecisionRow,
         reasons=(),
         penetration=0.0,
         model_error=cone.model_error,
-        refsafe=first.constrained and refsafe_active(one),
+        refsafe=pilot.constrained and refsafe_active(variant),
         steps=steps,
-        own=setting == basis.own,
+        own=setting == basis.baseline,
         front=False,
     )
     try:
-        run = simulate(first.setup, one, thickness(model))
+        run = simulate(pilot.setup, variant, thickness(model))
     except mujoco.FatalError as error:
         return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
     row = replace(
@@ -238,7 +245,7 @@ def _measured(basis: Basis, setting: MeasuredSetting) -> tuple[WorkPrecisionRow,
         reasons=run.judgement.reasons,
         energy_drift=None if energy is None else energy_drift(run, energy),
         momentum_drift=momentum_drift(run) if basis.momentum_conserved else None,
-        mean_energy=_mean_energy(run, cone.known.horizon, basis.beyond),
+        mean_energy=_mean_energy(run, cone.reference.horizon, basis.late_energy),
         penetration=run.penetration,
     )
     if not run.judgement.ok:
@@ -249,48 +256,52 @@ def _measured(basis: Basis, setting: MeasuredSetting) -> tuple[WorkPrecisionRow,
 def _with_errors(
     basis: Basis, row: WorkPrecisionRow, run: Run
 ) -> tuple[WorkPrecisionRow, bool | None]:
-    """With the errors of a run that went well."""
-    model, scene, cone = basis.model, basis.first.scene, basis.cones[row.setting.cone]
-    known = cone.known
-    states = run.states.head(len(known.states.times))
-    found = errors(motion_of(model, states), known.motion, known.floor)
-    floor = FLOORS * visible_error(model, scene, known.states, known.other)
-    shown = visible_error(model, scene, states, known.states)
-    noticeable = None if max(1, shown) <= floor else shown >= 1
-    if row.own and cone.seen >= 1:
+    """Add the errors of a run that went well."""
+    model, scene, cone = basis.model, basis.pilot.scene, basis.cones[row.setting.cone]
+    reference = cone.reference
+    states = run.states.head(len(reference.states.times))
+    run_errors = errors(motion_of(model, states), reference.motion, reference.floor)
+    floor = FLOORS * visible_error(model, scene, reference.states, reference.second_states)
+    visible = visible_error(model, scene, states, reference.states)
+    noticeable = None if max(1, visible) <= floor else visible >= 1
+    if row.own and cone.visible_model_error >= 1:
         noticeable = True
-    creep = None if cone.sticks is None else slip(model, scene, states, cone.sticks)
+    creep = None if cone.sticks is None else measure_slip(model, scene, states, cone.sticks)
     row = replace(
         row,
-        **asdict(found),
-        figure=_quantity(basis, states, known),
-        seen=max(shown, floor) + cone.seen,
+        **asdict(run_errors),
+        figure=_quantity_error(basis, states, reference),
+        seen=max(visible, floor) + cone.visible_model_error,
         slip=creep,
     )
     return row, noticeable
 
 
 def _mean_energy(run: Run, horizon: float, expected: float | None) -> float | None:
-    """Mean kinetic energy from the horizon to the end, relative to what it should be, less 1."""
-    later = run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1]
-    if expected is None or len(later) < 2 or not np.isfinite(later).all():
+    """Mean kinetic energy from the horizon to the end, relative to the expected one, less 1."""
+    energies = run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1]
+    if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
         return None
-    return float(later.mean()) / expected - 1
+    return float(energies.mean()) / expected - 1
 
 
 def _growth(basis: Basis, setting: MeasuredSetting) -> float | None:
-    """By what velocities were multiplied in a step, where they grew."""
-    first, model = basis.first, with_setting(basis.model, setting)
-    growth = run_trial(first.setup, model, first.setup.scenario.duration).growth
+    """The factor by which velocities grew in a step; `None` where they did not."""
+    pilot, model = basis.pilot, with_setting(basis.model, setting)
+    growth = run_trial(pilot.setup, model, pilot.setup.scenario.duration).growth
     return growth if math.isfinite(growth) and growth > 1 else None
 
 
-def _quantity(basis: Basis, states: EngineStates, known: KnownMotion) -> tuple[float, float] | None:
-    """The error of what the scenario declares to be measured."""
-    model, scene = basis.model, basis.first.scene
+def _quantity_error(
+    basis: Basis, states: EngineStates, reference: KnownMotion
+) -> tuple[float, float] | None:
+    """The error of the quantity that the scenario declares, at its largest and at the end."""
+    model, scene = basis.model, basis.pilot.scene
     if not quantity_name(model, scene):
         return None
-    exact, other = (quantity_values(model, scene, s) for s in (known.states, known.other))
-    floor = FLOORS * float(np.linalg.norm(exact - other, axis=1).max())
+    exact, second = (
+        quantity_values(model, scene, s) for s in (reference.states, reference.second_states)
+    )
+    floor = FLOORS * float(np.linalg.norm(exact - second, axis=1).max())
     apart = np.linalg.norm(quantity_values(model, scene, states) - exact, axis=1)
     return max(float(apart.max()), floor), max(float(apart[-1]), floor)

@@ -34,7 +34,7 @@ from coursebuild.numerics.forward import forward_motion
 from coursebuild.numerics.measure import (
     energy_drift,
     errors,
-    fitted_orders,
+    fit_orders,
     largest_errors,
     momentum_drift,
     reference_motion,
@@ -74,14 +74,17 @@ class DisagreementError(ArithmeticError):
 
 
 def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport:
-    """Everything that there is to measure on a problem.
+    """Measure everything on a problem.
 
     Raises:
         DisagreementError: its two references differ by more than they may.
     """
     first, second = problem.reference, _second_reference(problem)
     reference = ReferenceLine(first.kind, first.source, second.source, *astuple(floor(problem)))
-    runs = {one: [measure(problem, one, h) for h in problem.timesteps] for one in STANDARD}
+    runs = {
+        integrator: [measure(problem, integrator, h) for h in problem.timesteps]
+        for integrator in STANDARD
+    }
     return CaseReport(
         name=problem.name,
         title=problem.title,
@@ -91,7 +94,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         reference=reference,
         boundaries=boundaries(problem),
         figures=tuple(
-            _checked(check, integrator)
+            _measure_figure(check, integrator)
             for check in problem.checks
             for integrator in check.integrators
         ),
@@ -104,44 +107,44 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
 def _costs(
     problem: Problem, runs: Mapping[Integrator, Sequence[ErrorLine]], clock: Clock
 ) -> tuple[StepCost, ...]:
-    """What a step takes, at the longest timestep of which the run went well."""
+    """The time of a step, at the longest timestep with which the run went well."""
     jobs, names, counts = [], [], []
     for integrator, lines in runs.items():
-        step = next((one.timestep for one in lines if one.status == "ok"), None)
+        step = next((line.timestep for line in lines if line.status == "ok"), None)
         if step is not None:
             model = compile_model(problem.mjcf, integrator, step)
             state = full_state(model, initial_data(problem.scenario, model))
             jobs.append(scenario_job(model, [(problem.scenario, state)], step))
             names.append(integrator.value)
             counts.append(round(problem.scenario.duration / step))
-    found = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
+    timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
     return tuple(
-        StepCost(name, one.nanoseconds.scaled(1e-9 / count))
-        for name, count, one in zip(names, counts, found, strict=True)
+        StepCost(name, line.nanoseconds.scaled(1e-9 / count))
+        for name, count, line in zip(names, counts, timings, strict=True)
     )
 
 
 def _note(problem: Problem) -> str:
     model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     driven = problem.search and driving_force(model, problem.scenario)
-    said = (problem.note, f"energy is not judged: {driven}" if driven else "")
-    return "; ".join(one for one in said if one)
+    parts = (problem.note, f"energy is not judged: {driven}" if driven else "")
+    return "; ".join(part for part in parts if part)
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:
     """Run a problem and compare it with its reference.
 
     Raises:
-        ValueError: the timestep (s) does not divide the interval of the looks.
+        ValueError: the timestep (s) does not divide the sampling interval.
     """
     model = compile_model(problem.mjcf, integrator, timestep)
     run = simulate(problem, model)
-    found = Errors(None, None, None)
+    run_errors = Errors(None, None, None)
     if run.judgement.ok:
         exact = reference_motion(problem.reference, tuple(run.states.times.tolist()))
-        found = errors(motion_of(model, run.states), exact, floor(problem))
+        run_errors = errors(motion_of(model, run.states), exact, floor(problem))
     return ErrorLine(
-        **asdict(found),
+        **asdict(run_errors),
         integrator=integrator.value,
         timestep=timestep,
         status=run.judgement.status.value,
@@ -154,20 +157,17 @@ def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorL
 
 
 def orders(problem: Problem, lines: Sequence[ErrorLine]) -> OrderRow:
-    """Orders of the integrator that the lines are of.
-
-    None where the problem is not smooth: a slope would say nothing there.
-    """
+    """The orders of the integrator of these lines; none where the problem is not smooth."""
     integrator = lines[0].integrator
     if not problem.smooth:
         return OrderRow(integrator, None, None, None)
-    runs = [(one.timestep, one) for one in lines]
-    return fitted_orders(integrator, runs, floor(problem))
+    runs = [(line.timestep, line) for line in lines]
+    return fit_orders(integrator, runs, floor(problem))
 
 
 @lru_cache(maxsize=64)
 def floor(problem: Problem) -> Sizes:
-    """What the motion is not known better than: how far its two references are apart.
+    """How well the motion is known: the distance of its two references.
 
     Raises:
         DisagreementError: they differ by more than they may, so that one of them is wrong.
@@ -177,9 +177,9 @@ def floor(problem: Problem) -> Sizes:
     second = _second_reference(problem).motion(problem.mjcf, problem.scenario, times)
     gap = largest_errors(errors(second, exact))
     for part in ("position", "attitude", "velocity"):
-        found, most = getattr(gap, part), getattr(problem.precision, part)
-        if not found <= most:
-            message = f"the references of `{problem.name}` differ by {found:.2g} in {part}"
+        difference, most = getattr(gap, part), getattr(problem.precision, part)
+        if not difference <= most:
+            message = f"the references of `{problem.name}` differ by {difference:.2g} in {part}"
             raise DisagreementError(f"{message}, where {most:.0e} is said")
     return gap.at_least(ROUNDING)
 
@@ -188,17 +188,17 @@ def _second_reference(problem: Problem) -> SecondReference:
     return problem.second or _ENGINE
 
 
-def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
-    found, exact = check.measure(integrator), check.expected(integrator)
+def _measure_figure(check: ScalarCheck, integrator: Integrator) -> FigureLine:
+    figure, exact = check.measure(integrator), check.expected(integrator)
     spread = None
-    if not isinstance(found, float):
-        low, found, high = np.quantile(found, (0.1, 0.5, 0.9), method="nearest").tolist()
+    if not isinstance(figure, float):
+        low, figure, high = np.quantile(figure, (0.1, 0.5, 0.9), method="nearest").tolist()
         spread = (low, high) if math.isfinite(high) else None
     return FigureLine(
         check.name,
         check.unit,
         integrator.value,
-        found if math.isfinite(found) else None,
+        figure if math.isfinite(figure) else None,
         exact,
         check.source,
         spread,
@@ -206,28 +206,28 @@ def _checked(check: ScalarCheck, integrator: Integrator) -> FigureLine:
 
 
 def closed_motion(
-    model: Any, scene: Scene, declared: DeclaredScenario, times: Array
+    model: Any, scene: Scene, declaration: DeclaredScenario, times: Array
 ) -> tuple[Problem, Motion]:
-    """The hard case that a scenario names, and its motion begun where the scene begins.
+    """The hard case that a scenario names, and its motion from where the scene begins.
 
     Raises:
         SceneError: the scene begins otherwise than the hard case, but for the place of free bodies.
     """
-    problem, place = all_problems()[declared.closed], declared.place("reference")
-    there = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
-    if (there.jnt_type.tolist(), there.nq) != (model.jnt_type.tolist(), model.nq):
-        message = f"the model has other joints than the hard case `{declared.closed}`"
+    problem, place = all_problems()[declaration.closed], declaration.place("reference")
+    case_model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
+    if (case_model.jnt_type.tolist(), case_model.nq) != (model.jnt_type.tolist(), model.nq):
+        message = f"the model has other joints than the hard case `{declaration.closed}`"
         raise SceneError(message, place)
-    here, start = _start(model, scene.scenario), _start(there, problem.scenario)
-    shift = here.position - start.position
+    scene_start, case_start = _start(model, scene.scenario), _start(case_model, problem.scenario)
+    shift = scene_start.position - case_start.position
     of_free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
     widths = np.where(of_free, 3, model.jnt_type != mujoco.mjtJoint.mjJNT_BALL)
-    free = np.repeat(of_free, widths)
-    speeds = np.abs(here.velocity - start.velocity).max(initial=0.0)
-    if np.abs(shift[:, ~free]).max(initial=0.0) > 1e-9 or speeds > 1e-9:
-        message = f"the scenario begins otherwise than the hard case `{declared.closed}`"
+    free_columns = np.repeat(of_free, widths)
+    speeds = np.abs(scene_start.velocity - case_start.velocity).max(initial=0.0)
+    if np.abs(shift[:, ~free_columns]).max(initial=0.0) > 1e-9 or speeds > 1e-9:
+        message = f"the scenario begins otherwise than the hard case `{declaration.closed}`"
         raise SceneError(message, place, "its closed form holds for its own beginning only")
-    turn = quat_mul(here.attitude, quat_conj(start.attitude))
+    turn = quat_mul(scene_start.attitude, quat_conj(case_start.attitude))
     motion = problem.reference.solution.motion(times)
     attitude = quat_mul(turn, motion.attitude)
     return problem, Motion(times, motion.position + shift, attitude, motion.velocity)

@@ -1,14 +1,14 @@
-"""MuJoCo run for measuring: one integrator, one timestep, looked at on a fixed grid of times.
+"""Run MuJoCo for measuring: one integrator, one timestep, states sampled on a fixed grid of times.
 
 Entry points: `compile_model`, `with_integrator`, `initial_data`, `simulate`, `advance`,
 `advance_watching`, `motion_of`, `refsafe_active`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
-2. Energy and momentum belong to the state at the moment: `mjData.energy` after `mj_step` is that of
-   the state before the step, so it is computed again, on other data, from the state sampled.
-3. Steps between two looks are made in one call.
+2. Energy and momentum belong to the sampled state: `mjData.energy` after `mj_step` is that of the
+   state before the step, so it is computed again, on other data.
+3. Steps between two samples are made in one call.
 4. MuJoCo writes a warning to standard error and into a file in the working directory; here it is
-   counted, and said by the judgement.
+   counted, and becomes part of the judgement.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.detector import Peaks, RunJudgement, deepest_contact, judge, peaks
+from coursebuild.numerics.detector import Peaks, RunJudgement, deepest_contact, judge, update_peaks
 from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
 
 _CODE = {
@@ -37,7 +37,7 @@ _CODE = {
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the next step depends on."""
 _WATCHED = 8
-"""Steps from one look at the state to the next."""
+"""Steps from one look at the state to the next, as a rule."""
 
 
 @lru_cache(maxsize=64)
@@ -72,11 +72,13 @@ def set_integrator(model: Any, integrator: Integrator, timestep: float) -> None:
 
 def integrator_of(model: Any) -> Integrator:
     """The integrator that a model has."""
-    return next(one for one, code in _CODE.items() if int(code) == int(model.opt.integrator))
+    return next(
+        integrator for integrator, code in _CODE.items() if int(code) == int(model.opt.integrator)
+    )
 
 
 class silent:  # noqa: N801 - used as a function, and quicker than a generator
-    """Nothing that MuJoCo warns of is printed meanwhile."""
+    """A context in which MuJoCo prints no warnings."""
 
     __slots__ = ("before",)
 
@@ -98,25 +100,25 @@ def advance_watching(
     model: Any,
     data: Any,
     steps: int,
-    seen: Peaks,
+    peaks: Peaks,
     thickness: Array | None = None,
     *,
-    every: int = _WATCHED,
+    interval: int = _WATCHED,
     setup: Setup | None = None,
 ) -> tuple[Peaks, int]:
-    """Make so many steps; no more once the state is no number, or beyond what can be in a setup.
+    """Make so many steps; stop once the state is not finite, or out of the bounds of a setup.
 
-    Gives the most that was seen, with what was `seen` before, and how many steps were made. Looks
-    at every eighth state, or more seldom: what shoots up takes longer to come back.
+    Returns the updated `peaks` and the number of steps made. Only one state per `interval` is
+    looked at, which suffices: what shoots up takes longer to come back.
     """
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    done = 0
-    while done < steps and (seen.finite if setup is None else seen.within(setup)):
-        part = min(every, steps - done)
+    steps_made = 0
+    while steps_made < steps and (peaks.finite if setup is None else peaks.is_within(setup)):
+        part = min(interval, steps - steps_made)
         advance(model, data, part)
-        done += part
-        seen = peaks(data, seen, thickness)
-    return seen, done
+        steps_made += part
+        peaks = update_peaks(data, peaks, thickness)
+    return peaks, steps_made
 
 
 def initial_data(scenario: Scenario, model: Any) -> Any:
@@ -135,7 +137,7 @@ def initial_data(scenario: Scenario, model: Any) -> Any:
 
 
 def full_state(model: Any, data: Any) -> Array:
-    """What `STATE` says, as it is now."""
+    """The present state, as `STATE` selects it."""
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     return state
@@ -154,13 +156,13 @@ class EngineStates(Struct, frozen=True):
     """(n, na): activations of actuators."""
 
     def head(self, count: int) -> EngineStates:
-        """Only the first."""
+        """The first `count` of the states."""
         parts = (self.times, self.qpos, self.qvel, self.act)
         return EngineStates(*(part[:count] for part in parts))
 
 
 def coordinates(model: Any) -> tuple[list[int], list[int]]:
-    """Where positions stand in `qpos`, and where quaternions begin."""
+    """The indices in `qpos` of positions, and of the beginnings of quaternions."""
     places: list[int] = []
     turns: list[int] = []
     for kind, start in zip(model.jnt_type, model.jnt_qposadr, strict=True):
@@ -185,18 +187,18 @@ def motion_of(model: Any, states: EngineStates) -> Motion:
     return Motion(states.times, states.qpos[:, places], attitude, states.qvel)
 
 
-def states_of(model: Any, motion: Motion, like: EngineStates) -> EngineStates:
-    """A motion in the engine's coordinates; activations as in a like motion."""
+def states_of(model: Any, motion: Motion, template: EngineStates) -> EngineStates:
+    """A motion in the engine's coordinates; what it does not hold comes from the template."""
     places, turns = coordinates(model)
-    qpos = like.qpos.copy()
+    qpos = template.qpos.copy()
     qpos[:, places] = motion.position
     for index, at in enumerate(turns):
         qpos[:, at : at + 4] = motion.attitude[:, index]
-    return EngineStates(motion.times, qpos, motion.velocity, like.act)
+    return EngineStates(motion.times, qpos, motion.velocity, template.act)
 
 
 class Run(Struct, frozen=True):
-    """A simulation, looked at n times."""
+    """A simulation, sampled n times."""
 
     states: EngineStates
     energy: Array
@@ -209,46 +211,46 @@ class Run(Struct, frozen=True):
 
 
 def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
-    """Run a scenario with a model, under the options that it has; `thickness` as for `peaks`.
+    """Run a scenario with a model under its own options; `thickness` as for `update_peaks`.
 
     Raises:
-        ValueError: its timestep does not divide the interval of the looks.
+        ValueError: its timestep does not divide the sampling interval.
     """
     scenario, step = setup.scenario, float(model.opt.timestep)
-    every, times = scenario.steps(step), scenario.times
-    data, other = initial_data(scenario, model), initial_data(scenario, model)
+    steps_per_sample, times = scenario.steps(step), scenario.times
+    data, scratch = initial_data(scenario, model), initial_data(scenario, model)
     qpos, qvel, act = (np.full((len(times), n), np.nan) for n in (model.nq, model.nv, model.na))
     table = np.full((len(times) + 1, 5), np.nan)
-    table[0] = invariants(model, other, data.qpos, data.qvel)
-    seen, steps = Peaks(penetration=deepest_contact(other)), 0
+    table[0] = invariants(model, scratch, data.qpos, data.qvel)
+    peaks, steps = Peaks(penetration=deepest_contact(scratch)), 0
     for index in range(len(times)):
         if scenario.controls:
             data.ctrl[:] = scenario.command(index)
-        seen, done = advance_watching(model, data, every, seen, thickness)
-        steps += done
-        if not seen.finite:
+        peaks, steps_made = advance_watching(model, data, steps_per_sample, peaks, thickness)
+        steps += steps_made
+        if not peaks.finite:
             break
         qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act
-        table[index + 1] = invariants(model, other, data.qpos, data.qvel)
+        table[index + 1] = invariants(model, scratch, data.qpos, data.qvel)
         # Where a step ends, its contacts are still those of its beginning.
-        seen = replace(seen, penetration=max(seen.penetration, deepest_contact(other)))
-    judgement = judge(model, data, steps * step, seen, setup)
+        peaks = replace(peaks, penetration=max(peaks.penetration, deepest_contact(scratch)))
+    judgement = judge(model, data, steps * step, peaks, setup)
     states = EngineStates(times, qpos, qvel, act)
-    return Run(states, table[:, :2], table[:, 2:], seen.penetration, judgement)
+    return Run(states, table[:, :2], table[:, 2:], peaks.penetration, judgement)
 
 
-def invariants(model: Any, other: Any, qpos: Array, qvel: Array) -> Array:
+def invariants(model: Any, scratch: Any, qpos: Array, qvel: Array) -> Array:
     """Potential and kinetic energy (J) and angular momentum (kg m²/s) of a state: (5,).
 
-    `other` is data that nothing else uses.
+    `scratch` is `mjData` that nothing else uses.
     """
-    other.qpos[:], other.qvel[:] = qpos, qvel
-    mujoco.mj_fwdPosition(model, other)
-    mujoco.mj_fwdVelocity(model, other)
-    mujoco.mj_energyPos(model, other)
-    mujoco.mj_energyVel(model, other)
-    mujoco.mj_subtreeVel(model, other)
-    return np.concatenate([other.energy, other.subtree_angmom[0]])
+    scratch.qpos[:], scratch.qvel[:] = qpos, qvel
+    mujoco.mj_fwdPosition(model, scratch)
+    mujoco.mj_fwdVelocity(model, scratch)
+    mujoco.mj_energyPos(model, scratch)
+    mujoco.mj_energyVel(model, scratch)
+    mujoco.mj_subtreeVel(model, scratch)
+    return np.concatenate([scratch.energy, scratch.subtree_angmom[0]])
 
 
 def refsafe_active(model: Any) -> bool:
@@ -263,7 +265,7 @@ def refsafe_from(model: Any) -> float:
     """The timestep beyond which MuJoCo may soften a constraint, s; infinite where there is none.
 
     Unless `refsafe` is off it raises time constants to two timesteps: that is stable, and another
-    model. Said of geoms that can touch, equalities, limits and dry friction.
+    model. It concerns geoms that can touch, equalities, limits and dry friction.
     """
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE):
         return math.inf

@@ -32,7 +32,7 @@ from coursebuild.numerics.pilot import position_distances
 from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
 
 AGREED = 1e-6
-"""As near as the engine must come, in rad or relative to the extent, unless smaller steps bring it
+"""How near the engine must come, in rad or relative to the extent, unless smaller steps bring it
 nearer."""
 NEARER = 0.75
 """The part of a difference that half the timestep may leave: half in first order, and some room."""
@@ -76,10 +76,10 @@ def forward_states(
     for begin, end, command in _holds(scenario, float(times[-1])):
         if command:
             data.ctrl[:] = command
-        here = (times > begin + 1e-12) & (times <= end + 1e-12)
-        offsets = np.append(times[here] - begin, end - begin)
+        selected = (times > begin + 1e-12) & (times <= end + 1e-12)
+        offsets = np.append(times[selected] - begin, end - begin)
         part = method(rate, state, np.maximum.accumulate(offsets))
-        states[here] = part[:-1]
+        states[selected] = part[:-1]
         state = part[-1]
     nq, nv = int(model.nq), int(model.nv)
     qpos = states[:, :nq].copy()
@@ -89,16 +89,16 @@ def forward_states(
 
 
 def _holds(scenario: Scenario, end: float) -> list[tuple[float, float, tuple[float, ...]]]:
-    """From when to when which commands hold, s."""
+    """The beginnings and ends (s) of the intervals in which commands hold, with the commands."""
     if not scenario.controls:
         return [(0.0, end, ())]
-    found = []
+    holds = []
     for index, command in enumerate(scenario.controls):
         begin = index * scenario.hold
         until = begin + scenario.hold if index + 1 < len(scenario.controls) else end
         if begin < end:
-            found.append((begin, min(until, end), command))
-    return found
+            holds.append((begin, min(until, end), command))
+    return holds
 
 
 def _rate(model: Any, data: Any, evaluations: float) -> Rate:
@@ -107,15 +107,15 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
     places, turns = coordinates(model)
     turning = np.isin(model.jnt_type, _TURNING)
     # A free joint has three velocities of its place before those that turn it.
-    free = model.jnt_type[turning] == mujoco.mjtJoint.mjJNT_FREE
-    first = (model.jnt_dofadr[turning] + 3 * free).tolist()
+    is_free = model.jnt_type[turning] == mujoco.mjtJoint.mjJNT_FREE
+    first = (model.jnt_dofadr[turning] + 3 * is_free).tolist()
     moves = np.setdiff1d(np.arange(model.nv), [dof + k for dof in first for k in range(3)])
-    done = 0
+    count = 0
 
     def rate(state: State) -> State:
-        nonlocal done
-        done += 1
-        if done > evaluations:
+        nonlocal count
+        count += 1
+        if count > evaluations:
             raise NoConvergenceError(f"it takes more than {evaluations:g} evaluations")
         slope = np.empty_like(state)
         qvel = state[nq:end]
@@ -139,7 +139,7 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
 _TURNING = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
 
 
-def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parted: float) -> bool:
+def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parting: float) -> bool:
     """Whether the engine comes nearer to these states, the smaller its steps are.
 
     Two integrations over the same accelerations agree also where these are not the engine's own, as
@@ -150,16 +150,16 @@ def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parted
         setup: the scenario, as long as the states.
         states: at its samples.
         step: s; the longest to try.
-        parted: the difference at which motions are compared, where it grows beyond: later they have
-            nothing in common, however small the steps.
+        parting: the difference at which motions are compared, where it grows beyond: later they
+            have nothing in common, however small the steps.
     """
     before = _gaps(model, setup, states, step)
     if before.max() <= AGREED:
         return True
     for part in _PARTS:
         now = _gaps(model, setup, states, step / part)
-        beyond = np.flatnonzero(before > parted)
-        at = int(beyond[0]) if beyond.size else int(np.argmax(before))
+        apart = np.flatnonzero(before > parting)
+        at = int(apart[0]) if apart.size else int(np.argmax(before))
         if now[at] <= max(NEARER * before[at], AGREED):
             return True
         before = now
@@ -167,12 +167,12 @@ def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parted
 
 
 def _gaps(model: Any, setup: Setup, states: EngineStates, step: float) -> Array:
-    """How far the engine is from these states at every sample: (n,); see `position_distance`."""
+    """The distance of the engine from the states at each sample: (n,); see `position_distance`."""
     for integrator in (Integrator.RK4, Integrator.IMPLICITFAST):
         try:
-            found = simulate(setup, with_integrator(model, integrator, step)).states
+            engine_states = simulate(setup, with_integrator(model, integrator, step)).states
         except mujoco.FatalError:  # it does not run with everything
             continue
-        if np.isfinite(found.qpos).all():
-            return position_distances(model, found.qpos, states.qpos)
+        if np.isfinite(engine_states.qpos).all():
+            return position_distances(model, engine_states.qpos, states.qpos)
     return np.full(len(states.times), np.inf)

@@ -1,6 +1,7 @@
 """Which settings are worth their cost, and what that says of the scene's own.
 
-Entry points: `front(rows)`, rows with their places; `verdict(rows, noticeable)`.
+Entry points: `front(rows)`, rows that know whether they are on the front;
+`verdict(rows, noticeable)`.
 
 A setting is dominated where another costs no more and errs no more, and is clearly better in one of
 the two. Costs whose intervals meet do not differ, nor do those within 3 % or errors within 5 %.
@@ -24,46 +25,46 @@ Rows: TypeAlias = Sequence[WorkPrecisionRow]
 
 
 class FrontPoint(Struct, frozen=True):
-    """Where a setting is in the plot."""
+    """The place of a setting in the plot."""
 
     cost: Interval
     error: float
 
-    def beats(self, other: FrontPoint) -> bool:
-        """Whether one is clearly better in one respect, and no worse in the other."""
-        exacter = self.error * (1 + ERROR_SLACK) < other.error
-        no_worse = self.error <= other.error * (1 + ERROR_SLACK)
-        return (self.cheaper(other) and no_worse) or (exacter and not other.cheaper(self))
+    def beats(self, rival: FrontPoint) -> bool:
+        """Whether this is clearly better in one respect, and no worse in the other."""
+        exacter = self.error * (1 + ERROR_SLACK) < rival.error
+        no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
+        return (self.is_cheaper(rival) and no_worse) or (exacter and not rival.is_cheaper(self))
 
-    def cheaper(self, other: FrontPoint) -> bool:
-        """Whether it costs less, beyond what can be told."""
-        apart = self.cost.high < other.cost.low
-        return apart and self.cost.value * (1 + COST_SLACK) < other.cost.value
+    def is_cheaper(self, rival: FrontPoint) -> bool:
+        """Whether this costs less, beyond what timing can tell."""
+        apart = self.cost.high < rival.cost.low
+        return apart and self.cost.value * (1 + COST_SLACK) < rival.cost.value
 
 
 def _place(row: WorkPrecisionRow) -> FrontPoint | None:
-    """What a setting costs, and its error; `None` where it was lost, or not timed."""
+    """The cost and error of a setting; `None` where it was lost, or not timed."""
     if row.cost is None or row.seen is None:
         return None
     return FrontPoint(row.cost, row.seen if row.figure is None else row.figure[0])
 
 
 def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
-    """Rows with what is known of their places: which no other dominates, and which one does."""
+    """Rows that say whether they are on the front, and otherwise which row dominates them."""
     places = {n: place for n, row in enumerate(rows) if (place := _place(row)) is not None}
     better = {
-        n: [m for m, other in places.items() if other.beats(mine)] for n, mine in places.items()
+        n: [m for m, rival in places.items() if rival.beats(mine)] for n, mine in places.items()
     }
 
     def worth(n: int) -> tuple[float, int]:
         return places[n].cost.value * places[n].error, n
 
-    found = []
+    placed_rows = []
     for n, row in enumerate(rows):
-        others = better.get(n, [])
-        best = min([m for m in others if not better[m]] or others, key=worth, default=None)
-        found.append(replace(row, front=n in better and not others, dominated_by=best))
-    return tuple(found)
+        rivals = better.get(n, [])
+        best = min([m for m in rivals if not better[m]] or rivals, key=worth, default=None)
+        placed_rows.append(replace(row, front=n in better and not rivals, dominated_by=best))
+    return tuple(placed_rows)
 
 
 def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
@@ -71,54 +72,59 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
 
     `noticeable`: whether a learner sees the error of a row; `None` where that is not known.
     """
-    own = next(number for number, row in enumerate(rows) if row.own)
-    row, seen = rows[own], noticeable[own]
+    own_index = next(number for number, row in enumerate(rows) if row.own)
+    row, is_noticeable = rows[own_index], noticeable[own_index]
     if row.reasons:
-        return _lost(rows, row)
-    error = None if seen is None else row.seen
-    mine, told = _place(row), _noticed(error)
+        return _verdict_of_lost(rows, row)
+    error = None if is_noticeable is None else row.seen
+    mine, remark = _place(row), _describe_error(error)
     if mine is None:
         text = "nothing was timed, so that no setting can be called better"
-        return RowVerdict(False, None, None, None, seen, text + told)
+        return RowVerdict(False, None, None, None, is_noticeable, text + remark)
     if error is not None and error >= 1:
-        told += _enough(
+        remark += _cheapest_unseen(
             rows,
             mine.cost.value,
             hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
         )
     if row.dominated_by is None:
         text = "no other setting is cheaper without being less accurate"
-        return RowVerdict(True, None, None, None, seen, text + told)
+        return RowVerdict(True, None, None, None, is_noticeable, text + remark)
     better = rows[row.dominated_by]
-    other = _place(better)
-    assert other is not None
-    ratios = other.cost.value / mine.cost.value, other.error / mine.error if mine.error else 1.0
-    text = f"{setting_text(better.setting)} is {_compared(*ratios)}"
-    return RowVerdict(False, row.dominated_by, *ratios, seen, text + told)
+    better_place = _place(better)
+    assert better_place is not None
+    ratios = (
+        better_place.cost.value / mine.cost.value,
+        better_place.error / mine.error if mine.error else 1.0,
+    )
+    text = f"{setting_text(better.setting)} is {_describe_ratios(*ratios)}"
+    return RowVerdict(False, row.dominated_by, *ratios, is_noticeable, text + remark)
 
 
-def _enough(rows: Rows, own: float, *, hopeless: bool) -> str:
-    """With what a learner would notice nothing, where something is noticed now."""
+def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
+    """The cheapest setting with an error that no learner notices, in words."""
     unseen = [row for row in rows if row.seen is not None and row.seen < 1 and row.cost is not None]
     if not unseen:
         return ", and that of every other setting too" if hopeless else ""
     cost, least = min((row.cost.value, n) for n, row in enumerate(unseen) if row.cost)
-    name, times = setting_text(unseen[least].setting), f"{cost / own:.2g} times its cost"
+    name, times = setting_text(unseen[least].setting), f"{cost / own_cost:.2g} times its cost"
     return f"; the cheapest without one that is seen is {name}, at {times}"
 
 
-def _lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
-    """Of an own setting under which the scene does not run; the best one that does is named."""
+def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
+    """The verdict on a scene that does not run under its own setting: the best that does."""
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
-    found = [(p.error, p.cost.value, n) for n, r in enumerate(rows) if r.front and (p := _place(r))]
-    better = min(found)[2] if found else None
+    candidates = [
+        (p.error, p.cost.value, n) for n, r in enumerate(rows) if r.front and (p := _place(r))
+    ]
+    better = min(candidates)[2] if candidates else None
     if better is not None:
         text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
     return RowVerdict(False, better, None, None, None, text)
 
 
-def _compared(cost: float, error: float) -> str:
+def _describe_ratios(cost: float, error: float) -> str:
     cheap = f"takes {cost:.2g} of the time" if cost < 1 / 1.005 else "takes no more time"
     if error < 1 / (1 + ERROR_SLACK):
         exact = f"errs {1 / error:.2g} times less" if 1 / error < 1e4 else "errs far less"
@@ -127,9 +133,9 @@ def _compared(cost: float, error: float) -> str:
     return f"better: it {cheap} and {exact}"
 
 
-def _noticed(seen: float | None) -> str:
-    if seen is None:
+def _describe_error(error: float | None) -> str:
+    if error is None:
         return "; whether a learner would notice its error is not known"
-    if seen >= 1:
-        return f"; a learner would notice its error, which is {seen:.2g} times what can be seen"
-    return f"; a learner would not notice its error, which is {seen:.2g} of what can be seen"
+    if error >= 1:
+        return f"; a learner would notice its error, which is {error:.2g} times what can be seen"
+    return f"; a learner would not notice its error, which is {error:.2g} of what can be seen"

@@ -62,14 +62,14 @@ def bulirsch_stoer(
     exact = start.dtype == object
     y, now, trial = start.copy(), Decimal(0) if exact else 0.0, first
     carry = np.zeros_like(y)
-    found = []
+    states = []
     for time in times.tolist():
         goal: Any = Decimal(time) if exact else time
         while now < goal:
             left = float(goal - now)
             whole = trial >= left * (1 - 1e-12)
             step: Any = goal - now if whole else (Decimal(trial) if exact else trial)
-            change, error = _extrapolated(rate, y, step, columns)
+            change, error = _extrapolate(rate, y, step, columns)
             ratio = error / tolerance
             if not ratio <= 1.0:  # also when it is no number
                 factor = _SAFETY * ratio ** (-1 / (2 * columns - 1)) if ratio < 1e300 else _SHRINK
@@ -83,11 +83,11 @@ def bulirsch_stoer(
             now = goal if whole else now + step
             grown = float(step) * min(_GROW, _SAFETY * max(ratio, 1e-12) ** (-1 / (2 * columns)))
             trial = max(trial, grown) if whole else grown
-        found.append(y.copy())
-    return np.array(found)
+        states.append(y.copy())
+    return np.array(states)
 
 
-def _extrapolated(rate: Rate, y: State, step: Any, columns: int) -> tuple[State, float]:
+def _extrapolate(rate: Rate, y: State, step: Any, columns: int) -> tuple[State, float]:
     """The change of y over a step, and its estimated error relative to 1 + |y|."""
     with np.errstate(over="ignore", invalid="ignore"):  # a step too long is made again
         slope = rate(y)
@@ -95,8 +95,8 @@ def _extrapolated(rate: Rate, y: State, step: Any, columns: int) -> tuple[State,
         for j in range(1, columns + 1):
             new = [_midpoint(rate, y, slope, step, 2 * j)]
             for k in range(1, j):
-                more, fewer = j * j, (j - k) * (j - k)
-                new.append(new[-1] + (new[-1] - rows[k - 1]) * fewer / (more - fewer))
+                fine, coarse = j * j, (j - k) * (j - k)
+                new.append(new[-1] + (new[-1] - rows[k - 1]) * coarse / (fine - coarse))
             rows = new
         size = 1.0 + np.abs(y.astype(float))
         error = np.max(np.abs((rows[-1] - rows[-2]).astype(float)) / size)
@@ -123,7 +123,7 @@ def dop853(rate: Rate, start: Array, times: Array) -> Array:
     from scipy.integrate import DOP853  # which few commands need
 
     y, now, step = start, 0.0, math.inf
-    found = []
+    states = []
     for time in times.tolist():
         if time > now:
             first = min(step, time - now) if math.isfinite(step) else None
@@ -136,8 +136,8 @@ def dop853(rate: Rate, start: Array, times: Array) -> Array:
             if solver.status == "failed":
                 raise NoConvergenceError(f"no step is small enough at {solver.t:.6g} s")
             y, now = solver.y, time
-        found.append(y)
-    return np.array(found)
+        states.append(y)
+    return np.array(states)
 
 
 _NODES = 20

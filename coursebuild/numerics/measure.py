@@ -1,12 +1,12 @@
 """How far a motion is from its reference, what orders that shows, and what drifts.
 
-Entry points: `errors`, `largest_errors`, `fitted_orders`; `energy_drift`, `momentum_drift`.
+Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`.
 
 1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
    of fourth order in velocity and of second in attitude.
-2. No error is given below ten times what the reference itself may be wrong by.
+2. No error is given below ten times the floor, by which the reference itself may be off.
 3. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
-   rounding is measured, beyond 0.1 the asymptotic law does not hold yet. It is told only where
+   rounding is measured, beyond 0.1 the asymptotic law does not hold yet. It is given only where
    those errors lie on a line, in a logarithmic plot.
 """
 
@@ -24,53 +24,58 @@ from coursebuild.numerics.reports.bench import FLOORS, Errors, FittedOrder, Orde
 from mjcourse.spatial import angular_distance
 
 _LOWEST, _HIGHEST = 100.0, 0.1
-"""Where an order is fitted: over so many floors, and under so much."""
+"""An order is fitted to errors over so many floors, and under so much."""
 _FEWEST = 4
 """Errors that an order needs."""
 _UNCERTAIN, _BENT = 0.25, 0.25
-"""The widest half interval of an order, and the largest bend, with which it is told."""
+"""The widest half interval of an order, and the largest bend, with which it is given."""
 
 _ZEROS, _ONES = Sizes(0.0, 0.0, 0.0), Sizes(1.0, 1.0, 1.0)
 
 
 @lru_cache(maxsize=64)
 def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
-    """What a reference says at these times (s); computed once."""
+    """The motion of a reference at these times (s); computed once."""
     return reference.solution.motion(np.array(times))
 
 
 def errors(motion: Motion, exact: Motion, floor: Sizes = _ZEROS) -> Errors:
-    """How far a motion is from another at the same times; no error is below ten floors."""
-    moved, faster = motion.position - exact.position, motion.velocity - exact.velocity
-    turned = angular_distance(exact.attitude, motion.attitude)
+    """The errors of a motion against an exact one at the same times; none is below ten floors."""
+    displacements, speed_differences = (
+        motion.position - exact.position,
+        motion.velocity - exact.velocity,
+    )
+    angles = angular_distance(exact.attitude, motion.attitude)
 
     def pair(distances: Array, floor: float) -> tuple[float, float]:
         least = FLOORS * floor
         return max(float(np.max(distances)), least), max(float(distances[-1]), least)
 
     return Errors(
-        pair(np.linalg.norm(moved, axis=1), floor.position) if moved.size else None,
-        pair(np.max(turned, axis=1), floor.attitude) if turned.size else None,
-        pair(np.linalg.norm(faster, axis=1), floor.velocity) if faster.size else None,
+        pair(np.linalg.norm(displacements, axis=1), floor.position) if displacements.size else None,
+        pair(np.max(angles, axis=1), floor.attitude) if angles.size else None,
+        pair(np.linalg.norm(speed_differences, axis=1), floor.velocity)
+        if speed_differences.size
+        else None,
     )
 
 
-def largest_errors(found: Errors) -> Sizes:
-    """The largest of each; 0 for what is not there."""
-    parts = (found.position, found.attitude, found.velocity)
+def largest_errors(motion_errors: Errors) -> Sizes:
+    """The largest error of each part; 0 for a part that is missing."""
+    parts = (motion_errors.position, motion_errors.attitude, motion_errors.velocity)
     return Sizes(*(0.0 if part is None else part[0] for part in parts))
 
 
-def fitted_order(
-    timesteps: Sequence[float], found: Sequence[float], floor: float, extent: float = 1.0
+def fit_order(
+    timesteps: Sequence[float], errors: Sequence[float], floor: float, extent: float = 1.0
 ) -> FittedOrder | None:
-    """The order that errors found at timesteps (s) show.
+    """The order that errors at timesteps (s) show.
 
     Args:
         timesteps: in any order.
-        found: errors there.
-        floor: what the reference may be wrong by, in the unit of the errors.
-        extent: how much the motion changes: an error as large is no small one.
+        errors: one for each timestep.
+        floor: how far the reference may be off, in the unit of the errors.
+        extent: how much the motion changes, to know which errors are small.
 
     Returns:
         `None` where fewer than four errors are between a hundred floors and a tenth of 1 and of the
@@ -80,7 +85,7 @@ def fitted_order(
 
     usable = [
         (math.log(h), math.log(error))
-        for h, error in sorted(zip(timesteps, found, strict=True))
+        for h, error in sorted(zip(timesteps, errors, strict=True))
         if max(_LOWEST * floor, 1e-300) < error < _HIGHEST * min(1.0, extent)
     ]
     if len(usable) < _FEWEST:
@@ -96,7 +101,7 @@ def fitted_order(
     return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
 
 
-def fitted_orders(
+def fit_orders(
     integrator: str,
     runs: Sequence[tuple[float, Errors]],
     floor: Sizes,
@@ -104,15 +109,19 @@ def fitted_orders(
 ) -> OrderRow:
     """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count.
 
-    `floor` and `extent` as for `fitted_order`.
+    `floor` and `extent` as for `fit_order`.
     """
 
-    def fitted(part: str) -> FittedOrder | None:
-        known = [(h, pair[0]) for h, one in runs if (pair := getattr(one, part)) is not None]
-        steps, found = [h for h, _ in known], [error for _, error in known]
-        return fitted_order(steps, found, getattr(floor, part), getattr(extent, part))
+    def fit(part: str) -> FittedOrder | None:
+        pairs = [
+            (h, pair[0])
+            for h, run_errors in runs
+            if (pair := getattr(run_errors, part)) is not None
+        ]
+        steps, errors = [h for h, _ in pairs], [error for _, error in pairs]
+        return fit_order(steps, errors, getattr(floor, part), getattr(extent, part))
 
-    return OrderRow(integrator, fitted("position"), fitted("attitude"), fitted("velocity"))
+    return OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
 
 
 def energy_drift(run: Run, scale: float | None = None) -> float | None:
@@ -130,12 +139,12 @@ def energy_drift(run: Run, scale: float | None = None) -> float | None:
 
 
 def energy_scale(run: Run) -> float:
-    """The kinetic energy at the beginning, or its largest where it begins at rest, J."""
+    """The kinetic energy at the beginning, J; where that is 0, its largest."""
     return float(run.energy[0, 1]) or float(np.max(run.energy[:, 1]))
 
 
 def momentum_drift(run: Run) -> float | None:
-    """The largest change of angular momentum, relative to what it was."""
+    """The largest change of angular momentum, relative to its initial size."""
     scale = float(np.linalg.norm(run.momentum[0]))
     if not np.isfinite(run.momentum).all() or scale == 0:
         return None

@@ -1,7 +1,7 @@
-"""What is looked at in the states of a scene: errors in a picture, declared quantities, contacts.
+"""What is derived from the states of a scene: visible errors, declared quantities, contacts.
 
 Entry points: `visible_error(model, scene, states, exact)`; `quantity_name`, `quantity_values`, of
-what a scenario declares to be measured; `sticking` and `slip`.
+what a scenario declares to be measured; `find_sticks` and `measure_slip`.
 
 1. In the reference, two geoms stick to each other between two samples where a point in which they
    touch hardly moves along the surface, at both of them. A body that rolls sticks too.
@@ -27,10 +27,10 @@ def visible_error(model: Any, scene: Scene, states: EngineStates, exact: EngineS
     """The largest displacement or turn of a body in a picture, where 1 is just visible."""
     place, turn = _picture(model, states)
     exact_place, exact_turn = _picture(model, exact)
-    moved = float(np.linalg.norm(place - exact_place, axis=2).max(initial=0.0))
-    turned = float(angular_distance(exact_turn, turn).max(initial=0.0))
+    displacement = float(np.linalg.norm(place - exact_place, axis=2).max(initial=0.0))
+    angle = float(angular_distance(exact_turn, turn).max(initial=0.0))
     length = scene.bench.visible * max(float(model.stat.extent), 1e-15)
-    return max(moved / length, turned / math.radians(scene.bench.visible_angle))
+    return max(displacement / length, angle / math.radians(scene.bench.visible_angle))
 
 
 def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:
@@ -50,15 +50,15 @@ def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:
 
 
 def quantity_name(model: Any, scene: Scene) -> str:
-    """What the scenario measures, with its unit in brackets; empty where nothing is declared."""
-    wanted = scene.declared.measured
-    if wanted is None:
+    """The declared quantity of a scenario, with its unit in brackets; empty without one."""
+    quantity = scene.declaration.measured
+    if quantity is None:
         return ""
-    if wanted.kind != "sensor":
-        return f"place of the {wanted.kind} {wanted.name} [m]"
-    kind = mujoco.mjtSensor(int(model.sensor(wanted.name).type[0]))
+    if quantity.kind != "sensor":
+        return f"place of the {quantity.kind} {quantity.name} [m]"
+    kind = mujoco.mjtSensor(int(model.sensor(quantity.name).type[0]))
     unit = _UNITS.get(kind.name.removeprefix("mjSENS_"), "")
-    return f"sensor {wanted.name}" + (f" [{unit}]" if unit else "")
+    return f"sensor {quantity.name}" + (f" [{unit}]" if unit else "")
 
 
 _UNITS = {
@@ -87,31 +87,31 @@ _UNITS = {
 
 
 def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
-    """What the scenario measures, at every sample: (n, d)."""
-    wanted = scene.declared.measured
-    assert wanted is not None
+    """The declared quantity of a scenario at every sample: (n, d)."""
+    quantity = scene.declaration.measured
+    assert quantity is not None
     data = initial_data(scene.scenario, model)
-    found = []
+    values = []
     rows = zip(states.qpos, states.qvel, states.act, strict=True)
     for look, (qpos, qvel, act) in enumerate(rows):
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
         if scene.scenario.controls:
             data.ctrl[:] = scene.scenario.command(look)
         mujoco.mj_forward(model, data)
-        match wanted.kind:
+        match quantity.kind:
             case "body":
-                found.append(data.body(wanted.name).xpos.copy())
+                values.append(data.body(quantity.name).xpos.copy())
             case "site":
-                found.append(data.site(wanted.name).xpos.copy())
+                values.append(data.site(quantity.name).xpos.copy())
             case _:
-                found.append(data.sensor(wanted.name).data.copy())
-    return np.array(found)
+                values.append(data.sensor(quantity.name).data.copy())
+    return np.array(values)
 
 
 Pair: TypeAlias = tuple[int, int]
 """Two geoms, by number."""
 Sticks: TypeAlias = tuple[frozenset[Pair], ...]
-"""For every interval between two samples, and that before the first, the pairs that stick in it."""
+"""The pairs that stick in every interval between two samples, the first one before any sample."""
 
 _SLOW = 0.01
 """A point that sticks moves slower than this part of the speed of a fall through the model's
@@ -120,54 +120,58 @@ _STILL = 1e-3
 """m/s, where nothing falls."""
 
 
-def sticking(model: Any, scene: Scene, states: EngineStates) -> Sticks:
-    """What sticks in a motion, from sample to sample."""
+def find_sticks(model: Any, scene: Scene, states: EngineStates) -> Sticks:
+    """The pairs of geoms that stick in a motion, from sample to sample."""
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
     slow = [
-        frozenset(pair for pair, speed in found.items() if speed < max(_SLOW * fall, _STILL))
-        for found in speeds_of(model, scene, states)
+        frozenset(pair for pair, speed in speeds.items() if speed < max(_SLOW * fall, _STILL))
+        for speeds in surface_speeds(model, scene, states)
     ]
     return tuple(slow[max(0, i - 1)] & slow[i] for i in range(len(slow)))
 
 
-def slip(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> float:
+def measure_slip(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> float:
     """The largest creep, m, of a pair that sticks in the reference."""
     total: dict[Pair, float] = {}
     before = 0.0
-    for time, found, pairs in zip(
-        states.times.tolist(), speeds_of(model, scene, states), sticks, strict=False
+    for time, speeds, pairs in zip(
+        states.times.tolist(), surface_speeds(model, scene, states), sticks, strict=False
     ):
         for pair in pairs:
-            total[pair] = total.get(pair, 0.0) + found.get(pair, 0.0) * (time - before)
+            total[pair] = total.get(pair, 0.0) + speeds.get(pair, 0.0) * (time - before)
         before = time
     return max(total.values(), default=0.0)
 
 
-def speeds_of(model: Any, scene: Scene, states: EngineStates) -> list[dict[Pair, float]]:
+def surface_speeds(model: Any, scene: Scene, states: EngineStates) -> list[dict[Pair, float]]:
     """At every sample the least speed along the surface, m/s, of pairs of geoms that touch."""
     data = initial_data(scene.scenario, model)
-    found = []
+    least_speeds = []
     for qpos, qvel, act in zip(states.qpos, states.qvel, states.act, strict=True):
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
         least: dict[Pair, float] = {}
-        for contact in touching(data):
+        for contact in touching_contacts(data):
             if contact.dim >= 3:  # with friction
                 pair = (int(contact.geom[0]), int(contact.geom[1]))
-                _, along = speeds(model, data, contact)
-                least[pair] = min(along, least.get(pair, math.inf))
-        found.append(least)
-    return found
+                _, speed = contact_speeds(model, data, contact)
+                least[pair] = min(speed, least.get(pair, math.inf))
+        least_speeds.append(least)
+    return least_speeds
 
 
-def touching(data: Any) -> list[Any]:
+def touching_contacts(data: Any) -> list[Any]:
     """Contacts of geoms that touch; not those of a flex, or where only the margins do."""
-    return [one for one in data.contact[: data.ncon] if min(one.geom) >= 0 and one.dist <= 0]
+    return [
+        contact
+        for contact in data.contact[: data.ncon]
+        if min(contact.geom) >= 0 and contact.dist <= 0
+    ]
 
 
-def speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
-    """How fast two geoms part, and move along each other's surface, at a contact's place, m/s."""
+def contact_speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
+    """The speeds (m/s) with which two geoms part, and slide along each other, at a contact."""
     first, second = (int(geom) for geom in contact.geom)
     relative = _velocity(model, data, second, contact.pos)
     relative = relative - _velocity(model, data, first, contact.pos)
@@ -178,7 +182,7 @@ def speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
 
 def _velocity(model: Any, data: Any, geom: int, point: Array) -> Array:
     """The velocity (3,) of a geom's material at a point of the world, m/s."""
-    found = np.zeros(6)
-    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, found, 0)
-    velocity: Array = found[3:] + np.cross(found[:3], point - data.geom_xpos[geom])
+    twist = np.zeros(6)
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, twist, 0)
+    velocity: Array = twist[3:] + np.cross(twist[:3], point - data.geom_xpos[geom])
     return velocity

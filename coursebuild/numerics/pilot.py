@@ -1,14 +1,14 @@
-"""A first run of a scene, in small steps: what acts in it, how far it can be told, what can be.
+"""A first run of a scene in small steps: what acts in it, its horizon, the bounds of its states.
 
-Entry point: `pilot(model, scene)`.
+Entry point: `run_pilot(model, scene)`.
 
-1. Every step is looked at: a contact, a limit that is reached or dry friction makes accelerations
+1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
    jump, so that errors follow no power of the timestep and no smooth integration applies.
-2. Beside it run eight twins whose beginnings are off by 1e-10, in four directions, to both sides.
-   Where the first of them is a tenth away, errors of trajectories mean nothing any more: that is
-   the horizon. The growth until there is the largest Lyapunov exponent, about.
-3. What was seen of positions, and of energy where nothing drives the motion, else of velocities,
-   says what can be, with room for coarse timesteps.
+2. Eight twins begin 1e-10 away, in four directions, to both sides. Where the first of them is a
+   tenth away, errors of trajectories mean nothing any more: that is the horizon. The growth until
+   there gives about the largest Lyapunov exponent.
+3. The largest positions, and the largest energy where nothing drives the motion, else velocity,
+   give the bounds, with room for coarse timesteps.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.detector import Peaks, driving_force, peaks
+from coursebuild.numerics.detector import Peaks, driving_force, update_peaks
 from coursebuild.numerics.engine import advance, initial_data, integrator_of, with_integrator
 from coursebuild.numerics.problem import ROOM, Array, Scenario, Setup
 from coursebuild.numerics.scene import Scene, SceneError
 
 NUDGE = 1e-10
-"""Of a twin's beginning: rad, or relative to the model's extent; velocities likewise, per s."""
+"""How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
 _DIRECTIONS = 4
-"""In which beginnings are nudged, each to both sides."""
+"""How many directions beginnings are nudged in, each to both sides."""
 APART = 0.1
-"""Where two motions have nothing in common any more: rad, or relative to the model's extent."""
+"""The distance at which two motions have nothing in common any more: rad, or relative to the
+model's extent."""
 _RESTING = 0.01
 """What moves slower than this part of the speed of a fall through the model's extent is at rest."""
 _SELDOM = 8
@@ -42,7 +43,7 @@ class Pilot(Struct, frozen=True):
 
     scene: Scene
     setup: Setup
-    """The scenario, and the most that can be in it."""
+    """The scenario, with bounds of its states."""
     contact: bool
     """Whether anything touched."""
     constrained: bool
@@ -50,14 +51,14 @@ class Pilot(Struct, frozen=True):
     jumps: tuple[str, ...]
     """What makes accelerations jump, in words; none: the scene is smooth."""
     horizons: tuple[float, float]
-    """s, multiples of the sample: until where the first and the last twin stay near; the duration
-    for one that stays near to the end."""
+    """s, multiples of the sample: how long the first and the last twin stay near; the duration for
+    one that stays near to the end."""
     lyapunov: float | None
     """1/s, of the middle one of the twins that part; `None` where all stay near."""
 
     @property
     def horizon(self) -> float:
-        """s: until where all twins stay near."""
+        """s: how long all twins stay near."""
         return self.horizons[0]
 
     @property
@@ -66,43 +67,43 @@ class Pilot(Struct, frozen=True):
         return not self.jumps
 
 
-def pilot(model: Any, scene: Scene) -> Pilot:
+def run_pilot(model: Any, scene: Scene) -> Pilot:
     """Run a scene at its shortest timestep under its own integrator.
 
     Raises:
         SceneError: it diverges even there.
     """
     step, scenario = min(scene.timesteps), scene.scenario
-    own = with_integrator(model, integrator_of(model), step)
-    own.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    data, twins = initial_data(scenario, own), _twins(own, scenario)
-    look = _Observer(own)
-    seen = Peaks()
-    times, every = scenario.times, scenario.steps(step)
+    variant = with_integrator(model, integrator_of(model), step)
+    variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    data, twins = initial_data(scenario, variant), _twins(variant, scenario)
+    look = _Observer(variant)
+    peaks = Peaks()
+    times, steps_per_sample = scenario.times, scenario.steps(step)
     gaps = np.full((len(twins), len(times)), np.nan)
     for index in range(len(times)):
         command = scenario.command(index)
-        for one in (data, *twins) if command else ():
-            one.ctrl[:] = command
-        for number in range(every):
-            advance(own, data)
+        for copy in (data, *twins) if command else ():
+            copy.ctrl[:] = command
+        for number in range(steps_per_sample):
+            advance(variant, data)
             look(data)
-            if number % _SELDOM == 0 or number == every - 1:
-                seen = peaks(data, seen)
-        if not seen.finite:
+            if number % _SELDOM == 0 or number == steps_per_sample - 1:
+                peaks = update_peaks(data, peaks)
+        if not peaks.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
         for twin, gap in zip(twins, gaps, strict=True):
             if index == 0 or gap[index - 1] < APART:
-                advance(own, twin, every)
-                gap[index] = position_distance(own, data.qpos, twin.qpos)
+                advance(variant, twin, steps_per_sample)
+                gap[index] = position_distance(variant, data.qpos, twin.qpos)
     horizons, rates = zip(*(_horizon(times, gap) for gap in gaps), strict=True)
     grown = [rate for rate in rates if rate is not None]
     return Pilot(
         scene=scene,
-        setup=_bounds(own, scenario, seen),
+        setup=_bounds(variant, scenario, peaks),
         contact=look.contact,
         constrained=look.constrained,
-        jumps=look.jumps(own),
+        jumps=look.jumps(variant),
         horizons=(min(horizons), max(horizons)),
         lyapunov=float(np.median(grown)) if grown else None,
     )
@@ -121,23 +122,23 @@ def position_distance(model: Any, first: Array, second: Array) -> float:
 def position_distances(model: Any, first: Array, second: Array) -> Array:
     """The same of two motions (n, nq), at each time: (n,)."""
     pairs = zip(first, second, strict=True)
-    return np.array([position_distance(model, one, other) for one, other in pairs])
+    return np.array([position_distance(model, a, b) for a, b in pairs])
 
 
 def scales(model: Any) -> Array:
-    """What a difference in each degree of freedom is large against: 1 rad, or the extent, m."""
-    found = np.ones(int(model.nv))
+    """The unit of a difference in each degree of freedom: 1 rad, or the model's extent, m."""
+    units = np.ones(int(model.nv))
     extent = max(float(model.stat.extent), mujoco.mjMINVAL)
     for kind, dof in zip(model.jnt_type, model.jnt_dofadr, strict=True):
         if kind == mujoco.mjtJoint.mjJNT_FREE:
-            found[dof : dof + 3] = extent
+            units[dof : dof + 3] = extent
         elif kind == mujoco.mjtJoint.mjJNT_SLIDE:
-            found[dof] = extent
-    return found
+            units[dof] = extent
+    return units
 
 
 class _Observer:
-    """Looks at every state, and keeps what acted."""
+    """Looks at every state, and remembers what acted."""
 
     def __init__(self, model: Any) -> None:
         self.contact = self.limit = self.constrained = False
@@ -145,7 +146,7 @@ class _Observer:
         self._limited, self._range = _limited_activations(model)
 
     def __call__(self, data: Any) -> None:
-        """See what acts."""
+        """Note what acts in this state."""
         if data.nefc:
             self.constrained = True
             self.limit = self.limit or data.nl > 0
@@ -157,7 +158,7 @@ class _Observer:
 
     def jumps(self, model: Any) -> tuple[str, ...]:
         """What makes accelerations jump."""
-        found = (
+        causes = (
             (self.contact, "contact"),
             (self.limit, "a limit that is reached"),
             (self.friction, "dry friction"),
@@ -167,53 +168,53 @@ class _Observer:
             if hasattr(model, "actuator_history")
             else (False, ""),
         )
-        return tuple(words for there, words in found if there)
+        return tuple(words for is_present, words in causes if is_present)
 
 
 def _limited_activations(model: Any) -> tuple[Any, Array]:
-    """Which activations are clamped, by number (n,), and between what (n, 2)."""
-    found = [
+    """The numbers of activations that are clamped (n,), and their limits (n, 2)."""
+    activations = [
         (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
         for i in np.flatnonzero(model.actuator_actlimited)
         for k in range(int(model.actuator_actnum[i]))
     ]
-    limits: Array = np.array([limits for _, limits in found]).reshape(-1, 2)
-    return np.array([number for number, _ in found], dtype=np.intp), limits
+    limits: Array = np.array([limits for _, limits in activations]).reshape(-1, 2)
+    return np.array([number for number, _ in activations], dtype=np.intp), limits
 
 
 def _twins(model: Any, scenario: Scenario) -> list[Any]:
-    """The beginning with positions and velocities pushed a little, always in the same ways."""
+    """Copies of the beginning, nudged in positions and velocities, always in the same ways."""
     directions = np.random.default_rng(1).normal(size=(_DIRECTIONS, 2, int(model.nv)))
-    push, found = NUDGE * scales(model), []
+    push, twins = NUDGE * scales(model), []
     for direction in (*directions, *-directions):
         size = max(float(np.abs(direction).max(initial=0.0)), mujoco.mjMINVAL)
         twin = initial_data(scenario, model)
         mujoco.mj_integratePos(model, twin.qpos, direction[0] / size * push, 1.0)
         twin.qvel[:] += direction[1] / size * push
-        found.append(twin)
-    return found
+        twins.append(twin)
+    return twins
 
 
 def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
-    beyond = np.flatnonzero(gaps >= APART)
-    if not beyond.size:
+    apart = np.flatnonzero(gaps >= APART)
+    if not apart.size:
         return float(times[-1]), None
-    end = int(beyond[0])
+    end = int(apart[0])
     growth = math.log(float(gaps[end]) / NUDGE) / float(times[end])
     return float(times[max(0, end - 1)]), growth
 
 
-def _bounds(model: Any, scenario: Scenario, seen: Peaks) -> Setup:
+def _bounds(model: Any, scenario: Scenario, peaks: Peaks) -> Setup:
     extent = float(model.stat.extent)
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * extent)
     # A hinge without limits may go round the other way.
     hinged = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
-    round_and_round = 2 * seen.velocity * scenario.duration if hinged else 0.0
+    round_and_round = 2 * peaks.velocity * scenario.duration if hinged else 0.0
     driven = bool(driving_force(model, scenario))
     resting = float(model.body_mass.sum()) * max(_RESTING * fall, 1e-3) ** 2
     return Setup(
         scenario=scenario,
-        position_bound=2 * seen.position + ROOM * max(extent, 1.0) + round_and_round,
-        velocity_bound=ROOM * max(seen.velocity, fall, 1e-3) if driven else math.inf,
-        energy_bound=math.inf if driven else seen.energy + ROOM * max(seen.kinetic, resting),
+        position_bound=2 * peaks.position + ROOM * max(extent, 1.0) + round_and_round,
+        velocity_bound=ROOM * max(peaks.velocity, fall, 1e-3) if driven else math.inf,
+        energy_bound=math.inf if driven else peaks.energy + ROOM * max(peaks.kinetic, resting),
     )

@@ -42,7 +42,7 @@ class Integrator(enum.Enum):
 
 
 STANDARD: tuple[Integrator, ...] = tuple(
-    one for one in Integrator if one is not Integrator.EULER_EXPLICIT
+    integrator for integrator in Integrator if integrator is not Integrator.EULER_EXPLICIT
 )
 """Those with a name of their own in MJCF."""
 
@@ -133,9 +133,9 @@ class Sizes(Struct, frozen=True):
     velocity: float
     """m/s or rad/s."""
 
-    def at_least(self, other: Sizes) -> Sizes:
+    def at_least(self, sizes: Sizes) -> Sizes:
         """Of each part the larger one."""
-        return Sizes(*map(max, astuple(self), astuple(other)))
+        return Sizes(*map(max, astuple(self), astuple(sizes)))
 
     @property
     def place(self) -> float:

@@ -1,6 +1,6 @@
 """A model in one of its scenarios, with everything that its author left out filled in.
 
-Entry points: `scenes(model, declared, quick)`, `Scene`.
+Entry points: `scenes(model, declarations, quick)`, `Scene`.
 
 1. Without declarations each keyframe is a scenario; without a keyframe, the model's own state.
 2. Times are whole numbers of the model's own timestep: a sample is some of them, a hold and the
@@ -33,21 +33,21 @@ from coursebuild.numerics.problem import Array, Scenario
 from mjcourse import exact
 
 LOOKS = 100
-"""Samples that a scenario has where its author does not say, about."""
+"""About how many samples a scenario has by default."""
 FEWEST = 25
-"""Samples that it has then at least."""
+"""The fewest samples by default."""
 LADDER, QUICK_LADDER = (-3, -2, -1, 0, 1, 2, 3), (-2, -1, 0, 1)
 """Powers of 2 by which timesteps differ from the model's own."""
 
 
 EXACT_SCRIPT = exact.__file__
-"""Says what a course's file knows of a motion."""
+"""The script that evaluates a course's exact motion."""
 LONGEST = 10_000_000
-"""Steps of a scenario at its shortest timestep, at most: more would take hours."""
+"""The most steps of a scenario at its shortest timestep: more would take hours."""
 
 
 class SceneError(Exception):
-    """A scenario does not fit its model; `span` is where it says so."""
+    """A scenario does not fit its model; `span` is the place of the mistake."""
 
     def __init__(self, message: str, span: Span | None = None, help: str = "") -> None:
         super().__init__(message)
@@ -63,7 +63,7 @@ class ExactMotion(Struct, frozen=True, eq=False):
     """Its file."""
     states: Callable[[Array, Array, Array], tuple[Array, Array | None]]
     """Times (n,) in s, and `qpos` and `qvel` of the beginning → those at the times, (n, nq) and
-    (n, nv); no velocities where it does not say them."""
+    (n, nv), or `None` where the course gives no velocities."""
 
 
 class Scene(Struct, frozen=True):
@@ -74,33 +74,37 @@ class Scene(Struct, frozen=True):
     scenario: Scenario
     timesteps: tuple[float, ...]
     """Rising, the model's own among them, s."""
-    own: float
+    timestep: float
     """The model's own timestep, s."""
     bench: BenchTable
-    declared: DeclaredScenario
+    declaration: DeclaredScenario
     exact: ExactMotion | None = None
     """What the course knows of its motion."""
 
 
-def scenes(model: Any, declared: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
+def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
     """The scenarios of a model (`mjModel`); none of one in which nothing can move.
 
-    What they name is in the model, and states have as many numbers as it takes: that was checked.
+    The declarations were checked: the model has what they name, and states have the right size.
 
     Raises:
         SceneError: one does not fit the model.
     """
     if not model.nv:
-        if declared.scenarios:
-            raise SceneError("nothing can move in the model", declared.scenarios[0].span)
+        if declarations.scenarios:
+            raise SceneError("nothing can move in the model", declarations.scenarios[0].span)
         return ()
     step = float(model.opt.timestep)
     steps = [step * 2.0**power for power in (QUICK_LADDER if quick else LADDER)]
-    chosen = declared.scenarios or _by_keyframes(model, declared.source.span(0, 0))
-    return tuple(_scene(model, one, declared.bench, steps) for one in chosen)
+    declared_scenarios = declarations.scenarios or _keyframe_scenarios(
+        model, declarations.source.span(0, 0)
+    )
+    return tuple(
+        _scene(model, declaration, declarations.bench, steps) for declaration in declared_scenarios
+    )
 
 
-def _by_keyframes(model: Any, place: Span) -> tuple[DeclaredScenario, ...]:
+def _keyframe_scenarios(model: Any, place: Span) -> tuple[DeclaredScenario, ...]:
     """The scenarios of a model that declares none."""
     names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
     if not model.nkey:
@@ -112,9 +116,9 @@ def _by_keyframes(model: Any, place: Span) -> tuple[DeclaredScenario, ...]:
 
 
 def thickness(model: Any) -> Array:
-    """Half the thickness of every geom, and infinity for what is none: (ngeom + 1,) m.
+    """Half the thickness of every geom, and infinity for none (index -1): (ngeom + 1,) m.
 
-    That of a plane or a height field is infinite: nothing is on its other side.
+    Planes and height fields are infinitely thick: nothing is on their other side.
     """
     half = model.geom_aabb[:, 3:].min(axis=1)
     planes = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
@@ -123,78 +127,86 @@ def thickness(model: Any) -> Array:
 
 
 def _scene(
-    model: Any, declared: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
+    model: Any, declaration: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
 ) -> Scene:
     step = float(model.opt.timestep)
     scenario = replace(
-        _timed(step, declared),
-        qpos=_unit(model, declared.qpos),
-        qvel=declared.qvel,
-        controls=declared.controls,
-        keyframe=_keyframe(model, declared.keyframe),
+        _scenario_times(step, declaration),
+        qpos=_normalize_quaternions(model, declaration.qpos),
+        qvel=declaration.qvel,
+        controls=declaration.controls,
+        keyframe=_keyframe(model, declaration.keyframe),
     )
-    for one in declared.timesteps:
-        if not is_multiple(scenario.sample, one):
-            message = f"the timestep {one:g} s does not divide the sample, {scenario.sample:g} s"
+    for timestep in declaration.timesteps:
+        if not is_multiple(scenario.sample, timestep):
+            message = (
+                f"the timestep {timestep:g} s does not divide the sample, {scenario.sample:g} s"
+            )
             help = "give `sample` a value that all timesteps divide"
-            raise SceneError(message, declared.place("timesteps"), help)
-    ladder = _ladder(scenario, step, declared.timesteps or steps)
+            raise SceneError(message, declaration.place("timesteps"), help)
+    ladder = _ladder(scenario, step, declaration.timesteps or steps)
     if scenario.duration > LONGEST * ladder[0]:
         message = f"{scenario.duration:g} s in steps of {ladder[0]:g} s are over {LONGEST:,} steps"
-        place = declared.place("duration" if declared.duration is not None else "timesteps")
+        place = declaration.place("duration" if declaration.duration is not None else "timesteps")
         raise SceneError(message, place, "measure a shorter time, or longer timesteps")
-    title = declared.title or declared.name
-    return Scene(declared.name, title, scenario, ladder, step, bench, declared)
+    title = declaration.title or declaration.name
+    return Scene(declaration.name, title, scenario, ladder, step, bench, declaration)
 
 
-def _keyframe(model: Any, wanted: str | int | None) -> int:
-    if isinstance(wanted, str):
-        return int(model.key(wanted).id)
-    return -1 if wanted is None else wanted
+def _keyframe(model: Any, keyframe: str | int | None) -> int:
+    if isinstance(keyframe, str):
+        return int(model.key(keyframe).id)
+    return -1 if keyframe is None else keyframe
 
 
-def _unit(model: Any, qpos: tuple[float, ...]) -> tuple[float, ...]:
+def _normalize_quaternions(model: Any, qpos: tuple[float, ...]) -> tuple[float, ...]:
     """Positions with quaternions of length 1, which an author need not compute."""
     if not qpos:
         return ()
-    found = np.array(qpos)
-    mujoco.mj_normalizeQuat(model, found)
-    return tuple(found.tolist())
+    normalized = np.array(qpos)
+    mujoco.mj_normalizeQuat(model, normalized)
+    return tuple(normalized.tolist())
 
 
-def _timed(step: float, declared: DeclaredScenario) -> Scenario:
+def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
     """The times of a scenario, as whole numbers of the model's timestep.
 
     Raises:
         SceneError: what is given is no whole number of timesteps.
     """
-    duration, sample, hold = declared.duration, declared.sample, declared.hold
-    given = (("duration", duration), ("sample", sample), ("hold", hold))
-    whole = {name: _steps(length, step, name) for name, length in given if length is not None}
-    held, looks = whole.get("hold"), whole.get("sample")
-    count = len(declared.controls)
-    last = held * count if held is not None and count > 1 else 0
+    duration, sample, hold = declaration.duration, declaration.sample, declaration.hold
+    lengths = (("duration", duration), ("sample", sample), ("hold", hold))
+    whole = {
+        name: _whole_steps(length, step, name) for name, length in lengths if length is not None
+    }
+    hold_steps, sample_steps = whole.get("hold"), whole.get("sample")
+    count = len(declaration.controls)
+    last = hold_steps * count if hold_steps is not None and count > 1 else 0
     total = whole.get("duration") or max(last, min(round(DURATION / step), MOST_STEPS), 1)
-    if looks is None:
+    if sample_steps is None:
         basis = math.gcd(*(whole[name] for name in ("duration", "hold") if name in whole))
-        looks = _looks(basis, total) if basis else max(8, 8 * round(total / LOOKS / 8))
-    total = whole.get("duration") or looks * max(FEWEST, math.ceil(max(last, total) / looks))
-    if held is not None and "duration" not in whole:
-        total = held * math.ceil(total / held)
+        sample_steps = (
+            _sample_steps(basis, total) if basis else max(8, 8 * round(total / LOOKS / 8))
+        )
+    total = whole.get("duration") or sample_steps * max(
+        FEWEST, math.ceil(max(last, total) / sample_steps)
+    )
+    if hold_steps is not None and "duration" not in whole:
+        total = hold_steps * math.ceil(total / hold_steps)
     return Scenario(
         duration or _decimal(total * step),
-        sample or _decimal(looks * step),
-        hold=0.0 if held is None else hold or _decimal(held * step),
+        sample or _decimal(sample_steps * step),
+        hold=0.0 if hold_steps is None else hold or _decimal(hold_steps * step),
     )
 
 
 def _decimal(seconds: float) -> float:
     """A product of decimal fractions as the decimal fraction that it is meant to be."""
-    meant = float(f"{seconds:.12g}")
-    return meant if abs(meant - seconds) <= 1e-15 * seconds else seconds
+    rounded = float(f"{seconds:.12g}")
+    return rounded if abs(rounded - seconds) <= 1e-15 * seconds else seconds
 
 
-def _steps(length: float, step: float, name: str) -> int:
+def _whole_steps(length: float, step: float, name: str) -> int:
     if not is_multiple(length, step):
         raise SceneError(
             f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
@@ -202,7 +214,7 @@ def _steps(length: float, step: float, name: str) -> int:
     return round(length / step)
 
 
-def _looks(basis: int, total: int) -> int:
+def _sample_steps(basis: int, total: int) -> int:
     """The steps of a sample: a divisor of `basis`, near the usual number of looks.
 
     Timesteps a few times as long should divide it too.
@@ -218,10 +230,10 @@ def _looks(basis: int, total: int) -> int:
     return min(sorted(divisors), key=badness)
 
 
-def _ladder(scenario: Scenario, own: float, steps: Sequence[float]) -> tuple[float, ...]:
-    """The model's own timestep and those near others (s) that divide the sample, rising."""
-    kept = {round(scenario.sample / own): own}
+def _ladder(scenario: Scenario, timestep: float, steps: Sequence[float]) -> tuple[float, ...]:
+    """The model's own timestep, and those nearest to `steps` (s) that divide the sample, rising."""
+    ladder = {round(scenario.sample / timestep): timestep}
     for step in steps:
         count = max(1, round(scenario.sample / step))
-        kept.setdefault(count, _decimal(scenario.sample / count))
-    return tuple(kept[count] for count in sorted(kept, reverse=True))
+        ladder.setdefault(count, _decimal(scenario.sample / count))
+    return tuple(ladder[count] for count in sorted(ladder, reverse=True))

@@ -1,7 +1,7 @@
 """The settings that are measured in a scene: what can be chosen without changing the scene.
 
-Entry points: `settings(model, first)`, `own_setting`, `apply`; `stable(model, first)`, the largest
-stable timestep of each integrator.
+Entry points: `settings(model, pilot)`, `own_setting`, `apply`; `stable_rows(model, pilot)`, the
+largest stable timestep of each integrator.
 
 Every integrator at every timestep; where a solver runs, also other solvers and fewer iterations;
 where something touches, also the other cone. These vary one at a time about the model's own: the
@@ -34,17 +34,17 @@ CONES = {
 }
 _ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
 _SEARCH = (0.25, 64.0)
-"""Between which multiples of the model's timestep the largest stable one is looked for."""
+"""The multiples of the model's timestep between which the largest stable one is searched for."""
 
 
-def own_setting(model: Any, first: Pilot) -> MeasuredSetting:
+def own_setting(model: Any, pilot: Pilot) -> MeasuredSetting:
     """The setting that the model has."""
     return MeasuredSetting(
         integrator=integrator_of(model).value,
-        timestep=first.scene.own,
-        solver=_name(_SOLVERS, int(model.opt.solver)) if first.constrained else "",
-        iterations=int(model.opt.iterations) if first.constrained else 0,
-        cone=_name(CONES, int(model.opt.cone)) if first.contact else "",
+        timestep=pilot.scene.timestep,
+        solver=_name(_SOLVERS, int(model.opt.solver)) if pilot.constrained else "",
+        iterations=int(model.opt.iterations) if pilot.constrained else 0,
+        cone=_name(CONES, int(model.opt.cone)) if pilot.contact else "",
     )
 
 
@@ -52,21 +52,21 @@ def _name(names: dict[str, int], number: int) -> str:
     return next(name for name, value in names.items() if value == number)
 
 
-def settings(model: Any, first: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
+def settings(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
     """All settings to measure, each once, the model's own among them."""
-    own = own_setting(model, first)
-    found = [
-        replace(own, integrator=integrator.value, timestep=step)
+    baseline = own_setting(model, pilot)
+    variants = [
+        replace(baseline, integrator=integrator.value, timestep=step)
         for integrator in STANDARD
-        for step in reversed(first.scene.timesteps)
+        for step in reversed(pilot.scene.timesteps)
     ]
-    if first.contact:
-        found += [replace(own, cone=cone) for cone in CONES]
-    if first.constrained:
-        found += [replace(own, solver=solver) for solver in _SOLVERS]
+    if pilot.contact:
+        variants += [replace(baseline, cone=cone) for cone in CONES]
+    if pilot.constrained:
+        variants += [replace(baseline, solver=solver) for solver in _SOLVERS]
         counts = _QUICK_ITERATIONS if quick else _ITERATIONS
-        found += [replace(own, iterations=n) for n in counts if n < own.iterations]
-    return tuple(dict.fromkeys(found))
+        variants += [replace(baseline, iterations=n) for n in counts if n < baseline.iterations]
+    return tuple(dict.fromkeys(variants))
 
 
 def apply(model: Any, setting: MeasuredSetting) -> None:
@@ -81,19 +81,19 @@ def apply(model: Any, setting: MeasuredSetting) -> None:
 
 def with_setting(model: Any, setting: MeasuredSetting) -> Any:
     """A copy of a `mjModel` with a setting, and automatic reset off."""
-    one = with_integrator(model, Integrator(setting.integrator), setting.timestep)
-    apply(one, setting)
-    return one
+    variant = with_integrator(model, Integrator(setting.integrator), setting.timestep)
+    apply(variant, setting)
+    return variant
 
 
-def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
+def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
     """The largest stable timestep of every integrator, over the scenario.
 
-    They are searched for as those of the hard cases. No timestep is tried of which the
-    scenario has fewer than 20: of so few steps none would tell.
+    They are searched for as those of the hard cases. No timestep is tried of which the scenario
+    has fewer than 20: so few steps would say nothing.
     """
-    duration = first.scene.scenario.duration
-    low, high = (part * first.scene.own for part in _SEARCH)
+    duration = pilot.scene.scenario.duration
+    low, high = (part * pilot.scene.timestep for part in _SEARCH)
     search = (max(low, duration / MOST_STEPS), min(high, duration / FEWEST_STEPS))
     if search[1] <= search[0]:
         return ()
@@ -101,8 +101,8 @@ def stable(model: Any, first: Pilot, *, quick: bool = False) -> tuple[StableRow,
 
     def row(integrator: Integrator) -> StableRow:
         def attempt(step: float) -> StabilityTrial:
-            return run_trial(first.setup, with_integrator(model, integrator, step), duration, thick)
+            return run_trial(pilot.setup, with_integrator(model, integrator, step), duration, thick)
 
-        return stable_row(integrator, scan(attempt, search, quick=quick), first.setup, duration)
+        return stable_row(integrator, scan(attempt, search, quick=quick), pilot.setup, duration)
 
     return tuple(map(row, STANDARD))

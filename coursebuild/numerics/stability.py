@@ -42,11 +42,11 @@ from coursebuild.numerics.reports.cases import BoundaryLine
 _REACH = 10.0
 """The grid is tried down to this part of the largest stable timestep."""
 _NEAREST, _FARTHEST = 1e-3, 0.5
-"""How far below it others are tried, relative."""
+"""The relative distances below it between which others are tried."""
 MOST_STEPS = 200_000
 """Of one run."""
 _PARTS, _LOOKS = 20, 1000
-"""Of a run: looks at how fast it grows, and at whether it is lost."""
+"""How often a run is looked at: for its growth, and for whether it is lost."""
 _SMALL_STEPS = 100_000
 """Steps of the run that says how much energy there can be, at most."""
 _DENSE, _QUICK = (24, 32, 1e-4), (6, 8, 1e-2)
@@ -55,14 +55,14 @@ width at which the bisection ends."""
 
 
 class StabilityTrial(Struct, frozen=True):
-    """One timestep tried."""
+    """A run at one timestep."""
 
     timestep: float
     """s."""
     status: RunStatus
     growth: float
-    """By what the state is multiplied in a step, from half the run to its end; 1 is neither growth
-    nor decay, and no number where the run was lost before."""
+    """The factor by which velocities grow in a step, from half the run to its end; NaN where the
+    run was lost before."""
 
     @property
     def stable(self) -> bool:
@@ -80,11 +80,13 @@ def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
     # Only joints with damping know `eulerdamp`.
     damped = bool(np.any(compile_model(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
     problem = with_energy_bound(problem)
-    return tuple(boundary(problem, one) for one in (Integrator if damped else STANDARD))
+    return tuple(
+        boundary(problem, integrator) for integrator in (Integrator if damped else STANDARD)
+    )
 
 
 def with_energy_bound(problem: Problem) -> Problem:
-    """The problem with the energy that can be: by its motion in small steps, over its span."""
+    """The problem with a bound of its energy, from its motion in small steps over its span."""
     if driving_force(compile_model(problem.mjcf, Integrator.RK4, 1e-3), problem.scenario):
         return problem
     step, scenario = min(problem.timesteps), problem.scenario
@@ -97,14 +99,14 @@ def with_energy_bound(problem: Problem) -> Problem:
 
 
 def boundary(problem: Problem, integrator: Integrator) -> BoundaryLine:
-    """Look for the largest stable timestep of a problem that names timesteps to look between."""
+    """Search for the largest stable timestep of a problem with a search interval."""
     assert problem.search is not None
     low, high = problem.search
     search = max(low, problem.span / MOST_STEPS), high
-    found = scan(lambda step: attempt(problem, integrator, step), search)
-    row = stable_row(integrator, found, problem, problem.span)
+    trials = scan(lambda step: attempt(problem, integrator, step), search)
+    row = stable_row(integrator, trials, problem, problem.span)
     theory = None if problem.limit is None else problem.limit(integrator)
-    lost = _first_lost(found)
+    lost = _first_lost(trials)
     return BoundaryLine(
         **asdict(row),
         theory=None if theory is None else _finite(theory.timestep),
@@ -132,34 +134,34 @@ def scan(
     *,
     quick: bool = False,
 ) -> tuple[StabilityTrial, ...]:
-    """Look for the largest stable timestep between two (s); all that was tried, rising."""
+    """Search for the largest stable timestep between two (s); all trials, by rising timestep."""
     low, high = search
-    in_a_decade, near, resolution = _QUICK if quick else _DENSE
+    in_a_decade, near_count, resolution = _QUICK if quick else _DENSE
     count = max(2, round(in_a_decade * math.log10(high / low)) + 1)
     grid = np.geomspace(low, high, count).tolist()
-    tried: dict[float, StabilityTrial] = {}
-    while (step := _next(tried, grid, near, resolution)) is not None:
-        tried[step] = attempt(step)
-    return tuple(tried[step] for step in sorted(tried))
+    trials: dict[float, StabilityTrial] = {}
+    while (step := _next_timestep(trials, grid, near_count, resolution)) is not None:
+        trials[step] = attempt(step)
+    return tuple(trials[step] for step in sorted(trials))
 
 
 def _first_lost(trials: Sequence[StabilityTrial]) -> StabilityTrial | None:
-    return next((one for one in trials if not one.stable), None)
+    return next((trial for trial in trials if not trial.stable), None)
 
 
-def _next(
-    tried: Mapping[float, StabilityTrial], grid: list[float], near: int, resolution: float
+def _next_timestep(
+    trials: Mapping[float, StabilityTrial], grid: list[float], near_count: int, resolution: float
 ) -> float | None:
     """The timestep to try next; `None` when the largest stable one is known."""
-    lost = min((step for step, one in tried.items() if not one.stable), default=math.inf)
+    lost = min((step for step, trial in trials.items() if not trial.stable), default=math.inf)
     least = 0.0 if math.isinf(lost) else lost / _REACH
-    fresh = [step for step in grid if step >= least and step not in tried]
-    stable = max((step for step in tried if step < lost), default=0.0)
+    fresh = [step for step in grid if step >= least and step not in trials]
+    stable = max((step for step in trials if step < lost), default=0.0)
     if not fresh and stable and not math.isinf(lost):
         if lost / stable > 1 + resolution:
             return math.sqrt(lost * stable)
-        below = [stable * (1 - x) for x in np.geomspace(_NEAREST, _FARTHEST, near).tolist()]
-        fresh = [step for step in below if step > grid[0] and step not in tried]
+        shorter = [stable * (1 - x) for x in np.geomspace(_NEAREST, _FARTHEST, near_count).tolist()]
+        fresh = [step for step in shorter if step > grid[0] and step not in trials]
     return max(fresh, default=None)
 
 
@@ -167,20 +169,20 @@ def stable_row(
     integrator: Integrator, trials: Sequence[StabilityTrial], setup: Setup, span: float
 ) -> StableRow:
     """What a search found for an integrator, over a span (s) of simulated time."""
-    steps = [one.timestep for one in trials]
-    below, largest, lost = steps, None, _first_lost(trials)
+    steps = [trial.timestep for trial in trials]
+    stable_steps, largest, lost = steps, None, _first_lost(trials)
     if lost is not None:
-        below = [step for step in steps if step < lost.timestep]
-        largest = max(below, default=0.0)
-    islands = [one.timestep for one in trials[len(below) :] if one.stable]
+        stable_steps = [step for step in steps if step < lost.timestep]
+        largest = max(stable_steps, default=0.0)
+    islands = [trial.timestep for trial in trials[len(stable_steps) :] if trial.stable]
     return StableRow(
         integrator=integrator.value,
         largest=largest,
         searched=(steps[0], steps[-1]),
         islands=(islands[0], islands[-1]) if islands else None,
         duration=span,
-        steps=step_count(span, max(below, default=steps[0])),
-        tried=len(below),
+        steps=step_count(span, max(stable_steps, default=steps[0])),
+        tried=len(stable_steps),
         energy=_finite(setup.energy_bound),
     )
 
@@ -200,41 +202,41 @@ def run_trial(
 ) -> StabilityTrial:
     """Run a model over a span (s) with its own timestep, or until it is lost.
 
-    `thickness` is as for `detector.peaks`. A command changes with the first step that begins after
-    its time: the timestep need not divide the hold.
+    `thickness` is as for `detector.update_peaks`. A command changes with the first step that begins
+    after its time: the timestep need not divide the hold.
     """
     data = initial_data(setup.scenario, model)
     timestep = float(model.opt.timestep)
     steps = step_count(span, timestep)
-    every = max(8, steps // _LOOKS)
+    interval = max(8, steps // _LOOKS)
     sizes: list[tuple[int, float]] = []
-    seen, total = Peaks(), 0
+    peaks, total = Peaks(), 0
     for begin, end in itertools.pairwise(_edges(setup.scenario, timestep, steps)):
-        _command(setup.scenario, data, begin * timestep)
+        _apply_command(setup.scenario, data, begin * timestep)
         try:
-            seen, done = advance_watching(
-                model, data, end - begin, seen, thickness, every=every, setup=setup
+            peaks, steps_made = advance_watching(
+                model, data, end - begin, peaks, thickness, interval=interval, setup=setup
             )
         except mujoco.FatalError:  # MuJoCo does not run it
             return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan)
-        total += done
+        total += steps_made
         with np.errstate(over="ignore"):
             sizes.append((total, float(np.linalg.norm(data.qvel))))
-        if not seen.within(setup):
+        if not peaks.is_within(setup):
             break
-    judgement = judge(model, data, total * timestep, seen, setup)
+    judgement = judge(model, data, total * timestep, peaks, setup)
     return StabilityTrial(timestep, judgement.status, _growth(sizes))
 
 
 def _edges(scenario: Scenario, timestep: float, steps: int) -> list[int]:
-    """At which steps the run is interrupted: to look, and where the command changes."""
+    """The steps at which the run is interrupted: to look, and to change the command."""
     edges = {steps * part // _PARTS for part in range(_PARTS + 1)}
     for index in range(1, len(scenario.controls)):
         edges.add(min(math.ceil(index * scenario.hold / timestep - 1e-9), steps))
     return sorted(edges)
 
 
-def _command(scenario: Scenario, data: Any, time: float) -> None:
+def _apply_command(scenario: Scenario, data: Any, time: float) -> None:
     if scenario.controls:
         index = int(time / scenario.hold + 1e-9) if scenario.hold else 0
         data.ctrl[:] = scenario.controls[min(index, len(scenario.controls) - 1)]

@@ -1,4 +1,4 @@
-"""A model with its parameters at other values: what contacts, solver and cost are then.
+"""A model with its parameters at other values: its contacts, solver and cost.
 
 Entry point: `measure_sweep(spec, scene, sweep, …)`.
 
@@ -35,10 +35,10 @@ from coursebuild.numerics.engine import (
 )
 from coursebuild.numerics.observe import (
     Pair,
+    contact_speeds,
     quantity_name,
     quantity_values,
-    speeds,
-    touching,
+    touching_contacts,
     visible_error,
 )
 from coursebuild.numerics.problem import Scenario, Setup
@@ -78,14 +78,14 @@ def measure_sweep(
     base = _runnable(spec.compile())
     threads = [part for part in sweep.variations if part.parameter == THREADS]
     parts = [part for part in sweep.variations if part.parameter != THREADS]
-    variants = [one for part in parts for one in _variants(spec, scene.scenario, part)]
-    own = simulate(Setup(scenario=scene.scenario), base, thickness(base))
-    states = own.states if own.judgement.ok else None
-    rows = [_measured(scene, base, states, row, model) for row, model in variants]
+    variants = [variant for part in parts for variant in _variants(spec, scene.scenario, part)]
+    base_run = simulate(Setup(scenario=scene.scenario), base, thickness(base))
+    states = base_run.states if base_run.judgement.ok else None
+    rows = [_measure_variant(scene, base, states, row, model) for row, model in variants]
     if clocks is not None:
         models = [base, *(model for _, model in variants)]
         with silent():
-            rows = _timed(scene.scenario, models, rows, clocks[0], quick=quick)
+            rows = _with_costs(scene.scenario, models, rows, clocks[0], quick=quick)
             for part in threads:
                 rows += _rollouts(scene.scenario, base, part, clocks[1], quick=quick)
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, sweep.show, tuple(rows))
@@ -94,47 +94,51 @@ def measure_sweep(
 def _variants(spec: Any, scenario: Scenario, part: Variation) -> Iterator[tuple[SweepRow, Any]]:
     """The model with the parameter at each of its values, and a row on which nothing is known."""
     for value in part.values:
-        changed = spec.copy()
-        before, after = _change(changed, part, value)
+        changed_spec = spec.copy()
+        before, after = _change(changed_spec, part, value)
         try:
-            model = _runnable(changed.compile())
+            model = _runnable(changed_spec.compile())
             scenario.steps(float(model.opt.timestep))
         except ValueError as error:
-            message = f"`{part.parameter}` cannot be {_text(value)}: {' '.join(str(error).split())}"
+            message = (
+                f"`{part.parameter}` cannot be {_value_text(value)}: {' '.join(str(error).split())}"
+            )
             raise SceneError(message, part.span) from None
-        shown = f"{100 * (float(value) - 1):+g} %" if part.relative else _text(value)  # type: ignore[arg-type]
-        same = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
-        yield SweepRow(part.parameter, shown, own=same, status="ok"), model
+        text = f"{100 * (float(value) - 1):+g} %" if part.relative else _value_text(value)  # type: ignore[arg-type]
+        is_own = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+        yield SweepRow(part.parameter, text, own=is_own, status="ok"), model
 
 
 def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], list[Any]]:
-    """Give all elements that are meant the value; what they had before, and have now."""
+    """Give the elements of a variation a value; what they had before, and have now."""
     match = _PARAMETER.fullmatch(part.parameter)
     kind, name, field = match.group("kind", "name", "field") if match else ("", "", "")
     several = getattr(spec, _PLURALS.get(kind, f"{kind}s"), ())
-    found = [spec.option] if kind == "option" else [o for o in several if name in (None, o.name)]
-    if match is None or not found or not hasattr(found[0], field):
+    elements = [spec.option] if kind == "option" else [o for o in several if name in (None, o.name)]
+    if match is None or not elements or not hasattr(elements[0], field):
         message = f"the model has no parameter `{part.parameter}`"
         help = "it is named as in `mujoco.MjSpec`: `option.timestep`, `geom:ball.solref[0]`"
         raise SceneError(message, part.span, help)
     at, before, after = match["at"], [], []
-    for one in found:
-        old = getattr(one, field)
+    for element in elements:
+        old = getattr(element, field)
         before.append(np.array(old, copy=True))
         try:
-            _set(one, field, at, value, relative=part.relative)
+            _set_field(element, field, at, value, relative=part.relative)
         except (TypeError, ValueError, KeyError, IndexError):
-            message = f"`{part.parameter}` cannot be {_text(value)}"
+            message = f"`{part.parameter}` cannot be {_value_text(value)}"
             raise SceneError(message, part.span) from None
-        after.append(np.array(getattr(one, field), copy=True))
+        after.append(np.array(getattr(element, field), copy=True))
         if part.relative and not np.isfinite(after[-1]).all():
             message = f"`{part.parameter}` is not given in the MJCF, so that it has no share"
             raise SceneError(message, part.span)
     return before, after
 
 
-def _set(one: Any, field: str, at: str | None, value: SweepValue, *, relative: bool) -> None:
-    old = getattr(one, field)
+def _set_field(
+    element: Any, field: str, at: str | None, value: SweepValue, *, relative: bool
+) -> None:
+    old = getattr(element, field)
     if isinstance(value, str):
         members = _ENUMS[field].__members__
         value = int(
@@ -145,12 +149,12 @@ def _set(one: Any, field: str, at: str | None, value: SweepValue, *, relative: b
     elif isinstance(old, np.ndarray):
         old[:] = old * value if relative else value
     else:
-        setattr(one, field, type(old)(old * value if relative else value))
+        setattr(element, field, type(old)(old * value if relative else value))
 
 
-def _text(value: SweepValue) -> str:
+def _value_text(value: SweepValue) -> str:
     if isinstance(value, tuple):
-        return " ".join(f"{one:g}" for one in value)
+        return " ".join(f"{number:g}" for number in value)
     return value if isinstance(value, str) else f"{value:g}"
 
 
@@ -159,10 +163,13 @@ def _runnable(model: Any) -> Any:
     return with_integrator(model, integrator_of(model), float(model.opt.timestep))
 
 
-def _measured(
-    scene: Scene, base: Any, own: EngineStates | None, row: SweepRow, model: Any
+def _measure_variant(
+    scene: Scene, base: Any, base_states: EngineStates | None, row: SweepRow, model: Any
 ) -> SweepRow:
-    """With what a model does; `own`: the motion of the model as it is, unless it is lost."""
+    """Run a model and fill its row.
+
+    `base_states`: the motion of the model as it is; `None` where that run was lost.
+    """
     try:
         run = simulate(Setup(scenario=scene.scenario), model, thickness(model))
     except mujoco.FatalError as error:
@@ -171,13 +178,13 @@ def _measured(
     row = replace(row, status=judged.status.value, reasons=judged.reasons)
     if not judged.ok:
         return row
-    row = _contacts(scene.scenario, model, row)
-    if own is None:
+    row = _with_contacts(scene.scenario, model, row)
+    if base_states is None:
         return row
-    row = replace(row, change=visible_error(base, scene, run.states, own))
+    row = replace(row, change=visible_error(base, scene, run.states, base_states))
     if quantity_name(base, scene):
         mine = quantity_values(model, scene, run.states)
-        apart = np.linalg.norm(mine - quantity_values(base, scene, own), axis=1)
+        apart = np.linalg.norm(mine - quantity_values(base, scene, base_states), axis=1)
         row = replace(row, figure=float(apart.max()))
     return row
 
@@ -186,49 +193,49 @@ class _Hit(Struct):
     """Two geoms that touch."""
 
     closing: float
-    """Speed together at the beginning, m/s."""
+    """Speed with which they approach at the beginning, m/s."""
     contact: Any
-    """Where, at last."""
+    """The latest one."""
     apart: float = 0.0
-    """Speed apart at the end, m/s; 0 for what stays."""
+    """Speed with which they part at the end, m/s; 0 if they stay together."""
     slid: float = 0.0
-    """m."""
+    """Distance slid, m."""
 
 
-def _contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
-    """With what contacts and solver do, step by step."""
-    one = _runnable(model)
-    one.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)
-    step = float(one.opt.timestep)
+def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
+    """Add what contacts and solver do, step by step."""
+    stepped = _runnable(model)
+    stepped.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)
+    step = float(stepped.opt.timestep)
     steps = scenario.steps(step) * len(scenario.times)
-    data, other = initial_data(scenario, one), initial_data(scenario, one)
+    data, scratch = initial_data(scenario, stepped), initial_data(scenario, stepped)
     now: dict[Pair, _Hit] = {}
     hits: list[_Hit] = []
     deepest = residual = force = iterations = 0.0
     for command in scenario.commands(step):
         if command:
             data.ctrl[:] = command
-        advance(one, data)
+        advance(stepped, data)
         residual = max(residual, float(data.solver_fwdinv.max()))
         force = max(force, float(np.linalg.norm(data.qfrc_constraint)))
         iterations += int(data.solver_niter.sum())
-        other.qpos[:], other.qvel[:] = data.qpos, data.qvel
-        mujoco.mj_fwdPosition(one, other)
-        mujoco.mj_fwdVelocity(one, other)
+        scratch.qpos[:], scratch.qvel[:] = data.qpos, data.qvel
+        mujoco.mj_fwdPosition(stepped, scratch)
+        mujoco.mj_fwdVelocity(stepped, scratch)
         before, now = now, {}
-        for contact in touching(other):
+        for contact in touching_contacts(scratch):
             pair = (int(contact.geom[0]), int(contact.geom[1]))
-            apart, along = speeds(one, other, contact)
+            apart, sliding = contact_speeds(stepped, scratch, contact)
             hit = before.pop(pair, None) or now.get(pair)
             if hit is None:
                 hit = _Hit(-apart, contact)
                 hits.append(hit)
             if pair not in now:
-                hit.slid += along * step
+                hit.slid += sliding * step
             now[pair], hit.contact = hit, copy.copy(contact)
             deepest = max(deepest, -float(contact.dist))
         for hit in before.values():
-            hit.apart = max(0.0, speeds(one, other, hit.contact)[0])
+            hit.apart = max(0.0, contact_speeds(stepped, scratch, hit.contact)[0])
     closing = (hit for hit in hits if hit.closing > 0)
     hardest = max(closing, key=lambda hit: hit.closing, default=None)
     return replace(
@@ -241,10 +248,10 @@ def _contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     )
 
 
-def _timed(
+def _with_costs(
     scenario: Scenario, models: list[Any], rows: list[SweepRow], clock: Clock, *, quick: bool
 ) -> list[SweepRow]:
-    """With costs; the first model is as it is, the others are those of the rows."""
+    """Add costs; the first model is as it is, the others are those of the rows."""
     usable = [n for n, row in enumerate(rows) if row.status == "ok"]
     jobs = [_job(scenario, models[n]) for n in (0, *(n + 1 for n in usable))]
     for n, timing in zip(usable, time_jobs(jobs, 0, clock, quick=quick)[1:], strict=True):
@@ -277,11 +284,11 @@ def _rollouts(
 
     pools = [mujoco.rollout.Rollout(nthread=count) for count in counts]
     try:
-        found = time_jobs([job(pool) for pool in pools], 0, clock, quick=quick)
+        timings = time_jobs([job(pool) for pool in pools], 0, clock, quick=quick)
     finally:
         for pool in pools:
             pool.close()
-    for count, timing in zip(counts, found, strict=True):
+    for count, timing in zip(counts, timings, strict=True):
         took, simulated = timing.nanoseconds, batch * steps * step * 1e9
         speed = Interval(simulated / took.value, simulated / took.high, simulated / took.low)
         yield SweepRow(THREADS, f"{count}", own=False, status="ok", throughput=speed)

@@ -1,7 +1,7 @@
 """What scenarios cost, relative to each other, on a machine that does other things too.
 
-Entry points: `time_jobs(jobs, own, clock)`; `costs(model, scene, settings, …)`, of settings of a
-scene; `scenario_job(model, scenes)`, a model's whole scenarios as a job.
+Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
+a scene; `scenario_job(model, scenes)`, a model's whole scenarios as a job.
 
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
@@ -55,99 +55,102 @@ class Timing(Struct, frozen=True):
 
     nanoseconds: Interval
     ratio: Interval
-    """Its time over that of the own one."""
+    """Its time over that of the baseline."""
 
     @property
     def certain(self) -> bool:
-        """Whether the ratio is another than 1 beyond what the measurement can tell."""
+        """Whether the ratio differs from 1 by more than the measurement's uncertainty."""
         off = not self.ratio.low <= 1.0 <= self.ratio.high
         return off and abs(self.ratio.value - 1.0) > 0.03
 
 
 def time_jobs(
-    jobs: Sequence[Job], own: int, clock: Clock, *, quick: bool = False
+    jobs: Sequence[Job], baseline: int, clock: Clock, *, quick: bool = False
 ) -> tuple[Timing, ...]:
-    """Time jobs, of which number `own` is what others are compared with."""
+    """Time jobs, of which number `baseline` is what the others are compared with."""
     times = np.zeros((MOST, len(jobs)))
     budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
     collecting = gc.isenabled()
     gc.disable()
     try:
-        repeats = [_repeats(job, clock) for job in jobs]
+        repeats = [_count_repeats(job, clock) for job in jobs]
         for turn in range(MOST):
             order = range(len(jobs))
             for index in order if turn % 2 else reversed(order):
-                times[turn, index] = _spent(jobs[index], repeats[index], clock)
+                times[turn, index] = _time_job(jobs[index], repeats[index], clock)
             if turn + 1 < FEWEST:
                 continue
-            found = _timings(times[: turn + 1] / repeats, own)
-            widest = max((one.ratio.half_width for one in found), default=0.0)
+            timings = _timings(times[: turn + 1] / repeats, baseline)
+            widest = max((timing.ratio.half_width for timing in timings), default=0.0)
             if widest <= _ENOUGH or clock() - began > budget:
                 break
     finally:
         if collecting:
             gc.enable()
-    return found
+    return timings
 
 
-def _repeats(job: Job, clock: Clock) -> int:
-    """How often a job is repeated, to take as long as it should; caches are warm then."""
+def _count_repeats(job: Job, clock: Clock) -> int:
+    """How often a job must be repeated to take long enough; caches are warm afterwards."""
     times = 1
-    while _spent(job, times, clock) < _SHORTEST and times < 1 << 12:
+    while _time_job(job, times, clock) < _SHORTEST and times < 1 << 12:
         times *= 2
     return times
 
 
-def _spent(job: Job, times: int, clock: Clock) -> int:
+def _time_job(job: Job, times: int, clock: Clock) -> int:
     before = clock()
     for _ in range(times):
         job()
     return clock() - before
 
 
-def _timings(times: Array, own: int) -> tuple[Timing, ...]:
-    """What rounds (n, jobs) say."""
+def _timings(times: Array, baseline: int) -> tuple[Timing, ...]:
+    """The timings of jobs, from the times (n, jobs) of n rounds."""
     count = len(times)
     again = np.random.default_rng(0).integers(count, size=(_DRAWS, count))
     lowest = np.quantile(times, 0.1, axis=0)
-    drawn = np.quantile(times[again], 0.1, axis=1)
+    redrawn = np.quantile(times[again], 0.1, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios, drawn_ratios = lowest / lowest[own], drawn / drawn[:, own : own + 1]
+        ratios, redrawn_ratios = (
+            lowest / lowest[baseline],
+            redrawn / redrawn[:, baseline : baseline + 1],
+        )
     return tuple(
-        Timing(_interval(lowest[n], drawn[:, n]), _interval(ratios[n], drawn_ratios[:, n]))
+        Timing(_interval(lowest[n], redrawn[:, n]), _interval(ratios[n], redrawn_ratios[:, n]))
         for n in range(times.shape[1])
     )
 
 
-def _interval(value: float, drawn: Array) -> Interval:
-    low, high = np.quantile(drawn, (0.025, 0.975)).tolist()
+def _interval(value: float, redrawn: Array) -> Interval:
+    low, high = np.quantile(redrawn, (0.025, 0.975)).tolist()
     return Interval(float(value), min(low, float(value)), max(high, float(value)))
 
 
 def costs(
     model: Any,
     scene: Scene,
-    chosen: Sequence[MeasuredSetting],
-    own: int,
+    settings: Sequence[MeasuredSetting],
+    baseline: int,
     clock: Clock,
     *,
     quick: bool = False,
 ) -> tuple[Timing, ...]:
-    """What the scenario costs under some settings, relative to number `own` of them."""
-    one = with_setting(model, chosen[own])
-    state = full_state(one, initial_data(scene.scenario, one))
+    """What the scenario costs under some settings, relative to number `baseline` of them."""
+    variant = with_setting(model, settings[baseline])
+    state = full_state(variant, initial_data(scene.scenario, variant))
 
     def job(setting: MeasuredSetting) -> Job:
-        run = scenario_job(one, [(scene.scenario, state)], setting.timestep)
+        run = scenario_job(variant, [(scene.scenario, state)], setting.timestep)
 
         def work() -> None:
-            apply(one, setting)
+            apply(variant, setting)
             run()
 
         return work
 
     with silent():
-        return time_jobs([job(setting) for setting in chosen], own, clock, quick=quick)
+        return time_jobs([job(setting) for setting in settings], baseline, clock, quick=quick)
 
 
 def scenario_job(
@@ -156,17 +159,17 @@ def scenario_job(
     timestep: float,
     actuators: Sequence[int] | None = None,
 ) -> Job:
-    """Runs scenarios from the full states in which they begin; `actuators`: those commanded."""
-    data, chosen = mujoco.MjData(model), slice(None) if actuators is None else list(actuators)
+    """A job that runs scenarios from full states; `actuators`: those commanded, else all."""
+    data, commanded = mujoco.MjData(model), slice(None) if actuators is None else list(actuators)
     runs = [
         (
             state,
             [
-                (np.array(command)[chosen] if command else None, len([*steps]))
-                for command, steps in groupby(one.commands(timestep))
+                (np.array(command)[commanded] if command else None, len([*steps]))
+                for command, steps in groupby(scenario.commands(timestep))
             ],
         )
-        for one, state in begins
+        for scenario, state in begins
     ]
 
     def job() -> None:

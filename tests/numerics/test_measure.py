@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure, orders
-from coursebuild.numerics.measure import errors, fitted_order
+from coursebuild.numerics.measure import errors, fit_order
 from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Sizes
 from coursebuild.numerics.problems import all_problems, double_pendulum, impact, scales
 from coursebuild.numerics.reports.cases import ErrorLine
@@ -65,19 +65,19 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     steps = [2.0**-n for n in range(12)]
     clean = [h**3 for h in steps]
     spoilt = [max(e, 1e-7) if e < 0.1 else 5.0 for e in clean]
-    found = fitted_order(steps, spoilt, 1e-9)
-    assert found == fitted_order(steps[2:8], clean[2:8], 0.0)
+    found = fit_order(steps, spoilt, 1e-9)
+    assert found == fit_order(steps[2:8], clean[2:8], 0.0)
     assert found is not None and found.value == pytest.approx(3.0, abs=1e-12)
     assert max(found.uncertainty, found.bend) < 1e-9
-    assert fitted_order(steps[2:5], clean[2:5], 0.0) is None  # three are often on one
-    assert fitted_order(steps, [1e-12] * 12, 1e-12) is None
-    assert fitted_order(steps, clean, 0.0, extent=1e-7) is None  # as large as the motion
+    assert fit_order(steps[2:5], clean[2:5], 0.0) is None  # three are often on one
+    assert fit_order(steps, [1e-12] * 12, 1e-12) is None
+    assert fit_order(steps, clean, 0.0, extent=1e-7) is None  # as large as the motion
     bent = [h**2 + 50 * h**4 for h in steps]
-    assert fitted_order(steps, bent, 0.0) is None
+    assert fit_order(steps, bent, 0.0) is None
     wavy = [h**2 * (1.3 if n % 2 else 1) for n, h in enumerate(steps)]
-    assert fitted_order(steps, wavy, 0.0) is None
+    assert fit_order(steps, wavy, 0.0) is None
     shaken = [h**2 * (1.05 if n % 2 else 1) for n, h in enumerate(steps)]
-    told = fitted_order(steps, shaken, 0.0)
+    told = fit_order(steps, shaken, 0.0)
     assert told is not None and abs(told.value - 2) < told.uncertainty < 0.05
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coursebuild.numerics.engine import EngineStates
-from coursebuild.numerics.observe import slip, sticking
+from coursebuild.numerics.observe import find_sticks, measure_slip
 from coursebuild.numerics.scene import Scene, scenes
 from support.surveys import NOTHING
 
@@ -40,11 +40,11 @@ def moving(speed: list[float], spin: list[float]) -> EngineStates:
 
 def test_only_what_sticks_in_the_reference_creeps() -> None:
     model, scene = ball()
-    rolls = sticking(model, scene, moving([1, 1, 1], [10, 10, 10]))
+    rolls = find_sticks(model, scene, moving([1, 1, 1], [10, 10, 10]))
     assert rolls == (frozenset({(0, 1)}),) * 3
-    slides = sticking(model, scene, moving([1, 0, 0], [0, 0, 0]))
+    slides = find_sticks(model, scene, moving([1, 0, 0], [0, 0, 0]))
     assert slides == (frozenset(), frozenset(), frozenset({(0, 1)}))
     creeping = moving([0.02, 0.03, 0.04], [0, 0, 0])
-    assert slip(model, scene, creeping, rolls) == pytest.approx(0.009)
-    assert slip(model, scene, creeping, slides) == pytest.approx(0.004)
-    assert slip(model, scene, creeping, (frozenset(),) * 3) == 0.0
+    assert measure_slip(model, scene, creeping, rolls) == pytest.approx(0.009)
+    assert measure_slip(model, scene, creeping, slides) == pytest.approx(0.004)
+    assert measure_slip(model, scene, creeping, (frozenset(),) * 3) == 0.0

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
-from coursebuild.numerics.pilot import pilot
+from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.references import KnownMotion, find_reference
 from coursebuild.numerics.scene import SceneError, scenes
@@ -43,7 +43,7 @@ def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str
 
 def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') -> KnownMotion:
     (scene,) = scenes(model, declared("[[scenario]]\n" + text), quick=True)
-    return find_reference(model, pilot(model, scene), quick=True)
+    return find_reference(model, run_pilot(model, scene), quick=True)
 
 
 def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
@@ -71,7 +71,7 @@ def test_a_smooth_scene_is_integrated_twice() -> None:
 )
 def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, why: str) -> None:
     (scene,) = scenes(model, NOTHING, quick=True)
-    first = pilot(model, scene)
+    first = run_pilot(model, scene)
     assert first.jumps == (why,)
     found = find_reference(model, first, quick=True)
     assert found.kind == "self"
@@ -90,7 +90,7 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
     model.key_ctrl[0, 0] = 1.0
     (scene,) = scenes(model, NOTHING, quick=True)
-    first = pilot(model, scene)
+    first = run_pilot(model, scene)
     assert first.jumps == ("an activation at its limit",)
     found = find_reference(model, first, quick=True)
     assert (found.kind, found.states.act[-1, 0]) == ("self", 0.3)

@@ -70,7 +70,7 @@ def test_what_is_declared_is_taken() -> None:
     assert (scenario.duration, scenario.sample, scenario.hold) == (0.8, 0.04, 0.2)
     assert (scenario.keyframe, scenario.controls) == (0, ((1,), (-1,)))
     assert found.timesteps == (0.0005, 0.002, 0.04)
-    assert (found.own, found.title) == (0.002, "a")
+    assert (found.timestep, found.title) == (0.002, "a")
 
 
 @settings(max_examples=150, deadline=None)
@@ -95,7 +95,7 @@ def test_all_times_are_whole_numbers_of_each_other(
     (found,) = scenes(arm(step), parsed.value, quick=quick)
     scenario = found.scenario
     assert is_multiple(scenario.duration, scenario.sample)
-    assert is_multiple(scenario.sample, found.own)
+    assert is_multiple(scenario.sample, found.timestep)
     if hold is not None:
         assert is_multiple(scenario.hold, scenario.sample)
     if steps is not None:
@@ -104,7 +104,7 @@ def test_all_times_are_whole_numbers_of_each_other(
         commanded = 0 if hold is None or count == 1 else hold * count * step
         assert scenario.duration >= max(2.0, commanded) * (1 - 1e-9)
         assert len(scenario.times) >= 2
-    assert found.own in found.timesteps
+    assert found.timestep in found.timesteps
     assert sorted(set(found.timesteps)) == list(found.timesteps)
     for one in found.timesteps:
         assert is_multiple(scenario.sample, one)

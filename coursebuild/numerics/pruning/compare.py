@@ -23,7 +23,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
-from coursebuild.numerics.detector import Peaks, RunJudgement, judge, peaks
+from coursebuild.numerics.detector import Peaks, RunJudgement, judge, update_peaks
 from coursebuild.numerics.engine import advance, initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.index_map import IndexMap, transfer
@@ -102,7 +102,7 @@ def _begin(base: Any, changed: Any, index: IndexMap, scene: Scene) -> tuple[Any,
 def _same_bits(base: Any, changed: Any, index: IndexMap, scene: Scene) -> bool:
     data, other = _begin(base, changed, index, scene)
     end = float(other.time) + scene.scenario.duration
-    for step, command in enumerate(scene.scenario.commands(scene.own)):
+    for step, command in enumerate(scene.scenario.commands(scene.timestep)):
         if command:
             data.ctrl[:] = command
             other.ctrl[:] = data.ctrl[index["nu"]]
@@ -149,9 +149,9 @@ def _shots(base: Any, changed: Any, index: IndexMap, scene: Scene, *, whole: boo
     `whole`: over the whole scenario instead, from its beginning.
     """
     data, other = _begin(base, changed, index, scene)
-    every, length = (max(1, round(span / scene.own)) for span in (SHOTS, SHOT))
+    every, length = (max(1, round(span / scene.timestep)) for span in (SHOTS, SHOT))
     worst = 0.0
-    for step, command in enumerate(scene.scenario.commands(scene.own)):
+    for step, command in enumerate(scene.scenario.commands(scene.timestep)):
         if command:
             data.ctrl[:] = command
             other.ctrl[:] = data.ctrl[index["nu"]]
@@ -187,7 +187,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
     start, made = float(data.time), 0
     touching: set[tuple[int, int]] = set()
     most, constrained, thick = Peaks(), False, thickness(model)
-    for command in scene.scenario.commands(scene.own):
+    for command in scene.scenario.commands(scene.timestep):
         if command:
             data.ctrl[:] = command
         advance(model, data)
@@ -196,8 +196,8 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         if data.ncon:
             felt = data.contact.geom[data.contact.exclude == 0]  # none has a force within its gap
             touching |= {(min(p), max(p)) for p in felt.tolist() if min(p) >= 0}
-        most = peaks(data, most, thick)
+        most = update_peaks(data, most, thick)
         if not most.finite:
             break
-    judgement = judge(model, data, start + made * scene.own, most)
+    judgement = judge(model, data, start + made * scene.timestep, most)
     return WatchedRun(scene, judgement, frozenset(touching), constrained)

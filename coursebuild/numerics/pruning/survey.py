@@ -128,7 +128,7 @@ def survey(order: Order) -> Survey:
         scenarios=tuple(
             DietScenario(
                 one.scene.name,
-                round(one.scene.scenario.duration / one.scene.own),
+                round(one.scene.scenario.duration / one.scene.timestep),
                 one.judgement.status.value,
                 one.judgement.reasons,
             )

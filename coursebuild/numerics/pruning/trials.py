@@ -161,8 +161,8 @@ class PruningTrials:
         except ValueError:
             return None
         jobs = (
-            scenario_job(whole, begins, self.scenes[0].own),
-            scenario_job(trial.model, others, self.scenes[0].own, index["nu"].tolist()),
+            scenario_job(whole, begins, self.scenes[0].timestep),
+            scenario_job(trial.model, others, self.scenes[0].timestep, index["nu"].tolist()),
         )
         with silent():
             found, own = time_jobs(jobs, 1, self.clock, quick=self.quick)
