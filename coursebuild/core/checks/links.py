@@ -39,6 +39,7 @@ from coursebuild.core.model import (
     TermTarget,
     UrlTarget,
     block_inlines,
+    computed_once,
     document_blocks,
     document_inlines,
     document_scripts,
@@ -107,10 +108,7 @@ def anchors(document: Document) -> Mapping[str, Span]:
     Ids of its title, headings, quizzes, listings, outputs, formulas and terms, and those in raw
     HTML; for lines of scripts, see `_names_lines`. They are kept with the document.
     """
-    spans_by_id: dict[str, Span] | None = document.__dict__.get("anchors")
-    if spans_by_id is None:
-        spans_by_id = document.__dict__["anchors"] = dict(_anchors(document))
-    return spans_by_id
+    return computed_once(document, "anchors", lambda: dict(_anchors(document)))
 
 
 def _anchors(document: Document) -> Iterator[tuple[str, Span]]:

@@ -7,7 +7,8 @@ Entry points: `document_blocks`, `document_scripts`, `document_inlines`, `siblin
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
 
 from coursebuild.core.model.blocks import (
     Block,
@@ -33,6 +34,8 @@ from coursebuild.core.model.inlines import (
     Strong,
     Term,
 )
+
+Value = TypeVar("Value")
 
 _HOLDERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may have others in them."""
@@ -100,14 +103,22 @@ def main_and_further(
         yield bool(level), blocks[start:]
 
 
+def computed_once(document: Document, name: str, compute: Callable[[], Value]) -> Value:
+    """What is computed of a document: every check asks for it, so it is kept with the document."""
+    values = document.__dict__
+    if name not in values:
+        values[name] = compute()
+    return values[name]  # type: ignore[no-any-return]
+
+
 def document_blocks(document: Document) -> Iterator[Block]:
     """Every block of a document, its footnotes last."""
-    known: list[Block] | None = document.__dict__.get("walked")
-    if known is None:  # asked for by every check
-        known = document.__dict__["walked"] = list(walk_blocks(document.blocks))
-        for footnote in document.footnotes:
-            known += walk_blocks(footnote.blocks)
-    return iter(known)
+
+    def walk() -> tuple[Block, ...]:
+        groups = (document.blocks, *(footnote.blocks for footnote in document.footnotes))
+        return tuple(block for group in groups for block in walk_blocks(group))
+
+    return iter(computed_once(document, "all_blocks", walk))
 
 
 def sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
@@ -138,7 +149,11 @@ def is_comment(html: HtmlBlock | RawInline) -> bool:
 
 def document_scripts(document: Document) -> tuple[Script, ...]:
     """The complete scripts of a document."""
-    return tuple(block for block in document_blocks(document) if isinstance(block, Script))
+
+    def walk() -> tuple[Script, ...]:
+        return tuple(block for block in document_blocks(document) if isinstance(block, Script))
+
+    return computed_once(document, "scripts", walk)
 
 
 def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
@@ -151,5 +166,9 @@ def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
 
 def document_inlines(document: Document) -> Iterator[Inline]:
     """Every inline of a document."""
-    for block in document_blocks(document):
-        yield from walk_inlines(block_inlines(block))
+
+    def walk() -> tuple[Inline, ...]:
+        groups = (block_inlines(block) for block in document_blocks(document))
+        return tuple(inline for group in groups for inline in walk_inlines(group))
+
+    return iter(computed_once(document, "all_inlines", walk))

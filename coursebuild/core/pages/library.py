@@ -32,6 +32,7 @@ from coursebuild.core.model import (
     Script,
     Target,
     Term,
+    computed_once,
     document_blocks,
     document_inlines,
     document_scripts,
@@ -258,12 +259,14 @@ def models_named(script: Script) -> frozenset[str]:
 
 def _named_models(document: Document) -> dict[str, set[str]]:
     """What a document names that may be models, each with the ways in which it uses them."""
-    known: dict[str, set[str]] | None = document.__dict__.get("models")
-    if known is None:  # asked for with each edit of another
-        known = document.__dict__["models"] = {}
+
+    def collect() -> dict[str, set[str]]:
+        ways_by_name: dict[str, set[str]] = {}
         for way, name in _model_names(document):
-            known.setdefault(name, set()).add(way)
-    return known
+            ways_by_name.setdefault(name, set()).add(way)
+        return ways_by_name
+
+    return computed_once(document, "models", collect)
 
 
 def _model_names(document: Document) -> Iterator[tuple[str, str]]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Mapping
-from pathlib import PurePosixPath
 
 from msgspec import Struct
 
@@ -114,7 +113,9 @@ def _key(path: str) -> str:
 
 
 def _folders(key: str) -> list[str]:
-    return [folder.as_posix() for folder in PurePosixPath(key).parents if folder.name]
+    """The folders that a path lies in."""
+    parts = key.split("/")
+    return ["/".join(parts[:end]) for end in range(1, len(parts))]
 
 
 def _clash(
