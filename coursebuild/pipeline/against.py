@@ -27,12 +27,12 @@ from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.against import (
     RunStanding,
-    judgement,
-    reason_uncompared,
+    judge,
+    judge_comparability,
     run_standings,
 )
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.failures import failure
+from coursebuild.core.scripts.failures import failure_diagnostic
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.progress import Progress
@@ -102,7 +102,7 @@ class _Work(Struct):
         self.here = {one.path: one for one in runs}
         place = environment(self.options.root, self.other, self.progress.say)
         here = run_standings(self.course, self.here, runs)
-        kept = {path: reason_uncompared(standing) for path, standing in here.items()}
+        kept = {path: judge_comparability(standing) for path, standing in here.items()}
         compared = [e for e in self.chosen if kept[e.path] is None]
         there = self._run(compared, place, f"running scripts with MuJoCo {self.other}")
         differing = [e for e in compared if not there[e.path].holds]
@@ -112,12 +112,12 @@ class _Work(Struct):
         for extraction in self.chosen:
             path, reason = extraction.path, kept[extraction.path]
             if reason is not None:
-                lines.append(ScriptAgainst(path, extraction.owner, reason.status, reason.why))
+                lines.append(ScriptAgainst(path, extraction.owner, reason.status, reason.reason))
             elif there[path].holds:
                 lines.append(ScriptAgainst(path, extraction.owner, "same"))
             else:
-                found = judgement(there[path], control.get(path), again[path], engine_version())
-                why = found.why + (f": {trouble}" if trouble and path not in control else "")
+                found = judge(there[path], control.get(path), again[path], engine_version())
+                why = found.reason + (f": {trouble}" if trouble and path not in control else "")
                 lines.append(self._line(extraction, there[path], found.status, why))
         return AgainstReport(
             engine_version(),
@@ -138,7 +138,7 @@ class _Work(Struct):
             why,
             there.changes,
             there.diff,
-            failure(extraction, there.run, everything),
+            failure_diagnostic(extraction, there.run, everything),
         )
 
     def _control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:

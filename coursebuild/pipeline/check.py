@@ -140,7 +140,7 @@ def _sensitivity(
     course: Course, options: Options, progress: Progress, verified: Verified, chosen: Selection
 ) -> tuple[tuple[Sensitivity, ...], list[Diagnostic]]:
     """Which printed digits hold, and the warnings of those that do not."""
-    from coursebuild.core.scripts.sensitivity import noise
+    from coursebuild.core.scripts.sensitivity import noise_warnings
     from coursebuild.pipeline.sensitivity import measure
 
     by_path = {run.path: run for run in verified.results.runs}
@@ -148,7 +148,7 @@ def _sensitivity(
     runs = [by_path[extraction.path] for extraction in ran]
     own = options.for_course(course)
     measured = measure(course, own, progress, ran, runs, chosen.documents, halve=True)
-    return measured, [warning for one in measured for warning in noise(one)]
+    return measured, [warning for one in measured for warning in noise_warnings(one)]
 
 
 def _part(shard: Shard, verified: Verified) -> str:

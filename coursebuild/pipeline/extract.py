@@ -13,7 +13,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course
-from coursebuild.core.scripts.edit import adopted, apply_edits, block_text
+from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text
 from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
@@ -75,7 +75,7 @@ def _adopt(
         data = read_bytes(options.root, example.path)
         if example.diverged and block_text(data) != extraction.text:
             continue  # taking one would lose the other; how to go on is told with it
-        made = adopted(extraction.script, data)
+        made = adopt_file(extraction.script, data)
         if isinstance(made, Edit):
             edits.setdefault(made.span.source, []).append(made)
             read[example.path] = data

@@ -14,7 +14,7 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course
 from coursebuild.core.model.figures import RecordedFigure, recorded_figures
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.scripts.figures import difference, drawn_file
+from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 
@@ -52,10 +52,10 @@ def write_figures(
     for figure in figures_of(course, documents):
         run = by_path.get(figure.script)
         data = dict(run.figures).get(figure.name) if run is not None else None
-        drawn = drawn_file(figure.name, data) if data is not None else ""
+        drawn = prepare_figure(figure.name, data) if data is not None else ""
         recorded = read_recorded(options.root, figure.path)
         if isinstance(drawn, str) or (
-            recorded is not None and not difference(figure.name, recorded, drawn)
+            recorded is not None and not describe_difference(figure.name, recorded, drawn)
         ):
             continue
         try:

@@ -19,7 +19,7 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.model.sensitivity import HALVED, RUNS, Sensitivity
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.scripts.sensitivity import sensitivity, worth_moving
+from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import recorded_outputs, run
@@ -54,7 +54,7 @@ def measure(
     todo = [
         script
         for script, base in pairs
-        if worth_moving(course, recordings.get(script.path, ()), base)
+        if is_worth_moving(course, recordings.get(script.path, ()), base)
     ]
     numbers = (*range(1, RUNS + 1), *((HALVED,) if halve else ()))
     again = _runs(todo, options, progress, numbers)

@@ -25,7 +25,7 @@ from coursebuild.core.model.theme import PICTURES, TEMPLATES, Theme, ThemeFile
 from coursebuild.core.pages.font_files import course_face
 from coursebuild.core.pages.templates import TemplateFailure, template_mistake
 from coursebuild.core.pages.theme import picture_size
-from coursebuild.core.scripts.figures import drawn_file
+from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Source
 
@@ -71,7 +71,7 @@ def load_theme(root: Path, theme: Theme) -> Parsed[Theme]:
 
 def _check_files(theme: Theme) -> Iterator[Diagnostic]:
     for file in theme.pictures:
-        drawn = drawn_file(file.path, file.data)
+        drawn = prepare_figure(file.path, file.data)
         if isinstance(drawn, str):
             yield diagnose("theme-file", file.span, f"`{file.path}` {drawn}")
         elif file in (theme.icon, theme.touch_icon):

@@ -28,9 +28,9 @@ from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
-from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.findings import held_lines, script_findings
+from coursebuild.core.scripts.findings import collect_evidence, script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.figures import figures_of, write_figures
@@ -150,14 +150,14 @@ def _noise(
     progress: Progress,
 ) -> list[Diagnostic]:
     """Warnings of digits that were recorded and are noise, of the scripts whose output changed."""
-    from coursebuild.core.scripts.sensitivity import noise
+    from coursebuild.core.scripts.sensitivity import noise_warnings
     from coursebuild.pipeline.sensitivity import measure
 
     ran = {one.path: one for one in first if one.path in changed}
     scripts = [extraction for extraction in extract(now).value if extraction.path in ran]
     runs = [ran[extraction.path] for extraction in scripts]
     measured = measure(now, options, progress, scripts, runs, chosen.documents)
-    return [warning for one in measured for warning in noise(one)]
+    return [warning for one in measured for warning in noise_warnings(one)]
 
 
 def _is_touched(
@@ -203,7 +203,7 @@ def _edits(
         if recording.script not in good or recording.script in doubtful:
             continue
         comparison = recording.comparison or course.comparison
-        made = updated_body(recording, comparison, course.filters, *good[recording.script])
+        made = update_body(recording, comparison, course.filters, *good[recording.script])
         if isinstance(made, Edit):
             edits.setdefault(recording.span.source, []).append(made)
         elif made is not None:
@@ -259,7 +259,7 @@ def _afterwards(
 
     # What was written above a script moved it, so that its place is another than before.
     placed = [extraction for extraction in extract(now).value if extraction.path in ran]
-    held = held_lines(before, runs, verdicts(before)) if now is not before else None
+    held = collect_evidence(before, runs, verdicts(before)) if now is not before else None
     found = script_findings(now, placed, runs, verdicts(now), held)
     # What update just refused is told by the refusal; a dry run leaves the drift as it is.
     return [d for d in found if d.rule != "output-drift"]

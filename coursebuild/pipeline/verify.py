@@ -34,7 +34,7 @@ from coursebuild.core.model.results import (
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.versions import engine_version, python_version
-from coursebuild.core.scripts.bindings import HeldLines, document_bindings
+from coursebuild.core.scripts.bindings import BindingEvidence, document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import figure_findings
@@ -73,7 +73,7 @@ def verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
-    held: HeldLines | None = None,
+    held: BindingEvidence | None = None,
     known: Mapping[str, ScriptRun] | None = None,
 ) -> Verified:
     """Verify a course, or only what stands in the documents with these paths.

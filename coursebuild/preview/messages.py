@@ -30,8 +30,8 @@ from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
 from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.diff import diff_rows
-from coursebuild.core.scripts.edit import apply_edits, updated_body
-from coursebuild.core.scripts.figures import difference, drawn_file
+from coursebuild.core.scripts.edit import apply_edits, update_body
+from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.judge import judge
@@ -191,7 +191,7 @@ def _drift(session: Session, library: Library, verdict: Verdict) -> dict[str, An
     rows = diff_rows(verdict, library.course.filters, run.stdout)
     edit = new_output(session, library, verdict)
     return {
-        "rows": [[row.mark, [[one.text, one.changed] for one in row.pieces]] for row in rows],
+        "rows": [[row.mark, [[one.text, one.is_changed] for one in row.pieces]] for row in rows],
         "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
         "refused": edit.message if isinstance(edit, Diagnostic) else "",
     }
@@ -204,7 +204,7 @@ def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | D
     if again is None:
         return None
     filters = library.course.filters
-    return updated_body(verdict.recording, verdict.comparison, filters, run.stdout, again)
+    return update_body(verdict.recording, verdict.comparison, filters, run.stdout, again)
 
 
 # --- figures
@@ -216,11 +216,15 @@ def _figures(session: Session, library: Library, document: Document) -> Iterator
     for figure in recorded_figures(document):
         run = library.runs.get(figure.script)
         data = dict(run.figures).get(figure.name) if run is not None else None
-        drawn = drawn_file(figure.name, data) if data is not None else ""
+        drawn = prepare_figure(figure.name, data) if data is not None else ""
         if figure.span not in wrong or isinstance(drawn, str):
             continue
         old = read_recorded(session.root, figure.path)
-        differs = "nothing is recorded yet" if old is None else difference(figure.name, old, drawn)
+        differs = (
+            "nothing is recorded yet"
+            if old is None
+            else describe_difference(figure.name, old, drawn)
+        )
         if differs:
             kind = _IMAGES.get(figure.name.rpartition(".")[2])
             image = f"data:{kind};base64,{base64.b64encode(drawn).decode()}"

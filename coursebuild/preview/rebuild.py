@@ -30,7 +30,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.runner import Finished, RunAll, RunStoppedError, ScriptServer, Started
-from coursebuild.core.scripts.bindings import HeldLines
+from coursebuild.core.scripts.bindings import BindingEvidence
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.progress import Progress
@@ -64,7 +64,7 @@ class BackgroundRebuild:
         self._stages = progress if progress.live else Progress(quiet=True)
         self._seen = -1
         """The session's `edits` when the work began last."""
-        self._held: HeldLines = {}
+        self._held: BindingEvidence = {}
         """The lines that proved bound numbers, also before an output was accepted."""
         self._server = ScriptServer()
         self._style = style

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from msgspec import Struct
 
 from coursebuild.core.model.results import Change, DriftKind
-from coursebuild.core.scripts.diff import shortened
+from coursebuild.core.scripts.diff import shorten
 from coursebuild.core.scripts.findings import closeness
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.report.terminal import (
@@ -87,7 +87,7 @@ def _script_value(script: ScriptAgainst) -> dict[str, object]:
     return {
         **plain(script),
         "by_mujoco": script.status in ("changed", "fails"),
-        "changes": [plain(change, ran="printed") for change in script.changes],
+        "changes": [plain(change) for change in script.changes],
         "failure": None if failure is None else {**plain(failure), "said": failure.label},
     }
 
@@ -145,7 +145,7 @@ def _script(script: ScriptAgainst, other: str, style: Style) -> list[str]:
 
 
 def _change(change: Change, who: str) -> str:
-    recorded, printed = (_shown(text) for text in (change.recorded, change.ran))
+    recorded, printed = (_shown(text) for text in (change.recorded, change.printed))
     told = closeness(change)
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
@@ -156,12 +156,12 @@ def _change(change: Change, who: str) -> str:
             lines = change.recorded.count("\n") + 1
             return f"{who} did not print {plural(lines, 'line')} from `{recorded}` on"
         case DriftKind.EXTRA:
-            lines = change.ran.count("\n") + 1
+            lines = change.printed.count("\n") + 1
             return f"{who} printed {plural(lines, 'more line')} here: `{printed}`"
 
 
 def _shown(text: str) -> str:
-    return shortened(text.strip().split("\n")[0], _WIDTH)
+    return shorten(text.strip().split("\n")[0], _WIDTH)
 
 
 def _sum(report: AgainstReport, lost: int) -> str:

@@ -18,7 +18,7 @@ from coursebuild.core.model import Course, Document, Filter
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run.run_record import from_bytes
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.edit import updated_body
+from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.scenarios import parse_declarations
@@ -159,7 +159,7 @@ def comparison(text: str) -> None:
     if re.search(_UNWRITABLE, recorded + printed) or not printed.strip():
         return
     body = recording(recorded)
-    found = updated_body(body, by, filters, printed, printed)
+    found = update_body(body, by, filters, printed, printed)
     if isinstance(found, Edit):
         edited(body, printed, by, filters)
     elif found is None:

@@ -17,7 +17,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
@@ -135,7 +135,7 @@ def seen(change: Change) -> tuple[str, str, str]:
     """Class, recorded text, printed text; the span must hold what it names."""
     if change.kind in (DriftKind.ROUNDING, DriftKind.NUMERIC, DriftKind.TEXT):
         assert change.span.text == change.recorded
-    return change.kind.value, change.recorded, change.ran
+    return change.kind.value, change.recorded, change.printed
 
 
 # --- updates
@@ -149,14 +149,14 @@ def edited(
     again: str | None = None,
 ) -> Recording:
     """The recording after its update; a second update has nothing to do."""
-    edit = updated_body(lesson, comparison, filters, printed, printed if again is None else again)
+    edit = update_body(lesson, comparison, filters, printed, printed if again is None else again)
     assert isinstance(edit, Edit), edit
     source = lesson.span.source
     text = apply_edits(source.text, [edit])
     assert text[: edit.span.start] == source.text[: edit.span.start]
     assert text[edit.span.start + len(edit.text) :] == source.text[edit.span.end :]
     (new,) = recordings(document(text, source.path))
-    assert updated_body(new, comparison, filters, printed, printed) is None
+    assert update_body(new, comparison, filters, printed, printed) is None
     assert compare(new, comparison, filters, printed).status in ("verified", "volatile")
     return new
 
@@ -176,6 +176,6 @@ def refused(
     recorded: str, printed: str, comparison: Comparison = EXACT, again: str | None = None
 ) -> str:
     second = printed if again is None else again
-    found = updated_body(recording(recorded), comparison, (), printed, second)
+    found = update_body(recording(recorded), comparison, (), printed, second)
     assert isinstance(found, Diagnostic), found
     return told(found)

@@ -103,12 +103,12 @@ class EffectKind(enum.Enum):
     CONNECTION = "c"
 
 
-class Effect(Struct, frozen=True):
-    """Something that a line of a script does to what is around it."""
+class Effect(Struct, frozen=True, rename={"target": "what"}):
+    """Something that a line of a script does beyond the script."""
 
     kind: EffectKind
-    what: str
-    """The path that is written, of a file of the project relative to it; or the address."""
+    target: str
+    """The path that it writes, relative to the project for a file of it; or the address."""
     path: str
     """The file of the project with the line; empty where it is not known."""
     line: int
@@ -173,7 +173,7 @@ class ScriptRun(Struct, frozen=True):
 
 
 class DriftKind(enum.Enum):
-    """The class of a difference between what was recorded and what ran."""
+    """The class of a difference between recorded and printed output."""
 
     ROUNDING = "rounding"
     """Only the last recorded place of numbers differs."""
@@ -194,7 +194,7 @@ class Change(Struct, frozen=True):
     """In the lesson: the number, the text, the missing line, or the place where extra lines would
     stand."""
     recorded: str
-    ran: str
+    printed: str
     relative_error: float | None = None
     digits: int | None = None
     """Leading significant digits that agree."""

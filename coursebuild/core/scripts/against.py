@@ -1,11 +1,11 @@
-"""What a script does with another version of MuJoCo, and whether that is MuJoCo's doing.
+"""What a script does with another version of MuJoCo, and whether MuJoCo is the cause.
 
-Entry points: `run_standings`, how runs stand to what is recorded; `judgement`, what follows from
-four.
+Entry points: `run_standings`, runs compared with what is recorded; `judge_comparability` and
+`judge`, the verdict on one script.
 
-A difference is MuJoCo's only if nothing else can be its cause: the script prints here what is
-recorded, so does a second run, in a fresh environment that differs from the other one in nothing
-but MuJoCo, and in the other one it does twice the same.
+MuJoCo is the cause only if nothing else can be: the script prints here what is recorded; so does a
+control run in a fresh environment that differs from the other one in nothing but MuJoCo; and two
+runs in the other one agree.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from coursebuild.core.scripts.diff import text_diff
 from coursebuild.core.scripts.mapped_text import Side
 
 Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
-"""`changed` and `fails` are MuJoCo's doing; of what is `unclear` that cannot be said."""
+"""`changed` and `fails` are caused by MuJoCo; of `unclear` that cannot be said."""
 
 
 class RunStanding(Struct, frozen=True):
-    """How a run stands to what is recorded; where nothing is, to what the script prints here."""
+    """A run compared with what is recorded, or else with what the script prints here."""
 
     run: ScriptRun
     compared: bool
-    """Whether there is anything that it could be held against."""
+    """Whether there was anything to compare it with."""
     changes: tuple[Change, ...] = ()
     diff: str = ""
-    """Of what is printed, where nothing is recorded."""
+    """The difference between the outputs, where nothing is recorded."""
 
     @property
     def holds(self) -> bool:
@@ -46,71 +46,73 @@ class Judgement(Struct, frozen=True):
     """What became of a script with another version of MuJoCo."""
 
     status: Status
-    why: str = ""
-    """Where that needs to be said, a clause."""
+    reason: str = ""
+    """Why, as a clause, where that needs to be said."""
 
 
 def run_standings(
-    course: Course, here: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
+    course: Course, current_runs: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
 ) -> dict[str, RunStanding]:
-    """How runs stand, by the path of the script; `here` are those of this environment."""
+    """The standing of each run, by path; `current_runs` are those of this environment."""
     runs = tuple(runs)
     verdicts: dict[str, list[Verdict]] = {}
     for verdict in verify(course, runs):
         verdicts.setdefault(verdict.recording.script or "", []).append(verdict)
     return {
-        run.path: _of_recordings(run, verdicts[run.path])
+        run.path: _compare_with_recordings(run, verdicts[run.path])
         if run.path in verdicts
-        else _of_print(course, here[run.path], run)
+        else _compare_with_current(course, current_runs[run.path], run)
         for run in runs
     }
 
 
-def _of_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> RunStanding:
-    told = [verdict for verdict in verdicts if verdict.status != "volatile"]
-    return RunStanding(run, bool(told), tuple(c for verdict in told for c in verdict.changes))
+def _compare_with_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> RunStanding:
+    compared = [verdict for verdict in verdicts if verdict.status != "volatile"]
+    return RunStanding(
+        run, bool(compared), tuple(c for verdict in compared for c in verdict.changes)
+    )
 
 
-def _of_print(course: Course, here: ScriptRun, run: ScriptRun) -> RunStanding:
-    one, two = (Side.of(each.stdout, course.filters) for each in (here, run))
-    same = same_lines(one, two, course.comparison)
-    return RunStanding(run, True, diff="" if same else text_diff(here.stdout, run.stdout))
+def _compare_with_current(course: Course, current_run: ScriptRun, run: ScriptRun) -> RunStanding:
+    current, new = (Side.of(run.stdout, course.filters) for run in (current_run, run))
+    is_same = same_lines(current, new, course.comparison)
+    return RunStanding(run, True, diff="" if is_same else text_diff(current_run.stdout, run.stdout))
 
 
-def reason_uncompared(here: RunStanding) -> Judgement | None:
-    """What keeps a script from being compared; `None` where nothing does."""
-    match here.run.outcome:
+def judge_comparability(standing: RunStanding) -> Judgement | None:
+    """Why a script, as it runs here, cannot be compared; `None` where it can."""
+    match standing.run.outcome:
         case Outcome.NORUN:
             return Judgement("uncompared", "its lesson says `norun`")
         case Outcome.SKIPPED:
-            return Judgement("uncompared", f"it needs {', '.join(here.run.missing)}")
+            return Judgement("uncompared", f"it needs {', '.join(standing.run.missing)}")
         case Outcome.OK:
             pass
         case _:
             return Judgement("uncompared", "it does not run to its end here")
-    if not here.compared:
+    if not standing.compared:
         return Judgement("uncompared", "its output is volatile")
-    if not here.holds:
+    if not standing.holds:
         return Judgement("drifted", "what is recorded is not what it prints here")
     return None
 
 
-def judgement(
-    there: RunStanding, control: RunStanding | None, again: RunStanding, engine: str
+def judge(
+    other: RunStanding, control: RunStanding | None, repeated: RunStanding, engine: str
 ) -> Judgement:
-    """What follows for a script that prints here what is recorded, and there does not.
+    """Judge a script that prints what is recorded here, but not with the other MuJoCo.
 
     Args:
-        there: with the other version of MuJoCo.
-        control: with the version of here, in a fresh environment; `None` where there is none.
-        again: with the other version once more.
-        engine: the version of here.
+        other: its run with the other version of MuJoCo.
+        control: with this version, in a fresh environment; `None` where there is none.
+        repeated: with the other version once more.
+        engine: this version.
     """
-    if (there.run.outcome, there.run.stdout) != (again.run.outcome, again.run.stdout):
+    if (other.run.outcome, other.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
         return Judgement("unclear", "two runs of it there did not do the same")
     if control is None:
         return Judgement("unclear", f"no fresh environment with MuJoCo {engine} could be made")
     if not control.holds:
         fresh = f"a fresh environment with MuJoCo {engine}"
         return Judgement("unclear", f"it does not do in {fresh} what it does here either")
-    return Judgement("changed" if there.run.outcome is Outcome.OK else "fails")
+    return Judgement("changed" if other.run.outcome is Outcome.OK else "fails")

@@ -1,15 +1,15 @@
-"""Which recorded line corresponds to which line that ran.
+"""Which recorded line corresponds to which printed line.
 
-Entry points: `same_lines` (do they match?), `align` (where do they differ?); `pair`, by which all
-other things are aligned as well: words of a line, rows of a table.
+Entry points: `same_lines` (do they match?), `align` (where do they differ?); `pair`, which also
+aligns the words of a line and the rows of a table.
 
-1. Lines of only `...` stand for any number of lines, also none. The recorded lines between two of
-   them must stand in the output without a gap: the first ones at the start, the last ones at the
-   end, the others each at their first place.
+1. A line of only `...` stands for any number of lines, or none. The recorded lines between two of
+   them must be printed without a gap: the first block at the start, the last one at the end, each
+   other one at its first place.
 2. `align` pairs lines by weight: lines that match, lines that differ only in their numbers, lines
-   that share at least half of their words. Lines in between that found no partner are taken as
-   changed, one for one, and the rest as missing or extra; beside a recorded `...` line, lines that
-   ran are elided instead.
+   that share at least half of their words. Lines in between that found no partner count as
+   changed, one for one, and the rest as missing or extra; next to a recorded `...` line, printed
+   lines are elided instead.
 3. `pair` pairs what matches at the start and at the end, and aligns what is left for the greatest
    sum of weights by dynamic programming (Needleman and Wunsch, J. Mol. Biol. 48, 1970) where the
    table is small. A large rest is first cut at items that occur once on either side (patience
@@ -44,26 +44,26 @@ class StepKind(enum.Enum):
     ELLIPSIS = "ellipsis"
     """A recorded `...` line."""
     ELIDED = "elided"
-    """A line that ran and that a `...` line stands for."""
+    """A printed line that a `...` line stands for."""
 
 
 class Step(Struct, frozen=True):
     """One step; the indices count lines from 0.
 
     For `EXTRA` and `ELIDED`, `recorded` is the line before which the line stands; for `MISSING` and
-    `ELLIPSIS`, `ran` is the line that comes next.
+    `ELLIPSIS`, `printed` is the line that comes next.
     """
 
     kind: StepKind
     recorded: int
-    ran: int
+    printed: int
 
 
-def same_lines(recorded: Side, ran: Side, comparison: Comparison) -> bool:
-    """Whether what ran is what was recorded."""
-    if recorded.lines == ran.lines:
+def same_lines(recorded: Side, printed: Side, comparison: Comparison) -> bool:
+    """Whether the printed lines match the recorded ones."""
+    if recorded.lines == printed.lines:
         return True
-    matcher, lines = LineMatcher(comparison), ran.lines
+    matcher, lines = LineMatcher(comparison), printed.lines
     blocks: list[list[str]] = [[]]
     for line in recorded.lines:
         if matcher.elides_lines(line):
@@ -89,30 +89,30 @@ def same_lines(recorded: Side, ran: Side, comparison: Comparison) -> bool:
     return True
 
 
-def align(recorded: Side, ran: Side, matcher: LineMatcher) -> tuple[Step, ...]:
+def align(recorded: Side, printed: Side, matcher: LineMatcher) -> tuple[Step, ...]:
     """The steps that lead through both sides, in order."""
     literal = [i for i, line in enumerate(recorded.lines) if not matcher.elides_lines(line)]
-    pairs = _line_pairs(recorded, literal, ran, matcher)
+    pairs = _line_pairs(recorded, literal, printed, matcher)
     steps: list[Step] = []
     i = j = 0
-    for literal_index, ran_index in (*pairs, (len(literal), len(ran.lines))):
+    for literal_index, printed_index in (*pairs, (len(literal), len(printed.lines))):
         stop = literal[literal_index] if literal_index < len(literal) else len(recorded.lines)
-        steps += _gap(i, stop, j, ran_index, recorded, matcher)
+        steps += _gap_steps(i, stop, j, printed_index, recorded, matcher)
         if stop < len(recorded.lines):
-            same = matcher.matches(recorded.lines[stop], ran.lines[ran_index])
-            steps.append(Step(StepKind.SAME if same else StepKind.DIFFERS, stop, ran_index))
-        i, j = stop + 1, ran_index + 1
+            is_match = matcher.matches(recorded.lines[stop], printed.lines[printed_index])
+            steps.append(Step(StepKind.SAME if is_match else StepKind.DIFFERS, stop, printed_index))
+        i, j = stop + 1, printed_index + 1
     return tuple(steps)
 
 
 def _line_pairs(
-    recorded: Side, literal: Sequence[int], ran: Side, matcher: LineMatcher
+    recorded: Side, literal: Sequence[int], printed: Side, matcher: LineMatcher
 ) -> list[tuple[int, int]]:
-    """Pairs of recorded lines, as indices of `literal`, and lines that ran."""
-    lines, texts = [recorded.lines[i] for i in literal], ran.lines
+    """Pairs of recorded lines, as indices of `literal`, and printed lines."""
+    lines, texts = [recorded.lines[i] for i in literal], printed.lines
     # A `...` line stands just before line `k` of those that are none.
     following = [*literal, len(recorded.lines)]
-    free = [before != after - 1 for before, after in zip([-1, *literal], following, strict=True)]
+    is_free = [before != after - 1 for before, after in zip([-1, *literal], following, strict=True)]
     words = {line: Counter(_WORD.findall(line)) for line in {*lines, *texts}}
 
     def weight(i: int, j: int) -> int:
@@ -122,7 +122,7 @@ def _line_pairs(
             return _ALIKE
         return _likeness(words[lines[i]], words[texts[j]])
 
-    return pair(lines, texts, weight, free)
+    return pair(lines, texts, weight, is_free)
 
 
 def _likeness(a: Counter[str], b: Counter[str]) -> int:
@@ -132,10 +132,10 @@ def _likeness(a: Counter[str], b: Counter[str]) -> int:
     return 1 + 3 * (2 * shared - most) // most if shared and 2 * shared >= most else 0
 
 
-def _gap(
+def _gap_steps(
     i: int, i_stop: int, j: int, j_stop: int, recorded: Side, matcher: LineMatcher
 ) -> list[Step]:
-    """The steps between two pairs: recorded lines `[i, i_stop)`, lines that ran `[j, j_stop)`."""
+    """The steps between two pairs: recorded lines `[i, i_stop)`, printed lines `[j, j_stop)`."""
     elliptic = [matcher.elides_lines(recorded.lines[k]) for k in range(i, i_stop)]
     steps: list[Step] = []
     if any(elliptic):
@@ -145,14 +145,14 @@ def _gap(
                 steps += (Step(StepKind.ELIDED, k + 1, line) for line in range(j, j_stop))
                 j = j_stop
         return steps
-    both = min(i_stop - i, j_stop - j)
-    steps += (Step(StepKind.DIFFERS, i + k, j + k) for k in range(both))
-    steps += (Step(StepKind.MISSING, k, j_stop) for k in range(i + both, i_stop))
-    steps += (Step(StepKind.EXTRA, i_stop, k) for k in range(j + both, j_stop))
+    paired_count = min(i_stop - i, j_stop - j)
+    steps += (Step(StepKind.DIFFERS, i + k, j + k) for k in range(paired_count))
+    steps += (Step(StepKind.MISSING, k, j_stop) for k in range(i + paired_count, i_stop))
+    steps += (Step(StepKind.EXTRA, i_stop, k) for k in range(j + paired_count, j_stop))
     return steps
 
 
-# --- pairs of whatever items
+# --- pairs of items of any kind
 
 Weight = Callable[[int, int], int]
 _Pairs = list[tuple[int, int]]
@@ -161,34 +161,34 @@ MATCH = 8
 """The weight of a pair that matches; smaller ones are for items that are alike, 0 for no pair."""
 
 _CELLS = 250_000
-"""Cells of a table of dynamic programming."""
+"""The most cells that a table of dynamic programming may have."""
 
 
 def pair(
-    left: Sequence[str], right: Sequence[str], weight: Weight, free: Sequence[bool] = ()
+    left: Sequence[str], right: Sequence[str], weight: Weight, is_free: Sequence[bool] = ()
 ) -> _Pairs:
     """Pairs `(i, j)`, growing in both, of items that correspond.
 
     `weight(i, j)` is `MATCH` for items that match, less for items that are alike, 0 for others.
-    `free[i]` says that right items left out before left item `i` (or at the end) cost nothing.
+    `is_free[i]`: right items left out before left item `i` (or at the end) cost nothing.
     """
-    free = free or [False] * (len(left) + 1)
+    is_free = is_free or [False] * (len(left) + 1)
     pairs: _Pairs = []
     regions = [(0, len(left), 0, len(right))]
     while regions:
         i0, i1, j0, j1 = regions.pop()
-        while i0 < i1 and j0 < j1 and not free[i0] and weight(i0, j0) == MATCH:
+        while i0 < i1 and j0 < j1 and not is_free[i0] and weight(i0, j0) == MATCH:
             pairs.append((i0, j0))
             i0, j0 = i0 + 1, j0 + 1
-        while i0 < i1 and j0 < j1 and not free[i1] and weight(i1 - 1, j1 - 1) == MATCH:
+        while i0 < i1 and j0 < j1 and not is_free[i1] and weight(i1 - 1, j1 - 1) == MATCH:
             i1, j1 = i1 - 1, j1 - 1
             pairs.append((i1, j1))
         rows, columns = range(i0, i1), range(j0, j1)
         if len(rows) * len(columns) <= _CELLS:
-            pairs += _best(rows, columns, weight, free)
-        elif anchors := _anchors(left, rows, right, columns):
-            pairs += anchors
-            for i, j in [*anchors, (i1, j1)]:
+            pairs += _best_pairs(rows, columns, weight, is_free)
+        elif chain := _unique_chain(left, rows, right, columns):
+            pairs += chain
+            for i, j in [*chain, (i1, j1)]:
                 regions.append((i0, i, j0, j))
                 i0, j0 = i + 1, j + 1
         else:
@@ -196,20 +196,20 @@ def pair(
     return sorted(pairs)
 
 
-def _best(rows: range, columns: range, weight: Weight, free: Sequence[bool]) -> _Pairs:
-    """The pairs of greatest weight; an item left out costs 1. Of equal choices, the earliest."""
+def _best_pairs(rows: range, columns: range, weight: Weight, is_free: Sequence[bool]) -> _Pairs:
+    """The pairs of greatest total weight; an item left out costs 1. Ties go to the earliest."""
     n, m = len(rows), len(columns)
     weights = [[weight(i, j) for j in columns] for i in rows]
-    cost = [0 if free[rows.start + i] else 1 for i in range(n + 1)]
+    cost = [0 if is_free[rows.start + i] else 1 for i in range(n + 1)]
     score = [[0] * (m + 1) for _ in range(n + 1)]
     score[n] = [-cost[n] * (m - j) for j in range(m + 1)]
     for i in range(n - 1, -1, -1):
-        row, below, row_weights, extra = score[i], score[i + 1], weights[i], cost[i]
-        row[m] = below[m] - 1
+        row, next_row, row_weights, extra = score[i], score[i + 1], weights[i], cost[i]
+        row[m] = next_row[m] - 1
         for j in range(m - 1, -1, -1):
-            best = max(below[j] - 1, row[j + 1] - extra)
+            best = max(next_row[j] - 1, row[j + 1] - extra)
             w = row_weights[j]
-            row[j] = w + below[j + 1] if w and w + below[j + 1] >= best else best
+            row[j] = w + next_row[j + 1] if w and w + next_row[j + 1] >= best else best
     pairs: _Pairs = []
     i = j = 0
     while i < n and j < m:
@@ -224,23 +224,27 @@ def _best(rows: range, columns: range, weight: Weight, free: Sequence[bool]) -> 
     return pairs
 
 
-def _anchors(left: Sequence[str], rows: range, right: Sequence[str], columns: range) -> _Pairs:
-    """Items that occur once on either side, the longest chain that grows in both."""
+def _unique_chain(left: Sequence[str], rows: range, right: Sequence[str], columns: range) -> _Pairs:
+    """The longest chain, growing on both sides, of items that occur once on each."""
     left_count = Counter(left[i] for i in rows)
     right_count = Counter(right[j] for j in columns)
-    where = {right[j]: j for j in columns if right_count[right[j]] == 1}
-    found = [(i, where[left[i]]) for i in rows if left_count[left[i]] == 1 and left[i] in where]
+    columns_by_text = {right[j]: j for j in columns if right_count[right[j]] == 1}
+    unique_pairs = [
+        (i, columns_by_text[left[i]])
+        for i in rows
+        if left_count[left[i]] == 1 and left[i] in columns_by_text
+    ]
     # For each length, the least place on the right at which a chain of that length ends.
     tails: list[int] = []
     lengths: list[int] = []
-    for _, j in found:
+    for _, j in unique_pairs:
         length = bisect_left(tails, j)
         tails[length : length + 1] = [j]
         lengths.append(length)
     chain: _Pairs = []
-    wanted = len(tails) - 1
-    for (i, j), length in zip(reversed(found), reversed(lengths), strict=True):
-        if length == wanted and (not chain or j < chain[-1][1]):
+    length_due = len(tails) - 1
+    for (i, j), length in zip(reversed(unique_pairs), reversed(lengths), strict=True):
+        if length == length_due and (not chain or j < chain[-1][1]):
             chain.append((i, j))
-            wanted -= 1
+            length_due -= 1
     return chain[::-1]

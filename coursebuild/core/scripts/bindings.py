@@ -1,18 +1,18 @@
 """Numbers in prose that must be what a script printed: `` `+6.6 %`{out} ``.
 
-Entry points: `check_bindings` (a document), `leaning_on` (who depends on what has changed).
+Entry points: `check_bindings` (a document), `dependent_bindings` (those that a change affects).
 
 1. A binding depends on the nearest recorded output above it, or on the script that `{out=…}` names:
-   on its recorded outputs anywhere in the course, else on what it printed in this run.
+   on its recorded outputs anywhere in the course, or else on what it printed in this run.
 2. The numbers of a binding must be numbers of one printed line, one after the other, each rounded
    to the digits shown: within half a unit of the last place shown. Integers must be equal.
-3. Text beside the numbers (a unit, a name) chooses: where it stands beside printed numbers as well,
-   only those count. A binding without a number must stand in the output as text.
+3. Text next to the numbers (a unit, a name) narrows the choice: where it stands next to printed
+   numbers as well, only those count. A binding without a number must stand in the output as text.
 4. Recorded text decides, whatever this run printed: drift is reported by itself, with the bindings
-   that lean on it. The run counts where recorded text leaves things out (`...`, tables), and for a
-   binding that does not hold in a text that has drifted: what is recorded may be what is wrong.
-5. Where the script above a binding has no recorded output, the number may be of that script: one of
-   the output further up is not proposed in its place.
+   that depend on it. The run counts where recorded text leaves things out (`...`, tables), and for
+   a binding that does not hold in a text that has drifted: the recorded text may be wrong.
+5. Where the script right above a binding has no recorded output, the number may belong to that
+   script: no number of the output further up is proposed in its place.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import (
+    BoundText,
     PrintedLine,
-    Shown,
     lines_of_run,
     printed_lines,
     text_places,
@@ -54,32 +54,32 @@ _FAILED = (
 )
 
 
-class BindingPlace(Struct, frozen=True):
-    """What a binding shows, and on which outputs it leans, whatever they say now."""
+class BindingKey(Struct, frozen=True):
+    """What a binding shows, and on which outputs it depends, whatever these say now."""
 
     text: str
     script: str
     document: str
     """Empty where the binding names the script."""
     nth: int
-    """Of the recorded outputs of the script in the document."""
+    """Its index among the recorded outputs of the script in the document."""
     count: int
-    """Of these outputs: with another one, it is not known any more which is which."""
+    """How many there are: with one more or less, it is uncertain which is which."""
 
 
-HeldLines: TypeAlias = dict[BindingPlace, tuple[str, ...]]
-"""The lines by which bindings held when that was last looked at."""
+BindingEvidence: TypeAlias = dict[BindingKey, tuple[str, ...]]
+"""The lines by which bindings held when they were last checked."""
 
 
-class Leaning(Struct, frozen=True):
+class DependentBinding(Struct, frozen=True):
     """A binding, and the change of a recorded value that it depends on."""
 
     binding: NumberBinding
     change: Change
 
 
-class Printed:
-    """What a binding can lean on: the recorded outputs of a course and the runs of its scripts."""
+class PrintedOutputs:
+    """What bindings depend on: the recorded outputs of a course and the runs of its scripts."""
 
     def __init__(
         self,
@@ -97,36 +97,37 @@ class Printed:
             if recording.script is not None:
                 self._by_script.setdefault(recording.script, []).append(verdict)
                 self._by_document.setdefault(recording.span.path, []).append(verdict)
-        for found in self._by_document.values():
-            found.sort(key=_end_of_body)
+        for document_verdicts in self._by_document.values():
+            document_verdicts.sort(key=_end_of_body)
         self.scripts = frozenset({*scripts, *self.runs, *self._by_script})
         """The paths of all scripts."""
 
-    def outputs(self, document: Document) -> Sequence[Verdict]:
+    def of_document(self, document: Document) -> Sequence[Verdict]:
         """The recorded outputs of a document, in order."""
         return self._by_document.get(document.source.path, ())
 
-    def recorded(self, binding: NumberBinding) -> list[Verdict]:
+    def of_binding(self, binding: NumberBinding) -> list[Verdict]:
         """The recorded outputs that a binding depends on."""
         if binding.script is not None:
             return self._by_script.get(binding.script, [])
-        found = self._by_document.get(binding.span.path, [])
-        after = bisect_left(found, binding.span.start + 1, key=_end_of_body)
-        return found[after - 1 : after] if after else []
+        verdicts = self._by_document.get(binding.span.path, [])
+        after = bisect_left(verdicts, binding.span.start + 1, key=_end_of_body)
+        return verdicts[after - 1 : after] if after else []
 
-    def place(self, binding: NumberBinding) -> BindingPlace:
-        """What a binding shows, and on which outputs it leans."""
-        recorded = self.recorded(binding)
-        if binding.script is not None or not recorded:
-            return BindingPlace(binding.text, binding.script or "", "", 0, len(recorded))
-        (verdict,) = recorded
+    def key(self, binding: NumberBinding) -> BindingKey:
+        """The key of a binding."""
+        verdicts = self.of_binding(binding)
+        if binding.script is not None or not verdicts:
+            return BindingKey(binding.text, binding.script or "", "", 0, len(verdicts))
+        (verdict,) = verdicts
         path, script = binding.span.path, verdict.recording.script or ""
-        same = [_key(v) for v in self._by_document[path] if v.recording.script == script]
-        return BindingPlace(binding.text, script, path, same.index(_key(verdict)), len(same))
+        siblings = [v for v in self._by_document[path] if v.recording.script == script]
+        nth = list(map(_recording_key, siblings)).index(_recording_key(verdict))
+        return BindingKey(binding.text, script, path, nth, len(siblings))
 
     def lines(self, verdict: Verdict) -> tuple[PrintedLine, ...]:
         """The lines of a recorded output."""
-        key = _key(verdict)
+        key = _recording_key(verdict)
         if key not in self._lines:
             self._lines[key] = printed_lines(verdict.recording, verdict.comparison.filters)
         return self._lines[key]
@@ -136,8 +137,8 @@ def _end_of_body(verdict: Verdict) -> int:
     return verdict.recording.body_span.end
 
 
-def _key(verdict: Verdict) -> tuple[str, int]:
-    """Tells the recorded outputs of a course apart."""
+def _recording_key(verdict: Verdict) -> tuple[str, int]:
+    """A key that tells the recorded outputs of a course apart."""
     return verdict.recording.span.path, verdict.recording.body_span.start
 
 
@@ -148,41 +149,41 @@ def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
 
 
 def check_bindings(
-    document: Document, printed: Printed, held: HeldLines | None = None
+    document: Document, outputs: PrintedOutputs, evidence: BindingEvidence | None = None
 ) -> tuple[Diagnostic, ...]:
     """What is wrong with the bindings of a document.
 
-    Nothing is said of bindings that lean on a script that failed: its failure is reported. `held`
-    takes the lines by which bindings hold, and tells them of those that do not any more.
+    Bindings that depend on a failed script get none: the failure itself is reported. `evidence` is
+    read for the lines by which a binding held before, and gets those by which it holds now.
     """
-    held = {} if held is None else held
-    found: list[Diagnostic] = []
+    evidence = {} if evidence is None else evidence
+    diagnostics: list[Diagnostic] = []
     for binding in document_bindings(document):
-        place = printed.place(binding)
-        checked = _check(binding, printed, held.get(place, ()))
-        if isinstance(checked, Diagnostic):
-            between = None if place in held else _script_between(document, binding, printed)
-            if checked.rule == "binding-mismatch" and between is not None:
-                help = f"if `{between.path}` prints it, record its output above the number"
-                checked = replace(checked, help=help, edits=())
-            found.append(checked)
-        elif checked:
-            held[place] = tuple(line.text for line in checked)
-    return tuple(found)
+        key = outputs.key(binding)
+        finding = _check(binding, outputs, evidence.get(key, ()))
+        if isinstance(finding, Diagnostic):
+            script = None if key in evidence else _script_between(document, binding, outputs)
+            if finding.rule == "binding-mismatch" and script is not None:
+                help = f"if `{script.path}` prints it, record its output above the number"
+                finding = replace(finding, help=help, edits=())
+            diagnostics.append(finding)
+        elif finding:
+            evidence[key] = tuple(line.text for line in finding)
+    return tuple(diagnostics)
 
 
 def _check(
-    binding: NumberBinding, printed: Printed, before: Sequence[str]
+    binding: NumberBinding, outputs: PrintedOutputs, before: Sequence[str]
 ) -> Diagnostic | Sequence[PrintedLine]:
-    """What is wrong with a binding, or the lines by which it holds, as far as it was looked at.
+    """What is wrong with a binding, or the lines by which it holds; no lines where it is unchecked.
 
     `before` are those by which it held before, if that is known.
     """
-    verdicts = printed.recorded(binding)
+    verdicts = outputs.of_binding(binding)
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
-    if path is None or path not in printed.scripts:
-        return _orphan(binding, path, printed)
-    run = printed.runs.get(path)
+    if path is None or path not in outputs.scripts:
+        return _orphan_diagnostic(binding, path, outputs)
+    run = outputs.runs.get(path)
     ran_well = run is not None and run.outcome is Outcome.OK
     if run is not None and (
         run.outcome in _FAILED or (verdicts and ran_well and not run.stdout.strip())
@@ -190,20 +191,22 @@ def _check(
         return ()
     if not verdicts and not ran_well:
         is_run = run is None or run.outcome is not Outcome.NORUN
-        return () if is_run else _orphan(binding, path, printed)
+        return () if is_run else _orphan_diagnostic(binding, path, outputs)
     steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
-    shown = Shown.of(binding.text)
-    lines = [line for verdict in steady for line in printed.lines(verdict)]
-    if _holds(shown, lines):
+    bound_text = BoundText.of(binding.text)
+    lines = [line for verdict in steady for line in outputs.lines(verdict)]
+    if _holds(bound_text, lines):
         return lines
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
     drifted = any(v.status == "drift" for v in steady)
     if (partial or drifted or not verdicts) and run is not None and ran_well:
         lines = lines_of_run(run.stdout, [f for v in steady for f in v.comparison.filters])
-        if _holds(shown, lines):
+        if _holds(bound_text, lines):
             return lines
     varying = [v.recording for v in verdicts if v not in steady or v.comparison.volatile]
-    if varying and (not steady or _holds(shown, [n for r in varying for n in printed_lines(r)])):
+    if varying and (
+        not steady or _holds(bound_text, [n for r in varying for n in printed_lines(r)])
+    ):
         return diagnose(
             "binding-volatile",
             binding.text_span,
@@ -213,65 +216,70 @@ def _check(
     return mismatch(binding, path, lines, before)
 
 
-def _script_between(document: Document, binding: NumberBinding, printed: Printed) -> Script | None:
+def _script_between(
+    document: Document, binding: NumberBinding, outputs: PrintedOutputs
+) -> Script | None:
     """The last script between a binding and the output further up that the binding depends on."""
-    recorded = [] if binding.script is not None else printed.recorded(binding)
-    start = _end_of_body(recorded[0]) if recorded else binding.span.start
+    verdicts = [] if binding.script is not None else outputs.of_binding(binding)
+    start = _end_of_body(verdicts[0]) if verdicts else binding.span.start
     scripts = [s for s in document_scripts(document) if start < s.span.start < binding.span.start]
     return scripts[-1] if scripts else None
 
 
-def _holds(shown: Shown, lines: Sequence[PrintedLine]) -> bool:
-    if not shown.numbers:
-        return bool(shown.before) and next(text_places(shown.before, lines), None) is not None
-    return shown.is_in(lines)
+def _holds(bound_text: BoundText, lines: Sequence[PrintedLine]) -> bool:
+    if bound_text.numbers:
+        return bound_text.is_in(lines)
+    text = bound_text.before
+    return bool(text) and next(text_places(text, lines), None) is not None
 
 
-def _orphan(binding: NumberBinding, path: str | None, printed: Printed) -> Diagnostic:
+def _orphan_diagnostic(
+    binding: NumberBinding, path: str | None, outputs: PrintedOutputs
+) -> Diagnostic:
     """A binding that has no output: none above it, no such script, or one that is not run."""
     if path is None:
-        to = ", and no recorded output stands above it"
+        target = ", and no recorded output stands above it"
         help = "write it below the output, or name the script: `{out=examples/…}`"
-    elif path in printed.scripts:
-        to = f" to `{path}`, which has no recorded output and is not run"
+    elif path in outputs.scripts:
+        target = f" to `{path}`, which has no recorded output and is not run"
         help = "record its output below it"
     else:
-        to = f" to `{path}`, which is no script of the course"
-        help = did_you_mean(path, printed.scripts)
-    message = f"`{binding.text}` is bound{to}"
+        target = f" to `{path}`, which is no script of the course"
+        help = did_you_mean(path, outputs.scripts)
+    message = f"`{binding.text}` is bound{target}"
     return diagnose("binding-orphan", binding.text_span, message, help=help)
 
 
-def leaning_on(
-    verdict: Verdict, documents: Iterable[Document], printed: Printed
-) -> tuple[Leaning, ...]:
-    """The bindings of the course that lean on a value of a recording that changed, in order."""
+def dependent_bindings(
+    verdict: Verdict, documents: Iterable[Document], outputs: PrintedOutputs
+) -> tuple[DependentBinding, ...]:
+    """The bindings of the course, in order, that depend on a changed value of a recording."""
     changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
-    found: list[Leaning] = []
+    dependents: list[DependentBinding] = []
     for document in documents:
         for binding in document_bindings(document):
-            for candidate in printed.recorded(binding):
-                if _key(candidate) == _key(verdict):
-                    places = _leans_at(binding, printed.lines(candidate))
-                    change = next((c for p in places for c in changes if _overlap(p, c.span)), None)
+            for candidate in outputs.of_binding(binding):
+                if _recording_key(candidate) == _recording_key(verdict):
+                    spans = _dependence_spans(binding, outputs.lines(candidate))
+                    change = next((c for p in spans for c in changes if _overlaps(p, c.span)), None)
                     if change is not None:
-                        found.append(Leaning(binding, change))
-    return tuple(found)
+                        dependents.append(DependentBinding(binding, change))
+    return tuple(dependents)
 
 
-def _overlap(one: Span, other: Span) -> bool:
-    return one.start < other.end and other.start < one.end
+def _overlaps(a: Span, b: Span) -> bool:
+    return a.start < b.end and b.start < a.end
 
 
-def _leans_at(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
+def _dependence_spans(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
     """Where the numbers or the text of a binding stand in a recorded output."""
-    shown = Shown.of(binding.text)
-    if not shown.numbers:
-        for line, start, end in text_places(shown.before, lines) if shown.before else ():
+    bound_text = BoundText.of(binding.text)
+    if not bound_text.numbers:
+        for line, start, end in text_places(bound_text.before, lines) if bound_text.before else ():
             if line.locate is not None:
                 yield line.locate(start, end)
         return
-    for window in shown.windows(lines):
-        if window.line.locate is not None and shown.shows(window):
+    for window in bound_text.windows(lines):
+        if window.line.locate is not None and bound_text.shows(window):
             for number in window.numbers:
                 yield window.line.locate(number.start, number.end)

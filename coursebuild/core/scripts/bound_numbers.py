@@ -1,4 +1,4 @@
-"""What was printed, line by line with its numbers, and which of these a bound number may mean.
+"""The printed lines with their numbers, and which of these a bound number may mean.
 
 Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of a run);
 `Shown.of`, `shows`, `text_places`.
@@ -14,7 +14,7 @@ from functools import cached_property
 from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
-from coursebuild.core.scripts.mapped_text import Side, plain, replaced
+from coursebuild.core.scripts.mapped_text import Side, plain_text, replace_ranges
 from coursebuild.core.scripts.numbers import (
     Number,
     round_like,
@@ -37,7 +37,7 @@ class PrintedLine(Struct, frozen=True, dict=True):
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
-        """The numbers in it. Those of most lines nobody asks for."""
+        """The numbers in it; not computed until needed, as those of most lines never are."""
         return scan(self.text)
 
 
@@ -47,17 +47,17 @@ def lines_of_run(stdout: str, filters: Iterable[Filter] = ()) -> list[PrintedLin
 
 
 def printed_lines(recording: Recording, filters: Iterable[Filter] = ()) -> tuple[PrintedLine, ...]:
-    """The lines of a recorded output; as the author sees them, where no filter is applied."""
+    """The lines of a recorded output; without filters, as the author sees them."""
     if isinstance(recording.body, Table):
         return tuple(map(_row_line, table_rows(recording.body)))
     side = Side.of(recording.body.text, filters)
     return tuple(
-        PrintedLine(line, _in_fence(recording.body, side, index))
+        PrintedLine(line, _locator_in_fence(recording.body, side, index))
         for index, line in enumerate(side.lines)
     )
 
 
-def _in_fence(body: Excerpt, side: Side, line: int) -> Locate:
+def _locator_in_fence(body: Excerpt, side: Side, line: int) -> Locate:
     return lambda start, end: body.span(*side.origin(line, start, end))
 
 
@@ -78,13 +78,13 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
     return PrintedLine(" ".join(cell.mapped.text for cell in row), locate)
 
 
-def shows(shown: Number, printed: Number) -> bool:
+def shows(number: Number, printed: Number) -> bool:
     """Whether a number in prose is a printed one, rounded to the digits shown."""
-    if not (shown.finite and printed.finite):
-        return (shown.value.is_nan() and printed.value.is_nan()) or shown.value == printed.value
-    if shown.integer and printed.integer:
-        return shown.value == printed.value
-    return within_half_unit(shown, printed.value)
+    if not (number.finite and printed.finite):
+        return (number.value.is_nan() and printed.value.is_nan()) or number.value == printed.value
+    if number.integer and printed.integer:
+        return number.value == printed.value
+    return within_half_unit(number, printed.value)
 
 
 class Window(Struct, frozen=True):
@@ -109,26 +109,28 @@ class Window(Struct, frozen=True):
         return self.line.text[self.numbers[-1].end :].lstrip().replace("\u2212", "-")
 
 
-class Shown(Struct, frozen=True):
-    """What a binding shows: its numbers and the text around them; `before` is all without any."""
+class BoundText(Struct, frozen=True):
+    """The text of a binding: its numbers and the text around; without numbers, `before` is all."""
 
     before: str
     numbers: tuple[Number, ...]
     after: str
 
     @classmethod
-    def of(cls, text: str) -> Shown:
+    def of(cls, text: str) -> BoundText:
         """The numbers and the plain text of a binding."""
         numbers = scan_prose(text)
         if not numbers:
-            return cls(plain(text), (), "")
-        return cls(plain(text[: numbers[0].start]), numbers, plain(text[numbers[-1].end :]))
+            return cls(plain_text(text), (), "")
+        return cls(
+            plain_text(text[: numbers[0].start]), numbers, plain_text(text[numbers[-1].end :])
+        )
 
     def shows(self, window: Window) -> bool:
-        """Whether the printed numbers are those shown, rounded."""
+        """Whether the printed numbers, rounded, are those of the binding."""
         return all(map(shows, self.numbers, window.numbers))
 
-    def rewritten(self, text: str, window: Window) -> str | None:
+    def rewrite(self, text: str, window: Window) -> str | None:
         """The binding's text with printed numbers in it, rounded to the digits that it shows.
 
         `None` where its notation is not that of a printed number.
@@ -139,47 +141,49 @@ class Shown(Struct, frozen=True):
             if rounded is None:
                 return None
             places.append((number.start, number.end, rounded))
-        return replaced(text, places)
+        return replace_ranges(text, places)
 
     def is_in(self, lines: Sequence[PrintedLine]) -> bool:
-        """Whether printed numbers that may be meant are those shown, rounded."""
+        """Whether printed numbers that may be meant, rounded, are those of the binding."""
         digits = self.numbers[0].text.lstrip("+-\u2212")
-        same = filter(self.shows, self._windows(line for line in lines if digits in line.text))
-        if any(map(self.stands_beside, same)):  # as nearly always: the others need no look
+        equal_windows = filter(
+            self.shows, self._windows(line for line in lines if digits in line.text)
+        )
+        if any(map(self.has_context, equal_windows)):  # nearly always, so look here first
             return True
         return any(map(self.shows, self.windows(lines)))
 
     def _windows(self, lines: Iterable[PrintedLine]) -> Iterator[Window]:
-        """As many printed numbers, one after the other."""
+        """All runs of as many printed numbers of one line."""
         count = len(self.numbers)
         for line in lines:
             for first in range(len(line.numbers) - count + 1):
                 yield Window(line, line.numbers[first : first + count])
 
     def windows(self, lines: Iterable[PrintedLine]) -> list[Window]:
-        """The printed numbers that may be meant, by number and by the text around them."""
+        """The printed numbers that may be meant: those with the same text around, if any."""
         windows = list(self._windows(lines))
-        for stands_beside in self._sides():
-            windows = [window for window in windows if stands_beside(window)] or windows
+        for test in self._context_tests():
+            windows = [window for window in windows if test(window)] or windows
         return windows
 
-    def stands_beside(self, window: Window) -> bool:
-        """Whether the text around the numbers stands around the printed ones as well."""
-        return all(side(window) for side in self._sides())
+    def has_context(self, window: Window) -> bool:
+        """Whether the printed numbers have the same text around them."""
+        return all(test(window) for test in self._context_tests())
 
-    def _sides(self) -> Iterator[Callable[[Window], bool]]:
-        """Whether the text after and the text before the numbers stands beside printed ones."""
+    def _context_tests(self) -> Iterator[Callable[[Window], bool]]:
+        """Tests of whether printed numbers have the same text after, and before, them."""
         if self.after:
             after = re.compile(_whole_words(self.after))
             yield lambda window: after.match(window.after) is not None
         if self.before:
             before = re.compile(_whole_words(self.before) + r"\Z")
             reach = 4 * len(self.before) + 200
-            yield lambda window: before.search(plain(window.before[-reach:])) is not None
+            yield lambda window: before.search(plain_text(window.before[-reach:])) is not None
 
 
 def _whole_words(text: str) -> str:
-    """A pattern for a text, its white space of any width, that does not begin or end in a word."""
+    """A pattern for a text with white space of any width, not starting or ending inside a word."""
     lead = r"(?<!\w)" if text[:1].isalnum() else ""
     tail = r"(?!\w)" if text[-1:].isalnum() else ""
     return lead + r"\s+".join(re.escape(word) for word in text.split()) + tail
@@ -189,5 +193,5 @@ def text_places(text: str, lines: Iterable[PrintedLine]) -> Iterator[tuple[Print
     """Where a text stands in printed lines: whole words only, white space of any width."""
     pattern = re.compile(_whole_words(text))
     for line in lines:
-        for found in pattern.finditer(line.text.replace("\u2212", "-")):
-            yield line, found.start(), found.end()
+        for match in pattern.finditer(line.text.replace("\u2212", "-")):
+            yield line, match.start(), match.end()

@@ -1,12 +1,12 @@
-"""The differences between a recorded line and the line that ran, and their classes.
+"""The differences between a recorded line and the printed line, and their classes.
 
-Entry points: `differences` (inside one line), `number_kind`.
+Entry points: `find_differences` (inside one line), `number_kind`.
 
 1. Lines that differ in their numbers only: each pair of numbers that does not match.
-2. Other lines are cut into numbers, words, signs and white space, and these are aligned: numbers
-   that stand for each other are compared, the rest is text. White space that differs is named only
-   where nothing else does: columns shift when a number gets wider.
-3. A recorded line with an ellipsis that does not fit is different as a whole.
+2. Other lines are cut into numbers, words, signs and white space, and these are aligned: paired
+   numbers are compared, the rest is text. White space that differs is reported only where nothing
+   else does, because columns shift when a number gets wider.
+3. A recorded line with an ellipsis that does not fit differs as a whole.
 """
 
 from __future__ import annotations
@@ -34,62 +34,63 @@ _SPACE, _NUMBER = 1, 4
 
 
 class Difference(Struct, frozen=True):
-    """A stretch of a recorded line, and the stretch of the line that ran which stands there."""
+    """A stretch of a recorded line, and the stretch of the printed line in its place."""
 
     start: int
     end: int
-    ran_start: int
-    ran_end: int
+    printed_start: int
+    printed_end: int
     numbers: tuple[Number, Number] | None = None
-    """Recorded and ran, where both are a number."""
+    """Recorded and printed, where both are a number."""
 
 
-def number_kind(recorded: Number, ran: Number) -> DriftKind:
+def number_kind(recorded: Number, printed: Number) -> DriftKind:
     """The class of a difference between two numbers.
 
-    It is rounding where a number with a point or an exponent is off by no more than one unit of its
-    last recorded place; a count that is off by one is not. The same value, written in another way,
-    is text.
+    It is rounding where a number with a point or an exponent is off by at most one unit of its last
+    recorded place; a count that is off by one is not. The same value in another notation is text.
     """
-    if not (recorded.finite and ran.finite):
+    if not (recorded.finite and printed.finite):
         return DriftKind.NUMERIC
-    gap = difference(recorded.value, ran.value)
+    gap = difference(recorded.value, printed.value)
     if gap == 0:
         return DriftKind.TEXT
-    near = recorded.inexact and gap <= unit(recorded.place)
-    return DriftKind.ROUNDING if near else DriftKind.NUMERIC
+    is_rounding = recorded.inexact and gap <= unit(recorded.place)
+    return DriftKind.ROUNDING if is_rounding else DriftKind.NUMERIC
 
 
-def number_change(span: Span, recorded: str, ran: str, numbers: tuple[Number, Number]) -> Change:
-    """The change of a number at a place of the lesson."""
+def number_change(
+    span: Span, recorded: str, printed: str, numbers: tuple[Number, Number]
+) -> Change:
+    """The change of a number that stands at `span` in the lesson."""
     error = relative_error(numbers[0].value, numbers[1].value)
     size = None if error is None else float(error)
     return Change(
         number_kind(*numbers),
         span,
         recorded,
-        ran,
+        printed,
         None if size == float("inf") else size,
         None if error is None else agreeing_digits(error),
     )
 
 
-def differences(recorded: str, ran: str, matcher: LineMatcher) -> tuple[Difference, ...]:
-    """Where a line that ran differs from the recorded one; at least one difference."""
-    pairs = matcher.pairs(recorded, ran)
+def find_differences(recorded: str, printed: str, matcher: LineMatcher) -> tuple[Difference, ...]:
+    """Where a printed line differs from the recorded one; at least one difference."""
+    pairs = matcher.pairs(recorded, printed)
     if pairs is not None:
         numeric = tuple(
             Difference(a.start, a.end, b.start, b.end, (a, b))
             for a, b in pairs
-            if not matcher.same(a, b)
+            if not matcher.numbers_match(a, b)
         )
         if numeric:
             return numeric
     if not matcher.elides(recorded):
-        found = _token_differences(recorded, ran, matcher)
-        if found:
-            return found
-    return (Difference(0, len(recorded), 0, len(ran)),)
+        token_differences = _token_differences(recorded, printed, matcher)
+        if token_differences:
+            return token_differences
+    return (Difference(0, len(recorded), 0, len(printed)),)
 
 
 class _Token(Struct, frozen=True):
@@ -103,50 +104,54 @@ def _tokens(text: str) -> Iterator[_Token]:
     at = 0
     for number in (*scan(text), None):
         stop = len(text) if number is None else number.start
-        for found in _PART.finditer(text, at, stop):
-            yield _Token(found.start(), found.end(), found.group())
+        for part in _PART.finditer(text, at, stop):
+            yield _Token(part.start(), part.end(), part.group())
         if number is not None:
             yield _Token(number.start, number.end, number.text, number)
             at = number.end
 
 
-def _token_differences(recorded: str, ran: str, matcher: LineMatcher) -> tuple[Difference, ...]:
-    left, right = list(_tokens(recorded)), list(_tokens(ran))
+def _token_differences(recorded: str, printed: str, matcher: LineMatcher) -> tuple[Difference, ...]:
+    left, right = list(_tokens(recorded)), list(_tokens(printed))
 
     def weight(i: int, j: int) -> int:
         a, b = left[i], right[j]
         if a.number is not None and b.number is not None:
-            return MATCH if matcher.same(a.number, b.number) else _NUMBER
+            return MATCH if matcher.numbers_match(a.number, b.number) else _NUMBER
         if a.text.isspace() and b.text.isspace():
             return _SPACE
         return MATCH if a.text == b.text else 0
 
-    found: list[Difference] = []
-    at = ran_at = 0
+    differences: list[Difference] = []
+    at = printed_at = 0
     pairs = pair([t.text for t in left], [t.text for t in right], weight)
     left.append(_Token(len(recorded), len(recorded), ""))
-    right.append(_Token(len(ran), len(ran), ""))
+    right.append(_Token(len(printed), len(printed), ""))
     for i, j in (*pairs, (-1, -1)):
         a, b = left[i], right[j]
-        if at < a.start or ran_at < b.start:
-            found.append(Difference(at, a.start, ran_at, b.start))
+        if at < a.start or printed_at < b.start:
+            differences.append(Difference(at, a.start, printed_at, b.start))
         if a.number is not None and b.number is not None:
-            if not matcher.same(a.number, b.number):
-                both = (a.number, b.number)
-                found.append(Difference(a.start, a.end, b.start, b.end, both))
+            if not matcher.numbers_match(a.number, b.number):
+                numbers = (a.number, b.number)
+                differences.append(Difference(a.start, a.end, b.start, b.end, numbers))
         elif a.text != b.text:
-            found.append(Difference(a.start, a.end, b.start, b.end))
-        at, ran_at = a.end, b.end
-    return _merged(found, recorded, ran)
+            differences.append(Difference(a.start, a.end, b.start, b.end))
+        at, printed_at = a.end, b.end
+    return _merge_differences(differences, recorded, printed)
 
 
-def _merged(found: list[Difference], recorded: str, ran: str) -> tuple[Difference, ...]:
-    """Without white space where there is more; texts with only white space between them as one."""
+def _merge_differences(
+    differences: list[Difference], recorded: str, printed: str
+) -> tuple[Difference, ...]:
+    """Drop white space where anything else differs; join texts with only white space between."""
 
-    def blank(d: Difference) -> bool:
-        return not (recorded[d.start : d.end].strip() or ran[d.ran_start : d.ran_end].strip())
+    def is_blank(d: Difference) -> bool:
+        return not (
+            recorded[d.start : d.end].strip() or printed[d.printed_start : d.printed_end].strip()
+        )
 
-    visible = [d for d in found if not blank(d)] or found
+    visible = [d for d in differences if not is_blank(d)] or differences
     merged: list[Difference] = []
     for d in visible:
         last = merged[-1] if merged else None
@@ -155,9 +160,9 @@ def _merged(found: list[Difference], recorded: str, ran: str) -> tuple[Differenc
             and last.numbers is None
             and d.numbers is None
             and not recorded[last.end : d.start].strip()
-            and not ran[last.ran_end : d.ran_start].strip()
+            and not printed[last.printed_end : d.printed_start].strip()
         ):
-            merged[-1] = Difference(last.start, d.end, last.ran_start, d.ran_end)
+            merged[-1] = Difference(last.start, d.end, last.printed_start, d.printed_end)
         else:
             merged.append(d)
     return tuple(merged)

@@ -3,8 +3,8 @@
 Entry points: `verify` (all recordings of a course), `compare` (one recording).
 
 1. Where both are the same, character by character, the recording is verified.
-2. Else both sides are filtered and split into lines; matching sides are verified too.
-3. Otherwise the lines are aligned (`align`), and each step that differs becomes changes: numbers
+2. Else both sides are filtered and split into lines; if these match, it is verified too.
+3. Else the lines are aligned (`align`), and each step that differs becomes changes: numbers
    and texts inside lines (`changes`), runs of missing or extra lines.
 4. Every change is traced back through the filters to its place in the lesson.
 
@@ -30,7 +30,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.changes import differences, number_change
+from coursebuild.core.scripts.changes import find_differences, number_change
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.tables import compare_table
@@ -40,23 +40,24 @@ from coursebuild.core.text.source import Excerpt, Span
 def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
     """A verdict for every recording of the course that has a script, in order.
 
-    Where two blocks have the same path only the first is run; what is recorded below the other is
-    not compared with its output. Nor is an output whose fence says in a wrong way how to compare.
+    Where two blocks have the same path, only the first is run; what is recorded below the second
+    is not compared with its output. Nor is an output whose fence has mistakes in its options.
     """
     by_path = {run.path: run for run in runs}
-    first: dict[str, Script] = {}
+    first_by_path: dict[str, Script] = {}
     verdicts: list[Verdict] = []
     for document in course.documents:
-        nearest: Script | None = None
+        script_above: Script | None = None
         for block in document_blocks(document):
             if isinstance(block, Script):
-                nearest = block
-                first.setdefault(block.path, block)
+                script_above = block
+                first_by_path.setdefault(block.path, block)
             elif isinstance(block, Recording) and block.script is not None:
                 comparison, run = block.comparison or course.comparison, by_path.get(block.script)
-                same = nearest is not None and nearest.path == block.script
-                kept = block.readable and (not same or first[block.script] is nearest)
-                if kept and run and run.outcome is Outcome.OK and run.stdout.strip():
+                is_nearest = script_above is not None and script_above.path == block.script
+                is_run = not is_nearest or first_by_path[block.script] is script_above
+                is_comparable = block.readable and is_run
+                if is_comparable and run and run.outcome is Outcome.OK and run.stdout.strip():
                     verdicts.append(compare(block, comparison, course.filters, run.stdout))
                 else:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
@@ -74,25 +75,25 @@ def compare(
         return compare_table(recording, body, comparison, filters, Side.of(stdout, filters))
     if stdout in (body.text, f"{body.text}\n"):  # as it nearly always is
         return Verdict(recording, comparison, "verified")
-    recorded, ran = Side.of(body.text, filters), Side.of(stdout, filters)
-    if same_lines(recorded, ran, comparison):
+    recorded, printed = Side.of(body.text, filters), Side.of(stdout, filters)
+    if same_lines(recorded, printed, comparison):
         return Verdict(recording, comparison, "verified")
     matcher = LineMatcher(comparison)
-    changes = _Changes(recording, body, recorded, ran, matcher)
-    found = tuple(changes.of(align(recorded, ran, matcher)))
-    return Verdict(recording, comparison, "drift" if found else "verified", found)
+    finder = _ChangeFinder(recording, body, recorded, printed, matcher)
+    drift = tuple(finder.find(align(recorded, printed, matcher)))
+    return Verdict(recording, comparison, "drift" if drift else "verified", drift)
 
 
-class _Changes(Struct, frozen=True):
+class _ChangeFinder(Struct, frozen=True):
     """Turns steps into changes with their places in the lesson."""
 
     recording: Recording
     body: Excerpt
     recorded: Side
-    ran: Side
+    printed: Side
     matcher: LineMatcher
 
-    def of(self, steps: Sequence[Step]) -> Iterator[Change]:
+    def find(self, steps: Sequence[Step]) -> Iterator[Change]:
         """A change for each difference in a line, and for each run of missing or extra lines."""
         for kind, group in groupby(steps, key=lambda step: step.kind):
             match kind:
@@ -108,12 +109,14 @@ class _Changes(Struct, frozen=True):
 
     def _line(self, step: Step) -> Iterator[Change]:
         """The changes inside one line."""
-        recorded, ran = self.recorded.lines[step.recorded], self.ran.lines[step.ran]
-        for d in differences(recorded, ran, self.matcher):
+        recorded, printed = self.recorded.lines[step.recorded], self.printed.lines[step.printed]
+        for d in find_differences(recorded, printed, self.matcher):
             start, end = self.recorded.origin(step.recorded, d.start, d.end)
-            ran_start, ran_end = self.ran.origin(step.ran, d.ran_start, d.ran_end)
+            printed_start, printed_end = self.printed.origin(
+                step.printed, d.printed_start, d.printed_end
+            )
             span = self._span(start, end)
-            texts = self.recorded.raw[start:end], self.ran.raw[ran_start:ran_end]
+            texts = self.recorded.raw[start:end], self.printed.raw[printed_start:printed_end]
             if d.numbers is not None:
                 yield number_change(span, *texts, d.numbers)
             else:
@@ -126,7 +129,7 @@ class _Changes(Struct, frozen=True):
         return Change(DriftKind.MISSING, span, text, "")
 
     def _extra(self, steps: Sequence[Step]) -> Change:
-        text = "\n".join(self.ran.lines[step.ran] for step in steps)
+        text = "\n".join(self.printed.lines[step.printed] for step in steps)
         before, lines = steps[0].recorded, len(self.recorded.lines)
         place = self.recorded.origin(before, 0, 0)[0] if before < lines else self._end_of(lines - 1)
         return Change(DriftKind.EXTRA, self._span(place, place), "", text)

@@ -1,9 +1,9 @@
-"""A recorded output beside what its script prints now, line by line.
+"""The line-by-line difference between a recorded output and what its script prints now.
 
-Entry points: `diff_rows`; `text_diff`, `shortened`, `quoted`.
+Entry points: `diff_rows`; `text_diff`, `shorten`, `quote`.
 
-Lines that match under the comparison's mode are as recorded, even where their characters differ;
-lines that a `...` stands for are left out. A row says which part of its line is another.
+Lines that match under the comparison's mode count as recorded, even where their characters differ;
+lines that a `...` stands for are left out. A row marks the parts of its line that changed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from msgspec import Struct
 from coursebuild.core.model import Filter, Table
 from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align
-from coursebuild.core.scripts.changes import differences
+from coursebuild.core.scripts.changes import find_differences
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 
@@ -30,7 +30,7 @@ class DiffPiece(Struct, frozen=True):
     """A stretch of a line."""
 
     text: str
-    changed: bool
+    is_changed: bool
 
 
 class DiffRow(Struct, frozen=True):
@@ -40,20 +40,20 @@ class DiffRow(Struct, frozen=True):
     pieces: tuple[DiffPiece, ...]
 
 
-def shortened(text: str, width: int) -> str:
+def shorten(text: str, width: int) -> str:
     """The text, cut to a width with an ellipsis sign at its end."""
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
-def quoted(text: str, width: int) -> str:
-    """A line of output as a message shows it: cut, without the white space around it."""
-    return f"`{shortened(text.strip(), width)}`"
+def quote(text: str, width: int) -> str:
+    """A line of output as a message shows it: cut, without white space at its ends."""
+    return f"`{shorten(text.strip(), width)}`"
 
 
 def text_diff(before: str, now: str) -> str:
     """The lines that two texts do not share, at most twelve of them."""
     lines = [
-        shortened(line, _WIDTH)
+        shorten(line, _WIDTH)
         for line in difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
         if not line.startswith(("---", "+++", "@@"))
     ]
@@ -70,36 +70,41 @@ def diff_rows(verdict: Verdict, filters: tuple[Filter, ...], stdout: str) -> tup
     body = verdict.recording.body
     if isinstance(body, Table):
         return tuple(
-            row for change in verdict.changes for row in _whole(change.recorded, change.ran)
+            row for change in verdict.changes for row in _cell_rows(change.recorded, change.printed)
         )
     matcher, filters = LineMatcher(verdict.comparison), (*filters, *verdict.comparison.filters)
-    recorded, ran = Side.of(body.text, filters), Side.of(stdout, filters)
-    steps = align(recorded, ran, matcher)
-    rows = (row for step in steps for row in _rows(step, recorded, ran, matcher))
-    # All that goes before all that comes, as far as no common line lies between.
+    recorded, printed = Side.of(body.text, filters), Side.of(stdout, filters)
+    steps = align(recorded, printed, matcher)
+    rows = (row for step in steps for row in _step_rows(step, recorded, printed, matcher))
+    # Between two common lines, all removed lines come before all added ones.
     hunks = (list(group) for _, group in groupby(rows, key=lambda row: row.mark == " "))
     return tuple(row for hunk in hunks for row in sorted(hunk, key=lambda r: r.mark, reverse=True))
 
 
-def _whole(recorded: str, ran: str) -> Iterator[DiffRow]:
+def _cell_rows(recorded: str, printed: str) -> Iterator[DiffRow]:
     yield from (_row("-", text) for text in recorded.split("\n") if recorded)
-    yield from (_row("+", text) for text in ran.split("\n") if ran)
+    yield from (_row("+", text) for text in printed.split("\n") if printed)
 
 
-def _rows(step: Step, recorded: Side, ran: Side, matcher: LineMatcher) -> Iterator[DiffRow]:
-    """The rows of a step: one for a line on either side, none for what an ellipsis stands for."""
+def _step_rows(
+    step: Step, recorded: Side, printed: Side, matcher: LineMatcher
+) -> Iterator[DiffRow]:
+    """The rows of a step: one for each line of either side, none for elided lines."""
     match step.kind:
         case StepKind.SAME | StepKind.ELLIPSIS:
             yield from (_row(" ", text) for text in recorded.raw_lines(step.recorded))
         case StepKind.DIFFERS:
-            one, two = recorded.lines[step.recorded], ran.lines[step.ran]
-            found = differences(one, two, matcher)
-            yield DiffRow("-", _pieces(one, [(d.start, d.end) for d in found]))
-            yield DiffRow("+", _pieces(two, [(d.ran_start, d.ran_end) for d in found]))
+            recorded_line, printed_line = recorded.lines[step.recorded], printed.lines[step.printed]
+            line_differences = find_differences(recorded_line, printed_line, matcher)
+            yield DiffRow("-", _pieces(recorded_line, [(d.start, d.end) for d in line_differences]))
+            yield DiffRow(
+                "+",
+                _pieces(printed_line, [(d.printed_start, d.printed_end) for d in line_differences]),
+            )
         case StepKind.MISSING:
             yield _row("-", recorded.lines[step.recorded])
         case StepKind.EXTRA:
-            yield _row("+", ran.lines[step.ran])
+            yield _row("+", printed.lines[step.printed])
         case StepKind.ELIDED:
             pass
 
@@ -108,10 +113,10 @@ def _row(mark: Mark, text: str) -> DiffRow:
     return DiffRow(mark, (DiffPiece(text, mark != " "),))
 
 
-def _pieces(text: str, changed: Sequence[tuple[int, int]]) -> tuple[DiffPiece, ...]:
+def _pieces(text: str, ranges: Sequence[tuple[int, int]]) -> tuple[DiffPiece, ...]:
     pieces: list[DiffPiece] = []
     at = 0
-    for start, end in changed:
+    for start, end in ranges:
         pieces += (DiffPiece(text[at:start], False), DiffPiece(text[start:end], True))
         at = end
     pieces.append(DiffPiece(text[at:], False))

@@ -1,15 +1,15 @@
-"""A new output, put into the lesson by span.
+"""Edits that put a new output, or an edited script, into the lesson.
 
-Entry points: `updated_body` (what to write into one recorded output), `adopted` (an extracted file
-that was edited), `apply_edits`.
+Entry points: `update_body` (one recorded output), `adopt_file` (an extracted file that was edited),
+`apply_edits`.
 
-1. A recording that matches is left alone; it must match both of two runs. A volatile one takes the
-   text of the first run, where that differs in more than its numbers.
+1. A recording that matches both of two runs stays as it is. A volatile one takes the text of the
+   first run if that differs in more than its numbers.
 2. The new lines of a fence are those of the first run. Lines with `...`, and lines that match only
    after a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
    indentation) are those of the lesson.
-3. What was made is compared with both runs before it is offered: an output that differs from run to
-   run, or that the lesson's text cannot hold, is refused with the reason.
+3. The new text is compared with both runs: an output that differs from run to run, or that the
+   lesson's text cannot hold, is refused with the reason.
 
 Tables are brought up to date number by number: see `tableedit`.
 """
@@ -22,9 +22,9 @@ from collections.abc import Iterable, Sequence
 from coursebuild.core.model import Comparison, Filter, Mode, Recording, Script, Table
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher
-from coursebuild.core.scripts.mapped_text import Side, replaced
-from coursebuild.core.scripts.repeat import unstable
-from coursebuild.core.scripts.tableedit import updated_table
+from coursebuild.core.scripts.mapped_text import Side, replace_ranges
+from coursebuild.core.scripts.repeat import instability_diagnostic
+from coursebuild.core.scripts.tableedit import update_table
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -35,7 +35,7 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
     """The text with edits applied by offset.
 
     Raises `ValueError` for edits that overlap, stand at the same place, or belong to another text:
-    each is a bug of whoever made them.
+    each is a bug of the caller.
     """
     places: list[tuple[int, int, str]] = []
     for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
@@ -45,10 +45,10 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
         if places and (start < places[-1][1] or (start, end) == places[-1][:2]):
             raise ValueError(f"edits overlap at offset {start} of {edit.span.path}")
         places.append((start, end, edit.text))
-    return replaced(text, places)
+    return replace_ranges(text, places)
 
 
-def updated_body(
+def update_body(
     recording: Recording,
     comparison: Comparison,
     filters: tuple[Filter, ...],
@@ -62,7 +62,7 @@ def updated_body(
     if not first.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, Table):
-        return updated_table(recording, recording.body, comparison, filters, first, second)
+        return update_table(recording, recording.body, comparison, filters, first, second)
     body, filters = recording.body, (*filters, *comparison.filters)
     if comparison.mode is Mode.VOLATILE:
         before, now = Side.of(body.text).lines, Side.of(first).lines
@@ -70,18 +70,18 @@ def updated_body(
         if len(before) == len(now) and all(map(alike, before, now)):
             return None
         return _fence_edit(recording, now)
-    recorded, ran, again = (Side.of(text, filters) for text in (body.text, first, second))
+    recorded, printed, repeated = (Side.of(text, filters) for text in (body.text, first, second))
     lines: list[str] | Diagnostic
-    if same_lines(recorded, ran, comparison):
-        if same_lines(recorded, again, comparison):
+    if same_lines(recorded, printed, comparison):
+        if same_lines(recorded, repeated, comparison):
             return None
-        return unstable(recording, recorded, again, comparison)
-    lines = _new_lines(body, recorded, ran, comparison, filters)
+        return instability_diagnostic(recording, recorded, repeated, comparison)
+    lines = _new_lines(body, recorded, printed, comparison, filters)
     if isinstance(lines, Diagnostic):
         return lines
     new = Side.of("\n".join(lines), filters)
-    if not same_lines(new, again, comparison):
-        return unstable(recording, new, again, comparison)
+    if not same_lines(new, repeated, comparison):
+        return instability_diagnostic(recording, new, repeated, comparison)
     return _fence_edit(recording, lines)
 
 
@@ -96,22 +96,21 @@ def refusal(span: Span, message: str, help_text: str, label: str = "") -> Diagno
 def _new_lines(
     body: Excerpt,
     recorded: Side,
-    ran: Side,
+    printed: Side,
     comparison: Comparison,
     filters: tuple[Filter, ...],
 ) -> list[str] | Diagnostic:
     """The lines to record; they match the run."""
-    printed = list(Side.of(ran.raw).lines)
-    tries: list[list[str]] = []
+    candidates: list[list[str]] = []
     if filters or comparison.ellipsis:
-        kept = _Kept(body, recorded, ran, LineMatcher(comparison)).lines()
-        if isinstance(kept, Diagnostic):
-            return kept
-        tries.append(kept)
+        updated_lines = _LineUpdater(body, recorded, printed, LineMatcher(comparison)).lines()
+        if isinstance(updated_lines, Diagnostic):
+            return updated_lines
+        candidates.append(updated_lines)
     if not comparison.ellipsis:
-        tries.append(printed)
-    for lines in tries:
-        if same_lines(Side.of("\n".join(lines), filters), ran, comparison):
+        candidates.append(list(Side.of(printed.raw).lines))
+    for lines in candidates:
+        if same_lines(Side.of("\n".join(lines), filters), printed, comparison):
             return lines
     return refusal(
         body.span().first_line(),
@@ -120,60 +119,64 @@ def _new_lines(
     )
 
 
-class _Kept:
-    """Builds new lines around what the author wrote on purpose."""
+class _LineUpdater:
+    """Builds new lines that keep what the author wrote on purpose: ellipses and filtered text."""
 
-    def __init__(self, body: Excerpt, recorded: Side, ran: Side, matcher: LineMatcher) -> None:
-        self.body, self.recorded, self.ran, self.matcher = body, recorded, ran, matcher
+    def __init__(self, body: Excerpt, recorded: Side, printed: Side, matcher: LineMatcher) -> None:
+        self.body, self.recorded, self.printed, self.matcher = body, recorded, printed, matcher
 
     def lines(self) -> list[str] | Diagnostic:
-        steps = align(self.recorded, self.ran, self.matcher)
+        steps = align(self.recorded, self.printed, self.matcher)
         lines: list[str] = []
         for index, step in enumerate(steps):
-            made = self._of_step(step, steps, index)
-            if isinstance(made, Diagnostic):
-                return made
-            lines += made
+            lines_of_step = self._lines_of_step(step, steps, index)
+            if isinstance(lines_of_step, Diagnostic):
+                return lines_of_step
+            lines += lines_of_step
         return lines
 
-    def _of_step(self, step: Step, steps: Sequence[Step], index: int) -> Iterable[str] | Diagnostic:
+    def _lines_of_step(
+        self, step: Step, steps: Sequence[Step], index: int
+    ) -> Iterable[str] | Diagnostic:
         match step.kind:
             case StepKind.SAME:
-                if self._on_purpose(step):
+                if self._is_intended(step):
                     return self.recorded.raw_lines(step.recorded)
-                return self.ran.raw_lines(step.ran)
+                return self.printed.raw_lines(step.printed)
             case StepKind.DIFFERS:
                 if self.matcher.elides(self.recorded.lines[step.recorded]):
                     return self._with_numbers(step)
-                return self.ran.raw_lines(step.ran)
+                return self.printed.raw_lines(step.printed)
             case StepKind.MISSING:
-                if _beside_elided(steps, index):
+                if _has_elided_neighbours(steps, index):
                     return self._refusal(step.recorded, "this line was not printed where `...` is")
                 return ()
             case StepKind.EXTRA:
-                return self.ran.raw_lines(step.ran)
+                return self.printed.raw_lines(step.printed)
             case StepKind.ELLIPSIS:
                 return self.recorded.raw_lines(step.recorded)
             case StepKind.ELIDED:
                 return ()
 
-    def _on_purpose(self, step: Step) -> bool:
+    def _is_intended(self, step: Step) -> bool:
         """Whether a line that matches does so by an ellipsis or a filter."""
         text = self.recorded.lines[step.recorded]
         return (
             self.matcher.elides(text)
             or self.recorded.raw_lines(step.recorded) != (text,)
-            or self.ran.raw_lines(step.ran) != (self.ran.lines[step.ran],)
+            or self.printed.raw_lines(step.printed) != (self.printed.lines[step.printed],)
         )
 
     def _with_numbers(self, step: Step) -> Iterable[str] | Diagnostic:
-        """A line with `...` that fits but for its numbers, with the numbers of the run."""
+        """A line with `...` that fits except for its numbers, with the numbers of the run."""
         text = self.recorded.lines[step.recorded]
-        pairs = self.matcher.pairs(text, self.ran.lines[step.ran])
+        pairs = self.matcher.pairs(text, self.printed.lines[step.printed])
         if pairs is None or self.recorded.raw_lines(step.recorded) != (text,):
             return self._refusal(step.recorded, "this line no longer fits what the script prints")
-        others = ((a.start, a.end, b.text) for a, b in pairs if not self.matcher.same(a, b))
-        return (replaced(text, others),)
+        changes = (
+            (a.start, a.end, b.text) for a, b in pairs if not self.matcher.numbers_match(a, b)
+        )
+        return (replace_ranges(text, changes),)
 
     def _refusal(self, line: int, label: str) -> Diagnostic:
         start, end = self.recorded.origin(line, 0, len(self.recorded.lines[line]))
@@ -185,8 +188,8 @@ class _Kept:
         )
 
 
-def _beside_elided(steps: Sequence[Step], index: int) -> bool:
-    """Whether lines are elided between the pairs of lines around a step."""
+def _has_elided_neighbours(steps: Sequence[Step], index: int) -> bool:
+    """Whether lines are elided between the paired lines before and after a step."""
     for places in (range(index - 1, -1, -1), range(index + 1, len(steps))):
         for kind in (steps[at].kind for at in places):
             if kind is StepKind.ELIDED:
@@ -220,26 +223,26 @@ def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic
     return whole_lines(recording.body_span, recording.prefix, lines)
 
 
-def adopted(script: Script, data: bytes) -> Edit | Diagnostic:
-    """What to write into the block so that it extracts to `data`; a diagnostic where it cannot be.
+def adopt_file(script: Script, data: bytes) -> Edit | Diagnostic:
+    """What to write into the block so that it extracts to `data`; a diagnostic where that fails.
 
     The lesson's line ends and what stands before each line of the block are kept.
     """
 
-    def impossible(why: str) -> Diagnostic:
-        message = f"{script.path} cannot be brought into the lesson: {why}"
+    def refuse(reason: str) -> Diagnostic:
+        message = f"{script.path} cannot be brought into the lesson: {reason}"
         return diagnose("example-edited", script.path_span, message, help="bring it over by hand")
 
     text = block_text(data)
     if text is None:
-        return impossible("it is not UTF-8")
+        return refuse("it is not UTF-8")
     if text == "\n":
-        return impossible("it is empty")
+        return refuse("it is empty")
     lines = text.removesuffix("\n").split("\n")
     if _longest_marks(lines, _opening_fence(script.body_span).text):
-        return impossible("one of its lines would close the fence, or begin another")
+        return refuse("one of its lines would close the fence, or begin another")
     if "\0" in text:
-        return impossible("it holds a NUL")
+        return refuse("it holds a NUL")
     return whole_lines(script.body_span, script.prefix, lines)
 
 
@@ -256,23 +259,23 @@ def block_text(data: bytes) -> str | None:
 
 
 def _opening_fence(body: Span) -> Span:
-    """The marks that open the fence whose lines these are."""
+    """The marks that open the fence with this body."""
     line = body.source.position(body.start - 1)[0]
-    found = _FENCE.search(body.source.text, body.source.line_starts[line - 1], body.start)
-    assert found is not None
-    return Span(body.source, *found.span())
+    match = _FENCE.search(body.source.text, body.source.line_starts[line - 1], body.start)
+    assert match is not None
+    return Span(body.source, *match.span())
 
 
 def _longest_marks(lines: Sequence[str], fence: str) -> int:
     """The number of marks of the longest line that would close a fence, or begin another in it."""
     marks = re.compile(rf" {{0,3}}({re.escape(fence[0])}{{{len(fence)},}})(?:[ \t]*| *\w[^`]*)")
-    found = (marks.fullmatch(line) for line in lines)
-    return max((len(one[1]) for one in found if one), default=0)
+    matches = (marks.fullmatch(line) for line in lines)
+    return max((len(match[1]) for match in matches if match), default=0)
 
 
 def whole_lines(body: Span, prefix: str, lines: Sequence[str]) -> Edit:
     """New lines in a fence, with the line ends of the lesson and what stands before each line."""
     before = body.source.text[: body.start]
     line_end = "\r\n" if before.endswith("\r\n") else "\r" if before.endswith("\r") else "\n"
-    written = (prefix + line if line else prefix.rstrip() for line in lines)
-    return Edit(body, "".join(line + line_end for line in written))
+    texts = (prefix + line if line else prefix.rstrip() for line in lines)
+    return Edit(body, "".join(line + line_end for line in texts))

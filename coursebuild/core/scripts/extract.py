@@ -2,8 +2,8 @@
 
 Entry points: `extract` (a course's scripts and what is wrong with their paths), `jobs`.
 
-Two paths clash when they are equal, when they are one file where upper and lower case are not told
-apart, or when one is a folder on the way to the other. The first in the order of the course stays.
+Two paths clash when they are equal, when they differ only in upper and lower case, or when one is a
+folder on the way to the other. The first in the order of the course stays.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class Extraction(Struct, frozen=True):
 
 def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     """The scripts of a course in order, no two of which clash."""
-    kept: list[Extraction] = []
-    found: list[Diagnostic] = []
+    extractions: list[Extraction] = []
+    diagnostics: list[Diagnostic] = []
     files: dict[str, Extraction] = {}
     folders: dict[str, Extraction] = {}
     packages = tuple(package.path for package in course.packages)
@@ -72,43 +72,43 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
                 script, owner.id, packages, course.environment, course.limits.scripts
             )
             key = _key(script.path)
-            clash = _clash(extraction, files, folders)
+            clash = _find_clash(extraction, files, folders)
             if clash is None:
                 files[key] = extraction
                 for folder in _folders(key):
                     folders.setdefault(folder, extraction)
-                kept.append(extraction)
+                extractions.append(extraction)
             else:
-                found.append(clash)
-    return Parsed(tuple(kept), tuple(found))
+                diagnostics.append(clash)
+    return Parsed(tuple(extractions), tuple(diagnostics))
 
 
 _PATIENCE = 3.0
-"""How many times as long a script may take whose initial states are moved."""
+"""How many times as long a script may take when its initial states are moved."""
 
 
 def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[ScriptJob, ...]:
-    """What to run; with initial states moved, which takes longer, in the direction of a number."""
+    """The jobs that run these scripts; see `ScriptJob.perturbation`, which takes longer."""
     patience = _PATIENCE if perturbation else 1.0
     return tuple(
         ScriptJob(
-            each.path,
-            each.script.args,
-            each.script.timeout * patience,
-            each.script.requires,
+            extraction.path,
+            extraction.script.args,
+            extraction.script.timeout * patience,
+            extraction.script.requires,
             perturbation,
-            each.packages,
-            each.environment,
-            each.script.writes,
-            tuple(figure.name for figure in each.script.figures),
-            each.memory,
+            extraction.packages,
+            extraction.environment,
+            extraction.script.writes,
+            tuple(figure.name for figure in extraction.script.figures),
+            extraction.memory,
         )
-        for each in extractions
+        for extraction in extractions
     )
 
 
 def _key(path: str) -> str:
-    """The same for paths that some file system takes for one."""
+    """A key that is equal for paths that some file system takes for the same file."""
     return unicodedata.normalize("NFC", path).casefold()
 
 
@@ -118,28 +118,28 @@ def _folders(key: str) -> list[str]:
     return ["/".join(parts[:end]) for end in range(1, len(parts))]
 
 
-def _clash(
+def _find_clash(
     new: Extraction, files: Mapping[str, Extraction], folders: Mapping[str, Extraction]
 ) -> Diagnostic | None:
-    """What a path clashes with, of files and folders before it, by their keys."""
+    """A diagnostic if a path clashes with an earlier file or folder; both are given by key."""
     key = _key(new.path)
-    above = next((files[folder] for folder in _folders(key) if folder in files), None)
-    old = files.get(key) or folders.get(key) or above
-    if old is None:
+    blocking_file = next((files[folder] for folder in _folders(key) if folder in files), None)
+    first = files.get(key) or folders.get(key) or blocking_file
+    if first is None:
         return None
-    note = f"`{old.path}` is written here"
-    if old.path == new.path:
+    note = f"`{first.path}` is written here"
+    if first.path == new.path:
         message, note = f"`{new.path}` is written by two blocks", "written here first"
     elif key in files:
-        message = f"`{new.path}` and `{old.path}` are one file where case does not count"
+        message = f"`{new.path}` and `{first.path}` are one file where case does not count"
     elif key in folders:
-        message = f"`{new.path}` is a file here and a folder of `{old.path}`"
+        message = f"`{new.path}` is a file here and a folder of `{first.path}`"
     else:
-        message = f"`{old.path}` is a file and cannot be a folder of `{new.path}`"
+        message = f"`{first.path}` is a file and cannot be a folder of `{new.path}`"
     return diagnose(
         "script-repeated",
         new.script.path_span,
         message,
         help="give one of them another path",
-        notes=[Note(note, old.script.path_span)],
+        notes=[Note(note, first.script.path_span)],
     )

@@ -1,14 +1,15 @@
-"""What to say about a script that did not run to its end, or in which a simulation was lost.
+"""Diagnostics of a script that did not run to its end, lost a simulation, or reached too far.
 
-Entry points: `failure` (a run), `silence` (an output is recorded and nothing was printed),
-`divergence` (simulations), `is_lost`, `effects` (what it does to what is around it).
+Entry points: `failure_diagnostic` (a run), `silence_diagnostic` (an output is recorded and nothing
+was printed), `divergence_diagnostics` (simulations), `is_lost`, `effect_diagnostics` (what it wrote
+elsewhere, or asked of the network).
 
-1. A traceback's frames are read out of the standard error: each line of an extracted file is the
-   line of a lesson, and the innermost such line is what the diagnostic points at. Of a script that
-   does not parse nothing is said: the reader of its lesson has told it.
+1. A traceback's frames are read out of the standard error. Each line of an extracted file is the
+   line of a lesson; the diagnostic points at the innermost such line. A script that does not parse
+   gets none: the check of its lesson has reported it.
 2. A warning of MuJoCo's and a state that is not finite are errors, unless the fence says
-   `diverges`; bodies deep in each other are a warning, unless it says `deep`. A script that says
-   either and does not is wrong about itself.
+   `diverges`; bodies deep in each other are a warning, unless it says `deep`. A fence that says
+   either of a script that does not is a mistake as well.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import assert_never
 
 from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
-from coursebuild.core.scripts.diff import shortened
+from coursebuild.core.scripts.diff import shorten
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
@@ -31,11 +32,11 @@ _WARNING = re.compile(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULT
 _NOISE = re.compile(
     r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?|\n+Extension modules: [^\n]*\Z"
 )
-"""What a crash tells that is of no use, or another each time."""
+"""The parts of a crash dump that are of no use, or differ each time."""
 _COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _CRASH = "Current thread "
 _ABORTED = "Fatal Python error: Aborted\n\n"
-"""What Python says when it is asked, at the end of its time, where it is."""
+"""How Python's answer begins when a script at its time limit is asked where it is."""
 _LIBRARIES = ("site-packages", "dist-packages")
 
 _FIRST_SIGNALS = "HUP INT QUIT ILL TRAP ABRT BUS FPE KILL USR1 SEGV USR2 PIPE ALRM TERM"
@@ -60,15 +61,15 @@ _HELPS = (
         "no window opens while a course is checked: leave it out, or say `norun` on its fence",
     ),
 )
-"""The exception's line, and what mends it."""
+"""A pattern for the exception's line, and the help."""
 
 _TAIL_LINES = 30
 _TAIL_CHARACTERS = 4000
 _LABEL = 120
 
 
-class _Lessons:
-    """Finds the lesson's line for a line of an extracted file, wherever that file lies."""
+class _LessonLines:
+    """Finds the lesson's line for a line of an extracted file, wherever the file lies."""
 
     def __init__(self, extractions: Iterable[Extraction]) -> None:
         self._by_path = {extraction.path: extraction for extraction in extractions}
@@ -77,14 +78,14 @@ class _Lessons:
         """The script and the lesson's line where a traceback or a crash dump ends."""
         dump = stderr.rfind(_CRASH)
         frames = list(_FRAME.finditer(stderr, max(0, dump)))
-        for found in frames if dump >= 0 else reversed(frames):
-            extraction, span = self._find(found)
+        for match in frames if dump >= 0 else reversed(frames):
+            extraction, span = self._find(match)
             if extraction is not None and span is not None:
                 return extraction, without_indentation(span)
         return None
 
-    def translated(self, text: str) -> str:
-        """The text with the paths and lines of extracted files made those of lessons."""
+    def translate_paths(self, text: str) -> str:
+        """The text with paths and lines of extracted files replaced by those of lessons."""
 
         def frame(found: re.Match[str]) -> str:
             _, span = self._find(found)
@@ -96,14 +97,14 @@ class _Lessons:
 
         return _WARNING.sub(warning, _FRAME.sub(frame, text))
 
-    def _find(self, found: re.Match[str]) -> tuple[Extraction | None, Span | None]:
-        parts = found["path"].replace("\\", "/").split("/")
+    def _find(self, match: re.Match[str]) -> tuple[Extraction | None, Span | None]:
+        parts = match["path"].replace("\\", "/").split("/")
         if any(library in parts for library in _LIBRARIES):
             return None, None
         for first in range(len(parts)):
             extraction = self._by_path.get("/".join(parts[first:]))
             if extraction is not None:
-                return extraction, extraction.line_span(int(found["line"]))
+                return extraction, extraction.line_span(int(match["line"]))
         return None, None
 
 
@@ -113,54 +114,61 @@ def without_indentation(span: Span) -> Span:
     return Span(span.source, span.start + lead, span.end)
 
 
-def failure(
+def failure_diagnostic(
     extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
 ) -> Diagnostic | None:
-    """What is wrong with a run; `None` for one that ended well or was not to be made."""
-    path, help = f"`{extraction.path}`", ""
-    match run.outcome:
-        case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN:
-            return None
-        case Outcome.FAILED:
-            rule, message = "script-failed", f"{path} exited with status {run.status}"
-        case Outcome.KILLED:
-            known = _SIGNALS.get(run.status)
-            name = f"SIG{known}" if known else f"signal {run.status}"
-            rule, message = "script-killed", f"{path} was ended by {name}"
-            if name == "SIGKILL":
-                help = "the system ends a process that takes too much memory"
-        case Outcome.TIMEOUT:
-            limit = f"{extraction.script.timeout:g}"
-            rule, message = "script-timeout", f"{path} was stopped after {limit} s, its time limit"
-            help = "make it do less, or set `timeout=SECONDS` on its fence to a higher limit"
-        case Outcome.OUTPUT_LIMIT:
-            rule, message = "script-output-limit", f"{path} printed more than 1 MiB"
-            help = "print less: a recorded output is to be read"
-        case Outcome.ENCODING:
-            rule, message = "script-encoding", f"{path} printed bytes that are not UTF-8"
-            help = "print text; `sys.stdout.buffer` takes bytes as they are"
-        case _:
-            assert_never(run.outcome)
-    lessons, stderr = _Lessons(extractions), _COLOURS.sub("", run.stderr)
+    """What is wrong with a run; `None` where it ended well or the script was not run."""
+    wording = _failure_wording(extraction, run)
+    if wording is None:
+        return None
+    rule, message, help = wording
+    lessons, stderr = _LessonLines(extractions), _COLOURS.sub("", run.stderr)
     fence = extraction.script.span.first_line()
-    where, span, label = extraction, fence, ""
+    source, span, label = extraction, fence, ""
     if run.outcome in (Outcome.FAILED, Outcome.KILLED, Outcome.TIMEOUT):
-        where, span = lessons.innermost(stderr) or (extraction, fence)
+        source, span = lessons.innermost(stderr) or (extraction, fence)
         label = "" if span is fence else "it was here"
     if run.outcome is Outcome.FAILED:
-        if not (_parses(where) and _parses(extraction)):
+        if not (_parses(source) and _parses(extraction)):
             return None
-        words = _last_words(stderr)
-        label = shortened(words, _LABEL)
-        found = ((pattern.match(words), advice) for pattern, advice in _HELPS)
-        help = next((match.expand(advice) for match, advice in found if match), "")
-    notes = _stderr_notes(run.outcome, lessons.translated(stderr))
-    if where.path != extraction.path:
+        error = _last_message(stderr)
+        label = shorten(error, _LABEL)
+        matches = ((pattern.match(error), advice) for pattern, advice in _HELPS)
+        help = next((match.expand(advice) for match, advice in matches if match), "")
+    notes = _stderr_notes(run.outcome, lessons.translate_paths(stderr))
+    if source.path != extraction.path:
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
     return diagnose(rule, span, message, label=label, help=help, notes=notes)
 
 
-def silence(recording: Recording, path: str) -> Diagnostic:
+def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, str] | None:
+    """The rule, the message and the help for a failed run; `None` for any other."""
+    path = f"`{extraction.path}`"
+    match run.outcome:
+        case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN:
+            return None
+        case Outcome.FAILED:
+            return "script-failed", f"{path} exited with status {run.status}", ""
+        case Outcome.KILLED:
+            signal = _SIGNALS.get(run.status)
+            name = f"SIG{signal}" if signal else f"signal {run.status}"
+            help = "the system ends a process that takes too much memory"
+            return "script-killed", f"{path} was ended by {name}", help if name == "SIGKILL" else ""
+        case Outcome.TIMEOUT:
+            message = f"{path} was stopped after {extraction.script.timeout:g} s, its time limit"
+            help = "make it do less, or set `timeout=SECONDS` on its fence to a higher limit"
+            return "script-timeout", message, help
+        case Outcome.OUTPUT_LIMIT:
+            help = "print less: a recorded output is to be read"
+            return "script-output-limit", f"{path} printed more than 1 MiB", help
+        case Outcome.ENCODING:
+            help = "print text; `sys.stdout.buffer` takes bytes as they are"
+            return "script-encoding", f"{path} printed bytes that are not UTF-8", help
+        case _:
+            assert_never(run.outcome)
+
+
+def silence_diagnostic(recording: Recording, path: str) -> Diagnostic:
     """An output is recorded, and the script printed no line."""
     return diagnose(
         "script-silent",
@@ -180,7 +188,7 @@ def _parses(extraction: Extraction) -> bool:
     return True
 
 
-def _last_words(stderr: str) -> str:
+def _last_message(stderr: str) -> str:
     """The exception's line of the last traceback, else the last line that was written."""
     frames = list(_FRAME.finditer(stderr))
     if frames:
@@ -189,9 +197,9 @@ def _last_words(stderr: str) -> str:
         if lines:
             return lines[0].strip()
     # Exception groups are drawn with lines and corners.
-    written = [line.strip(" \t\r|+-") for line in stderr.split("\n")]
-    written = [line for line in written if line]
-    return written[-1] if written else ""
+    lines = [line.strip(" \t\r|+-") for line in stderr.split("\n")]
+    lines = [line for line in lines if line]
+    return lines[-1] if lines else ""
 
 
 def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
@@ -202,15 +210,15 @@ def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
         return []
     lines = text.replace("\r\n", "\n").split("\n")
     tail = "\n".join(lines[-_TAIL_LINES:])
-    cut = len(lines) > _TAIL_LINES or len(tail) > _TAIL_CHARACTERS
-    lead = "its standard error ended with" if cut else "its standard error"
+    is_cut = len(lines) > _TAIL_LINES or len(tail) > _TAIL_CHARACTERS
+    lead = "its standard error ended with" if is_cut else "its standard error"
     return [Note(f"{lead}:\n{tail[-_TAIL_CHARACTERS:]}")]
 
 
 # --- simulations
 
 _SHOWN = 4
-"""Further simulations that are named."""
+"""The most further incidents that notes name."""
 _DIVERGES = (
     "try a smaller timestep or another integrator; if it is to diverge, say so by `diverges` on "
     "its fence"
@@ -232,7 +240,7 @@ _EFFECTS = {
         "keep what it asks for in the course, where it stays the same",
     ),
 }
-"""The rule, what is said, and what mends it."""
+"""The rule, the end of the message, and the help."""
 
 
 def is_lost(extraction: Extraction, run: ScriptRun) -> bool:
@@ -240,96 +248,105 @@ def is_lost(extraction: Extraction, run: ScriptRun) -> bool:
     return not extraction.script.diverges and bool(_lost_simulations(run))
 
 
-def divergence(
+def divergence_diagnostics(
     extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
 ) -> Iterator[Diagnostic]:
     """What is wrong with the simulations of a script that was run."""
-    found = () if run.trace is None else run.trace.divergences
+    divergences = () if run.trace is None else run.trace.divergences
     script = extraction.script
-    deep = [each for each in found if each.sign is Sign.CONTACT]
+    deep = [divergence for divergence in divergences if divergence.sign is Sign.CONTACT]
     if run.outcome is Outcome.OK and run.trace is not None:
-        if script.diverges and not found:
-            yield _unlike(extraction, "script-stable", "diverges", "none of its simulations did")
+        if script.diverges and not divergences:
+            reason = "none of its simulations did"
+            yield _false_claim(extraction, "script-stable", "diverges", reason)
         if script.deep and not deep:
-            what = "no bodies lay deep in each other"
-            yield _unlike(extraction, "script-shallow", "deep", what)
-    if script.diverges or not found:
+            reason = "no bodies lay deep in each other"
+            yield _false_claim(extraction, "script-shallow", "deep", reason)
+    if script.diverges or not divergences:
         return
     lost = _lost_simulations(run)
     if lost:
-        said = f"a simulation of `{script.path}` diverged"
-        yield _found("script-diverged", extraction, lost, extractions, said, _DIVERGES)
+        message = f"a simulation of `{script.path}` diverged"
+        yield _incident_diagnostic(
+            "script-diverged", extraction, lost, extractions, message, _DIVERGES
+        )
     elif deep and not script.deep:  # what is lost may as well lie anywhere
-        said = f"bodies of `{script.path}` lie deep in each other"
-        yield _found("script-penetration", extraction, deep, extractions, said, _DEEP)
+        message = f"bodies of `{script.path}` lie deep in each other"
+        yield _incident_diagnostic(
+            "script-penetration", extraction, deep, extractions, message, _DEEP
+        )
 
 
-def effects(
+def effect_diagnostics(
     extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
 ) -> Iterator[Diagnostic]:
-    """That a script wrote outside its temporary folder, or used the network."""
-    found = () if run.trace is None else run.trace.effects
-    for kind, (rule, said, help) in _EFFECTS.items():
-        if these := [each for each in found if each.kind is kind]:
-            what = these[0].what
-            if kind is EffectKind.WRITE and what.endswith((".svg", ".png")):
-                name = posixpath.basename(what)
+    """A diagnostic if the script wrote outside its temporary folder, one if it used the network."""
+    effects = () if run.trace is None else run.trace.effects
+    for kind, (rule, wording, help) in _EFFECTS.items():
+        if selection := [effect for effect in effects if effect.kind is kind]:
+            target = selection[0].target
+            if kind is EffectKind.WRITE and target.endswith((".svg", ".png")):
+                name = posixpath.basename(target)
                 help = f"to show it, save it as `{name}`, and say `figure={name}` on the fence"
-            yield _found(rule, extraction, these, extractions, f"`{run.path}` {said}", help)
+            yield _incident_diagnostic(
+                rule, extraction, selection, extractions, f"`{run.path}` {wording}", help
+            )
 
 
 def _lost_simulations(run: ScriptRun) -> tuple[Divergence, ...]:
-    found = () if run.trace is None else run.trace.divergences
-    return tuple(each for each in found if each.sign is not Sign.CONTACT)
+    divergences = () if run.trace is None else run.trace.divergences
+    return tuple(divergence for divergence in divergences if divergence.sign is not Sign.CONTACT)
 
 
-def _unlike(extraction: Extraction, rule: str, key: str, what: str) -> Diagnostic:
+def _false_claim(extraction: Extraction, rule: str, key: str, reason: str) -> Diagnostic:
     fence = extraction.script.span.first_line()
-    message = f"`{extraction.path}` says `{key}`, and {what}"
+    message = f"`{extraction.path}` says `{key}`, and {reason}"
     return diagnose(rule, fence, message, help=f"take `{key}` away")
 
 
-def _found(
+def _incident_diagnostic(
     rule: str,
     extraction: Extraction,
-    found: Sequence[Divergence | Effect],
+    incidents: Sequence[Divergence | Effect],
     extractions: Iterable[Extraction],
-    said: str,
+    message: str,
     help: str,
 ) -> Diagnostic:
-    """The first of what was found, where it was found, and some more in notes."""
-    by_path = {each.path: each for each in extractions}
+    """A diagnostic at the first incident, with some more in notes."""
+    by_path = {extraction.path: extraction for extraction in extractions}
     fence = extraction.script.span.first_line()
-    further, left = found[1 : _SHOWN + 1], len(found) - 1 - _SHOWN
-    notes = [Note(_noticed(each), _place(each, by_path)) for each in further]
-    if found[0].path not in ("", extraction.path):
+    named_incidents, rest_count = incidents[1 : _SHOWN + 1], len(incidents) - 1 - _SHOWN
+    notes = [Note(_describe_incident(i), _place(i, by_path)) for i in named_incidents]
+    if incidents[0].path not in ("", extraction.path):
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
-    if left > 0:
-        notes.append(Note(f"and {left} more like these"))
-    place = _place(found[0], by_path) or fence
-    return diagnose(rule, place, f"{said}: {_noticed(found[0])}", help=help, notes=notes)
+    if rest_count > 0:
+        notes.append(Note(f"and {rest_count} more like these"))
+    place = _place(incidents[0], by_path) or fence
+    return diagnose(
+        rule, place, f"{message}: {_describe_incident(incidents[0])}", help=help, notes=notes
+    )
 
 
-def _place(found: Divergence | Effect, by_path: Mapping[str, Extraction]) -> Span | None:
-    """The lesson's line where it was noticed."""
-    where = by_path.get(found.path)
-    span = None if where is None else where.line_span(found.line)
+def _place(incident: Divergence | Effect, by_path: Mapping[str, Extraction]) -> Span | None:
+    """The lesson's line where an incident was noticed."""
+    extraction = by_path.get(incident.path)
+    span = None if extraction is None else extraction.line_span(incident.line)
     return None if span is None else without_indentation(span)
 
 
-def _noticed(found: Divergence | Effect) -> str:
-    """What was noticed, in words."""
-    if isinstance(found, Effect):
-        return f"`{found.what}`"
-    of = f" of model `{found.model}`" if found.model else ""
-    at = f" at t = {found.time} s" if found.time else ""
-    match found.sign:
+def _describe_incident(incident: Divergence | Effect) -> str:
+    """An incident in words."""
+    if isinstance(incident, Effect):
+        return f"`{incident.target}`"
+    of = f" of model `{incident.model}`" if incident.model else ""
+    at = f" at t = {incident.time} s" if incident.time else ""
+    match incident.sign:
         case Sign.POSITIONS | Sign.VELOCITIES | Sign.ACCELERATIONS:
-            return f"MuJoCo warned of bad {found.sign.value}{of}{at}"
+            return f"MuJoCo warned of bad {incident.sign.value}{of}{at}"
         case Sign.STATE:
             return f"the state{of} is not finite{at}"
         case Sign.CONTACT:
-            one, other = (*found.geoms, "", "")[:2]
-            return f"{one} and {other}{of} by {found.depth} m{at}"
+            first_geom, second_geom = (*incident.geoms, "", "")[:2]
+            return f"{first_geom} and {second_geom}{of} by {incident.depth} m{at}"
         case _:
-            assert_never(found.sign)
+            assert_never(incident.sign)

@@ -1,13 +1,14 @@
-"""Figures as they are recorded, and how one differs from what a script drew now.
+"""Figures as they are recorded, and how they differ from what a script drew now.
 
-Entry points: `figure_findings`; `drawn_file`, what is recorded of a drawing; `difference`.
+Entry points: `figure_findings`; `prepare_figure`, what is recorded of a figure;
+`describe_difference`.
 
-1. Of a drawing in SVG no date, no comment and no id is kept that changes from run to run, so that
-   the same drawing is the same bytes.
+1. Dates, comments and ids, which change from run to run, are taken out of a drawing in SVG, so that
+   the same drawing gives the same bytes.
 2. Two drawings in SVG are the same where elements, attributes and texts are, and numbers differ by
    less than a thousandth of the drawing's size. Two in PNG are the same where the root mean square
    of what pixels differ by is below one of 255 steps.
-3. Of its data, in CSV, texts are the same, and numbers differ by less than a thousandth of the
+3. Data in CSV are the same where texts are, and numbers differ by less than a thousandth of the
    largest in their column.
 """
 
@@ -36,7 +37,7 @@ _SVG = "{http://www.w3.org/2000/svg}"
 _XLINK = "{http://www.w3.org/1999/xlink}href"
 _URL = re.compile(r"url\(#([^()\s]+)\)")
 _FAR = re.compile(r"""@import[^;]*|url\(\s*["']?(?!#|data:image/|["'\s])[^()]*\)""")
-"""What in a style asks for another file."""
+"""The parts of a style that load another file."""
 _ACTIVE = ("script", "foreignObject", "iframe", "audio", "video")
 
 ReadFile = Callable[[str], bytes | None]
@@ -59,10 +60,10 @@ def figure_findings(
         for recorded in recorded_figures(document):
             run = by_path.get(recorded.script)
             if run is not None and not run.recorded:  # a run that the course keeps drew nothing now
-                yield from _compared(recorded, run, read(recorded.path), owner.id)
+                yield from _compare_figure(recorded, run, read(recorded.path), owner.id)
 
 
-def _compared(
+def _compare_figure(
     figure: RecordedFigure, run: ScriptRun, recorded: bytes | None, owner: str
 ) -> Iterator[Diagnostic]:
     data = dict(run.figures).get(figure.name)
@@ -71,46 +72,46 @@ def _compared(
         help = f'save it under this name, as in `plt.savefig("{figure.name}")`'
         yield diagnose("figure-missing", figure.span, message, help=help)
         return
-    drawn = drawn_file(figure.name, data)
-    if isinstance(drawn, str):
-        yield diagnose("figure-unreadable", figure.span, f"`{figure.name}` {drawn}")
+    figure_file = prepare_figure(figure.name, data)
+    if isinstance(figure_file, str):
+        yield diagnose("figure-unreadable", figure.span, f"`{figure.name}` {figure_file}")
         return
     update = f"`coursebuild update {owner}`"
     if recorded is None:
         message = f"nothing is recorded yet of what `{run.path}` draws"
         yield diagnose("figure-drift", figure.span, message, help=f"run {update}")
         return
-    differs = difference(figure.name, recorded, drawn)
-    if differs:
+    wording = describe_difference(figure.name, recorded, figure_file)
+    if wording:
         kind = "data differ" if figure.name.endswith(".csv") else "figure differs"
-        message = f"the recorded {kind} from this run: {differs}"
+        message = f"the recorded {kind} from this run: {wording}"
         help = f"if the change is intended, run {update}"
         yield diagnose("figure-drift", figure.span, message, help=help)
 
 
-def drawn_file(name: str, data: bytes) -> bytes | str:
-    """What is recorded of a drawing; in words, why it cannot be shown."""
+def prepare_figure(name: str, data: bytes) -> bytes | str:
+    """The bytes to record of a figure; or why it cannot be shown, in words."""
     if name.endswith(".png"):
         return data if _png_size(data) is not None else "is no PNG"
     if name.endswith(".csv"):
         return b"\n".join(data.splitlines()) + b"\n"
-    tree = _svg(data)
+    tree = _read_svg(data)
     return tree if isinstance(tree, str) else ET.tostring(tree, encoding="utf-8") + b"\n"
 
 
-def difference(name: str, recorded: bytes, drawn: bytes) -> str:
-    """How a drawing differs from what is recorded, in words; empty where it does not."""
-    if recorded == drawn:
+def describe_difference(name: str, old: bytes, new: bytes) -> str:
+    """How a new figure differs from the recorded one, in words; empty where it does not."""
+    if old == new:
         return ""
     kinds = {"png": _png_difference, "csv": _csv_difference, "svg": _svg_difference}
-    return kinds[name.rpartition(".")[2]](recorded, drawn)
+    return kinds[name.rpartition(".")[2]](old, new)
 
 
 # --- SVG
 
 
-def _svg(data: bytes) -> ET.Element | str:
-    """The drawing without what changes from run to run; why there is none, in words."""
+def _read_svg(data: bytes) -> ET.Element | str:
+    """The drawing without what changes from run to run; or why it cannot be shown, in words."""
     if b"<!ENTITY" in data:
         return "declares entities"
     try:
@@ -127,31 +128,31 @@ def _svg(data: bytes) -> ET.Element | str:
             if child.tag == f"{_SVG}metadata":
                 parent.remove(child)
     for element in root.iter():
-        wrong = _active(element)
-        if wrong:
-            return wrong
+        reason = _reason_unshowable(element)
+        if reason:
+            return reason
     for element in root.iter():
         if "id" in element.attrib:
             names.setdefault(element.attrib["id"], f"x{len(names) + 1}")
     for element in root.iter():
         for key, value in element.attrib.items():
-            element.attrib[key] = _renamed(key, value, names)
+            element.attrib[key] = _rename_ids(key, value, names)
     return root
 
 
-def _active(element: ET.Element) -> str:
-    """What keeps an element from being shown, in words: it acts, or loads something."""
+def _reason_unshowable(element: ET.Element) -> str:
+    """Why an element cannot be shown, in words: it is active, or loads something; else empty."""
     kind = element.tag.removeprefix(_SVG)
     if kind in _ACTIVE or any(key.lower().startswith("on") for key in element.attrib):
         return f"holds active content, `{kind}`"
     links = (element.attrib[key] for key in (_XLINK, "href") if key in element.attrib)
-    far = next((link for link in links if not link.startswith(("#", "data:image/"))), "")
+    target = next((link for link in links if not link.startswith(("#", "data:image/"))), "")
     styles = (*element.attrib.values(), *([element.text or ""] if kind == "style" else ()))
-    far = far or next((found[0] for style in styles if (found := _FAR.search(style))), "")
-    return f"leads to `{far}`" if far else ""
+    target = target or next((match[0] for style in styles if (match := _FAR.search(style))), "")
+    return f"leads to `{target}`" if target else ""
 
 
-def _renamed(key: str, value: str, names: dict[str, str]) -> str:
+def _rename_ids(key: str, value: str, names: dict[str, str]) -> str:
     if key == "id":
         return names[value]
     if key in (_XLINK, "href") and value.startswith("#"):
@@ -159,33 +160,33 @@ def _renamed(key: str, value: str, names: dict[str, str]) -> str:
     return _URL.sub(lambda match: f"url(#{names.get(match[1], match[1])})", value)
 
 
-def _svg_difference(recorded: bytes, drawn: bytes) -> str:
-    old, new = _svg(recorded), _svg(drawn)
-    if isinstance(old, str) or isinstance(new, str):
-        return f"the recorded file {old}" if isinstance(old, str) else str(new)
-    before, after = list(_words(old)), list(_words(new))
-    if len(before) != len(after):
-        return f"it has {len(after)} parts where {len(before)} are recorded"
-    size = _size(old)
+def _svg_difference(old_data: bytes, new_data: bytes) -> str:
+    old_root, new_root = _read_svg(old_data), _read_svg(new_data)
+    if isinstance(old_root, str) or isinstance(new_root, str):
+        return f"the recorded file {old_root}" if isinstance(old_root, str) else str(new_root)
+    old_words, new_words = list(_words(old_root)), list(_words(new_root))
+    if len(old_words) != len(new_words):
+        return f"it has {len(new_words)} parts where {len(old_words)} are recorded"
+    size = _size(old_root)
     numbers, texts, worst = 0, 0, 0.0
-    for one, two in zip(before, after, strict=True):
-        if one == two:
+    for old_word, new_word in zip(old_words, new_words, strict=True):
+        if old_word == new_word:
             continue
-        if _NUMBER.split(one) != _NUMBER.split(two):
+        if _NUMBER.split(old_word) != _NUMBER.split(new_word):
             texts += 1
             continue
-        pairs = zip(_NUMBER.findall(one), _NUMBER.findall(two), strict=True)
+        pairs = zip(_NUMBER.findall(old_word), _NUMBER.findall(new_word), strict=True)
         error = max(abs(float(a) - float(b)) for a, b in pairs) / size
         if not error <= TOLERANCE:
             numbers, worst = numbers + 1, max(worst, error)
-    said = [f"other words or colours in {texts} of its parts"] if texts else []
+    clauses = [f"other words or colours in {texts} of its parts"] if texts else []
     if numbers:
-        said.append(f"{numbers} of its parts moved, by up to {worst:.1%} of its size")
-    return " and ".join(said)
+        clauses.append(f"{numbers} of its parts moved, by up to {worst:.1%} of its size")
+    return " and ".join(clauses)
 
 
 def _words(root: ET.Element) -> Iterator[str]:
-    """What a drawing says, one string for each tag, attribute and text."""
+    """The content of a drawing: a string for each tag, attribute and text."""
     for element in root.iter():
         yield element.tag
         yield from (f"{key}={value}" for key, value in sorted(element.attrib.items()))
@@ -193,10 +194,10 @@ def _words(root: ET.Element) -> Iterator[str]:
 
 
 def _size(root: ET.Element) -> float:
-    """The longer side, in units of the drawing."""
+    """The longer side of a drawing, in its own units."""
     box = [float(n) for n in _NUMBER.findall(root.get("viewBox", ""))]
-    given = (_NUMBER.match(root.get(side, "")) for side in ("width", "height"))
-    sides = box[2:4] or [float(number[0]) for number in given if number is not None]
+    lengths = (_NUMBER.match(root.get(side, "")) for side in ("width", "height"))
+    sides = box[2:4] or [float(number[0]) for number in lengths if number is not None]
     return max([side for side in sides if math.isfinite(side) and side > 0], default=1.0)
 
 
@@ -214,15 +215,15 @@ def _png_size(data: bytes) -> tuple[int, int] | None:
         return None
 
 
-def _png_difference(recorded: bytes, drawn: bytes) -> str:
+def _png_difference(old: bytes, new: bytes) -> str:
     from PIL import Image, ImageChops, ImageStat
 
-    sizes = _png_size(recorded), _png_size(drawn)
+    sizes = _png_size(old), _png_size(new)
     if sizes[0] is None:
         return "the recorded file is no PNG"
     if sizes[0] != sizes[1] or sizes[1] is None:
         return "it has {}×{} pixels where {}×{} are recorded".format(*(sizes[1] or ()), *sizes[0])
-    images = [Image.open(io.BytesIO(data)).convert("RGBA") for data in (recorded, drawn)]
+    images = [Image.open(io.BytesIO(data)).convert("RGBA") for data in (old, new)]
     change = ImageChops.difference(*images)
     square = sum(value**2 for value in ImageStat.Stat(change).rms) / 4
     if math.sqrt(square) < PIXEL_TOLERANCE:
@@ -234,24 +235,25 @@ def _png_difference(recorded: bytes, drawn: bytes) -> str:
 # --- CSV
 
 
-def _csv_difference(recorded: bytes, drawn: bytes) -> str:
+def _csv_difference(old_data: bytes, new_data: bytes) -> str:
     old, new = (
-        list(csv.reader(io.StringIO(data.decode("utf-8", "replace")))) for data in (recorded, drawn)
+        list(csv.reader(io.StringIO(data.decode("utf-8", "replace"))))
+        for data in (old_data, new_data)
     )
     if [len(row) for row in old] != [len(row) for row in new]:
         return "the table has other rows or columns"
     columns = zip(itertools.zip_longest(*old), itertools.zip_longest(*new), strict=True)
-    different = sum(_unequal(*column) for column in columns)
+    different = sum(_count_unequal(*column) for column in columns)
     return f"{different} of its cells differ" if different else ""
 
 
-def _unequal(old: Sequence[str | None], new: Sequence[str | None]) -> int:
+def _count_unequal(old: Sequence[str | None], new: Sequence[str | None]) -> int:
     """How many cells of a column differ."""
-    numbers = [(_number(one), _number(two)) for one, two in zip(old, new, strict=True)]
-    largest = max((abs(one) for one, _ in numbers if math.isfinite(one)), default=0.0)
+    numbers = [(_number(a), _number(b)) for a, b in zip(old, new, strict=True)]
+    largest = max((abs(number) for number, _ in numbers if math.isfinite(number)), default=0.0)
     return sum(
-        one != two and not abs(a - b) <= TOLERANCE * largest
-        for one, two, (a, b) in zip(old, new, numbers, strict=True)
+        old_cell != new_cell and not abs(a - b) <= TOLERANCE * largest
+        for old_cell, new_cell, (a, b) in zip(old, new, numbers, strict=True)
     )
 
 

@@ -1,13 +1,14 @@
-"""Does a recorded line match a line that ran?
+"""Does a recorded line match a printed line?
 
 Entry point: `LineMatcher`.
 
-1. `canonical` replaces each number of a line by a mark and folds the white space around it, because
-   columns shift when a number gets wider. Two lines are alike when these skeletons are equal.
+1. `canonicalize` replaces each number of a line by a mark and folds the white space around it,
+   because columns shift when a number gets wider. Two lines are alike when these skeletons are
+   equal.
 2. Lines that are alike match when each pair of numbers does, by the rules of the comparison's mode.
-3. With `ellipsis`, a recorded line is cut at its `...`; its parts must stand in the line that ran,
+3. With `ellipsis`, a recorded line is cut at its `...`; its parts must stand in the printed line,
    in order, the first at the start and the last at the end. A part has a fixed length in the
-   skeleton, so that taking each at its first place finds a match whenever there is one.
+   skeleton, so taking each at its first place finds a match whenever there is one.
 """
 
 from __future__ import annotations
@@ -40,12 +41,12 @@ class Canon(Struct, frozen=True):
     """Offsets of the numbers' marks in the skeleton."""
 
     def numbers_at(self, part: Canon, place: int) -> tuple[Number, ...]:
-        """The numbers of this line that those of a part stand for, the part standing at `place`."""
+        """The numbers of this line that pair with those of a part whose skeleton is at `place`."""
         first = bisect_left(self.marks, place)
         return self.numbers[first : first + len(part.numbers)]
 
 
-def canonical(text: str, offset: int = 0) -> Canon:
+def canonicalize(text: str, offset: int = 0) -> Canon:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)
     safe = text.replace(MARK, "\ufffd")
@@ -55,59 +56,63 @@ def canonical(text: str, offset: int = 0) -> Canon:
     parts: list[str] = []
     length = previous = 0
     for index, number in enumerate(numbers):
-        between = _folded(safe[previous : number.start], after_number=index > 0, before_number=True)
-        parts += (between, MARK)
-        marks.append(length + len(between))
-        length += len(between) + 1
+        stretch = _fold_spaces(
+            safe[previous : number.start], after_number=index > 0, before_number=True
+        )
+        parts += (stretch, MARK)
+        marks.append(length + len(stretch))
+        length += len(stretch) + 1
         previous = number.end
-    parts.append(_folded(safe[previous:], after_number=True, before_number=False))
+    parts.append(_fold_spaces(safe[previous:], after_number=True, before_number=False))
     if offset:
-        moved = ((number, number.start + offset, number.end + offset) for number in numbers)
-        numbers = tuple(replace(number, start=start, end=end) for number, start, end in moved)
+        shifted = ((number, number.start + offset, number.end + offset) for number in numbers)
+        numbers = tuple(replace(number, start=start, end=end) for number, start, end in shifted)
     return Canon("".join(parts), numbers, tuple(marks))
 
 
-def _folded(between: str, *, after_number: bool, before_number: bool) -> str:
+def _fold_spaces(text: str, *, after_number: bool, before_number: bool) -> str:
     """The text between two numbers with the white space at its ends folded."""
-    body = between.strip()
+    body = text.strip()
     if not body:
-        return " " if between and after_number and before_number else ""
+        return " " if text and after_number and before_number else ""
     if before_number:
-        body = between.rstrip()
-        if len(body) < len(between) and (body[-1].isalnum() or body[-1] == "_"):
+        body = text.rstrip()
+        if len(body) < len(text) and (body[-1].isalnum() or body[-1] == "_"):
             body += " "
     else:
-        body = between
+        body = text
     if after_number:
         inner = body.lstrip()
         body = inner if len(inner) == len(body) or inner[0] in _CLOSING else " " + inner
     return body
 
 
-def same_number(recorded: Number, ran: Number, comparison: Comparison) -> bool:
-    """Whether a printed number is what was recorded, in a mode of comparison."""
-    if recorded.text == ran.text:
+def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bool:
+    """Whether a printed number matches the recorded one in this comparison."""
+    if recorded.text == printed.text:
         return True
     if comparison.mode is Mode.DIGITS:
-        return recorded.inexact and ran.inexact and within_half_unit(recorded, ran.value)
+        return recorded.inexact and printed.inexact and within_half_unit(recorded, printed.value)
     if comparison.mode is Mode.TOLERANCE:
-        if recorded.finite and ran.finite:
-            return within_tolerance(recorded.value, ran.value, comparison.rtol, comparison.atol)
-        return (recorded.value.is_nan() and ran.value.is_nan()) or recorded.value == ran.value
+        if recorded.finite and printed.finite:
+            return within_tolerance(recorded.value, printed.value, comparison.rtol, comparison.atol)
+        return (
+            recorded.value.is_nan() and printed.value.is_nan()
+        ) or recorded.value == printed.value
     return False
 
 
-def any_number(recorded: Number, ran: Number) -> bool:
-    """Takes every pair: for lines that are alike, whatever their numbers."""
+def always_match(recorded: Number, printed: Number) -> bool:
+    """Accept every pair: for lines that are alike, whatever their numbers."""
     return True
 
 
 class LineMatcher:
-    """Matches lines for one comparison; remembers what it has worked out about each line."""
+    """Matches lines for one comparison; caches the skeleton of each line."""
 
     def __init__(self, comparison: Comparison) -> None:
         self.comparison = comparison
-        self._canonical = cache(canonical)
+        self._canonical = cache(canonicalize)
 
     def elides_lines(self, recorded: str) -> bool:
         """Whether a recorded line is a `...` that stands for any lines."""
@@ -117,42 +122,42 @@ class LineMatcher:
         """Whether a recorded line has a `...` that stands for anything."""
         return self.comparison.ellipsis and ELLIPSIS in recorded
 
-    def same(self, recorded: Number, ran: Number) -> bool:
+    def numbers_match(self, recorded: Number, printed: Number) -> bool:
         """Whether two numbers match."""
-        return same_number(recorded, ran, self.comparison)
+        return same_number(recorded, printed, self.comparison)
 
-    def matches(self, recorded: str, ran: str) -> bool:
-        """Whether a line that ran is what was recorded."""
-        if recorded == ran:
+    def matches(self, recorded: str, printed: str) -> bool:
+        """Whether a printed line matches a recorded one."""
+        if recorded == printed:
             return True
         if self.elides(recorded):
             parts = [Canon(part, (), ()) for part in recorded.split(ELLIPSIS)]
-            if _find_parts(parts, Canon(ran, (), ()), any_number) is not None:
+            if _find_parts(parts, Canon(printed, (), ()), always_match) is not None:
                 return True
         if self.comparison.mode is Mode.EXACT:
             return False
-        return self._paired(recorded, ran, self.same) is not None
+        return self._pair_numbers(recorded, printed, self.numbers_match) is not None
 
-    def alike(self, recorded: str, ran: str) -> bool:
+    def alike(self, recorded: str, printed: str) -> bool:
         """Whether two lines differ in their numbers (and the white space around them) only."""
-        return self.pairs(recorded, ran) is not None
+        return self.pairs(recorded, printed) is not None
 
-    def pairs(self, recorded: str, ran: str) -> tuple[tuple[Number, Number], ...] | None:
+    def pairs(self, recorded: str, printed: str) -> tuple[tuple[Number, Number], ...] | None:
         """The numbers of two lines that are alike, pair by pair; `None` if they are not alike."""
-        return self._paired(recorded, ran, any_number)
+        return self._pair_numbers(recorded, printed, always_match)
 
-    def _paired(
-        self, recorded: str, ran: str, same: SameNumber
+    def _pair_numbers(
+        self, recorded: str, printed: str, numbers_match: SameNumber
     ) -> tuple[tuple[Number, Number], ...] | None:
-        line = self._canonical(ran)
+        line = self._canonical(printed)
         if not self.elides(recorded):
-            wanted = self._canonical(recorded)
-            if wanted.skeleton != line.skeleton:
+            expected = self._canonical(recorded)
+            if expected.skeleton != line.skeleton:
                 return None
-            pairs = tuple(zip(wanted.numbers, line.numbers, strict=True))
-            return pairs if all(same(a, b) for a, b in pairs) else None
-        parts = _cut(recorded)
-        places = _find_parts(parts, line, same)
+            number_pairs = tuple(zip(expected.numbers, line.numbers, strict=True))
+            return number_pairs if all(numbers_match(a, b) for a, b in number_pairs) else None
+        parts = _split_at_ellipses(recorded)
+        places = _find_parts(parts, line, numbers_match)
         if places is None:
             return None
         return tuple(
@@ -163,28 +168,32 @@ class LineMatcher:
 
 
 @lru_cache(maxsize=256)
-def _cut(recorded: str) -> tuple[Canon, ...]:
+def _split_at_ellipses(recorded: str) -> tuple[Canon, ...]:
     """The parts of a recorded line between its ellipses."""
     parts: list[Canon] = []
     offset = 0
     for text in recorded.split(ELLIPSIS):
-        parts.append(canonical(text, offset))
+        parts.append(canonicalize(text, offset))
         offset += len(text) + len(ELLIPSIS)
     return tuple(parts)
 
 
-def _find_parts(parts: Sequence[Canon], line: Canon, same: SameNumber) -> list[int] | None:
-    """Where the parts of a recorded line stand in the skeleton of a line that ran, if they do."""
+def _find_parts(parts: Sequence[Canon], line: Canon, numbers_match: SameNumber) -> list[int] | None:
+    """Where the parts of a recorded line stand in the skeleton of a printed line, if they do."""
     first, *inner, last = parts
     stop = len(line.skeleton) - len(last.skeleton)
     ends = line.skeleton.startswith(first.skeleton) and line.skeleton.endswith(last.skeleton)
-    if not (ends and fits(first, line, 0, same) and fits(last, line, stop, same)):
+    if not (
+        ends
+        and numbers_fit(first, line, 0, numbers_match)
+        and numbers_fit(last, line, stop, numbers_match)
+    ):
         return None
     places = [0]
     at = len(first.skeleton)
     for part in inner:
         place = line.skeleton.find(part.skeleton, at, stop)
-        while place >= 0 and not fits(part, line, place, same):
+        while place >= 0 and not numbers_fit(part, line, place, numbers_match):
             place = line.skeleton.find(part.skeleton, place + 1, stop)
         if place < 0:
             return None
@@ -193,6 +202,6 @@ def _find_parts(parts: Sequence[Canon], line: Canon, same: SameNumber) -> list[i
     return [*places, stop] if at <= stop else None
 
 
-def fits(part: Canon, line: Canon, place: int, same: SameNumber) -> bool:
+def numbers_fit(part: Canon, line: Canon, place: int, numbers_match: SameNumber) -> bool:
     """Whether the numbers of a part match those of a line in which its skeleton is at `place`."""
-    return all(map(same, part.numbers, line.numbers_at(part, place)))
+    return all(map(numbers_match, part.numbers, line.numbers_at(part, place)))

@@ -1,12 +1,12 @@
 """Texts to compare: filtered, split into lines, every part with the place that it came from.
 
-Entry points: `filtered`, `Side.of`, `plain`.
+Entry points: `apply_filters`, `Side.of`, `plain_text`.
 
-1. `MappedText` is a text with its origin: stretches that are copies know it character by character,
-   a stretch that a filter wrote stands for all that it replaced.
-2. `filtered` applies the course's filters, one after the other, each to the whole text (`^` and `$`
-   match at lines), after white space that does not count has gone.
-3. A `Side` is one side of a comparison: the lines without trailing white space and without
+1. A `MappedText` knows where its text came from: copied stretches character by character, a stretch
+   that a filter wrote as a whole.
+2. `apply_filters` removes insignificant white space, then applies the course's filters one after
+   the other, each to the whole text (`^` and `$` match at lines).
+3. A `Side` is one side of a comparison: its lines without trailing white space, and without
    trailing empty lines.
 """
 
@@ -55,67 +55,67 @@ class MappedText(Struct, frozen=True):
 
     @classmethod
     def of_output(cls, text: str) -> MappedText:
-        """An output without what does not count.
+        """An output without insignificant white space.
 
         Line ends are LF, the last line has one too, no line ends in white space, no empty lines
         stand at the end.
         """
-        mapped = cls.of_text(text).substituted(_END_OF_LINE, "\n")
-        return mapped.substituted(_EMPTY_LINES, "")
+        mapped = cls.of_text(text).substitute(_END_OF_LINE, "\n")
+        return mapped.substitute(_EMPTY_LINES, "")
 
-    def _segment(self, at: int) -> int:
+    def _segment_index(self, at: int) -> int:
         """The index of the segment that an offset is in."""
         return max(0, bisect_right(self.segments, at, key=lambda segment: segment.at) - 1)
 
     def origin(self, start: int, end: int) -> tuple[int, int]:
         """The smallest range of the origin that `text[start:end]` came from; empty for no text."""
-        first = self.segments[self._segment(start)]
-        last = self.segments[self._segment(max(start, end - 1))]
+        first = self.segments[self._segment_index(start)]
+        last = self.segments[self._segment_index(max(start, end - 1))]
         low = first.start + start - first.at if first.verbatim else first.start
         high = last.start + end - last.at if last.verbatim else last.end
         return low, low if start == end else max(low, high)
 
-    def substituted(self, pattern: re.Pattern[str], text: str) -> MappedText:
-        """The text with another in place of each match."""
-        return self.edited({found.span(): text for found in pattern.finditer(self.text)})
+    def substitute(self, pattern: re.Pattern[str], text: str) -> MappedText:
+        """The text with each match replaced."""
+        return self.replace_ranges({match.span(): text for match in pattern.finditer(self.text)})
 
-    def edited(self, places: Mapping[tuple[int, int], str]) -> MappedText:
-        """The text with others in places of it, given in order by where they start and end."""
+    def replace_ranges(self, places: Mapping[tuple[int, int], str]) -> MappedText:
+        """The text with ranges replaced; `places` maps each (start, end), in order, to its text."""
         parts: list[str] = []
         segments: list[MappingSegment] = []
-        length = copied = 0
-        for (start, end), written in places.items():
-            if written == self.text[start:end]:
+        length = copied_to = 0
+        for (start, end), replacement in places.items():
+            if replacement == self.text[start:end]:
                 continue
-            self._copy(copied, start, length, segments)
-            parts += (self.text[copied:start], written)
-            length += start - copied
-            copied = end
-            if written:
-                replaced = self._replaced(start, end)
-                segments.append(MappingSegment(length, *replaced, False))
-                length += len(written)
-        self._copy(copied, len(self.text), length, segments)
-        parts.append(self.text[copied:])
-        nothing = MappingSegment(0, 0, self.segments[-1].end, False)
-        return MappedText("".join(parts), tuple(segments) or (nothing,))
+            self._copy(copied_to, start, length, segments)
+            parts += (self.text[copied_to:start], replacement)
+            length += start - copied_to
+            copied_to = end
+            if replacement:
+                origin = self._replaced_origin(start, end)
+                segments.append(MappingSegment(length, *origin, False))
+                length += len(replacement)
+        self._copy(copied_to, len(self.text), length, segments)
+        parts.append(self.text[copied_to:])
+        empty_segment = MappingSegment(0, 0, self.segments[-1].end, False)
+        return MappedText("".join(parts), tuple(segments) or (empty_segment,))
 
-    def _replaced(self, start: int, end: int) -> tuple[int, int]:
-        """What a replacement of `text[start:end]` stands for.
+    def _replaced_origin(self, start: int, end: int) -> tuple[int, int]:
+        """The range of the origin that a replacement of `text[start:end]` stands for.
 
-        Where nothing is replaced, inside or at the end of what was written by another replacement,
-        that is what the other one stands for: there is no place between its characters.
+        An insertion inside or at the end of an earlier replacement stands for the same range as
+        that: no character of the origin lies between its characters.
         """
-        segment = self.segments[self._segment(start)]
+        segment = self.segments[self._segment_index(start)]
         if start == end and not segment.verbatim and start > segment.at:
             return segment.start, segment.end
         return self.origin(start, end)
 
-    def _copy(self, start: int, end: int, at: int, into: list[MappingSegment]) -> None:
+    def _copy(self, start: int, end: int, at: int, segments: list[MappingSegment]) -> None:
         """Append the segments of `text[start:end]`, which will stand at offset `at`."""
         if start == end:
             return
-        for index in range(self._segment(start), len(self.segments)):
+        for index in range(self._segment_index(start), len(self.segments)):
             segment = self.segments[index]
             if segment.at >= end:
                 break
@@ -123,31 +123,31 @@ class MappedText(Struct, frozen=True):
             if segment.verbatim:
                 first = segment.start + max(0, start - segment.at)
                 stop = min(segment.end, segment.start + end - segment.at)
-                into.append(MappingSegment(new_at, first, stop, True))
+                segments.append(MappingSegment(new_at, first, stop, True))
             else:
-                into.append(MappingSegment(new_at, segment.start, segment.end, False))
+                segments.append(MappingSegment(new_at, segment.start, segment.end, False))
 
 
-def filtered(mapped: MappedText, filters: Iterable[Filter]) -> MappedText:
+def apply_filters(mapped: MappedText, filters: Iterable[Filter]) -> MappedText:
     """The text after the filters."""
     for rule in filters:
         if places := replacements(rule.pattern, rule.replacement, mapped.text):
-            mapped = mapped.edited(places)
+            mapped = mapped.replace_ranges(places)
     return mapped
 
 
-def replaced(text: str, places: Iterable[tuple[int, int, str]]) -> str:
-    """A text with others in places of it: start, end and what is there instead, in order."""
+def replace_ranges(text: str, places: Iterable[tuple[int, int, str]]) -> str:
+    """The text with ranges replaced; `places` holds start, end and new text of each, in order."""
     parts: list[str] = []
     at = 0
-    for start, end, written in places:
-        parts += (text[at:start], written)
+    for start, end, replacement in places:
+        parts += (text[at:start], replacement)
         at = end
     return "".join((*parts, text[at:]))
 
 
-def plain(text: str) -> str:
-    """A text with its minus signs and its white space made plain."""
+def plain_text(text: str) -> str:
+    """The text with ASCII minus signs and single spaces."""
     return " ".join(text.replace("\u2212", "-").split())
 
 
@@ -165,7 +165,7 @@ class Side(Struct, frozen=True):
     @classmethod
     def of(cls, text: str, filters: Iterable[Filter] = ()) -> Side:
         """The lines of a text after the filters."""
-        mapped = filtered(MappedText.of_output(text), filters)
+        mapped = apply_filters(MappedText.of_output(text), filters)
         parts = mapped.text.split("\n")
         starts = accumulate((len(part) + 1 for part in parts), initial=0)
         lines = [part.rstrip() for part in parts]

@@ -3,14 +3,14 @@
 Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 10⁻¹¹`),
 `within_half_unit`, `within_tolerance`, `relative_error`, `agreeing_digits`, `round_like`.
 
-1. One regular expression walks the text. Its first alternatives take what only looks like a number:
-   words with digits in them (`x1`, `v3.14.0`, `UTF-8`), versions, dates, times of day, hexadecimal
-   literals, hashes. They stay text, as do powers (`m^2`). No alternative can start inside what
-   another one gave up, so that the walk is linear.
+1. One regular expression walks the text. Its first alternatives match what only looks like a
+   number: words with digits in them (`x1`, `v3.14.0`, `UTF-8`), versions, dates, times of day,
+   hexadecimal literals, hashes. They stay text, as do powers (`m^2`). No alternative can start
+   inside what another one gave up, so that the walk is linear.
 2. A number may carry a unit of letters (`12.5ms`); letters with a digit among them make the whole
    thing text (`4x4`).
-3. Values are decimals as written: nothing is rounded on the way, so that a border such as half a
-   unit of the last place is exact. What no floating-point format can mean (more than 1000
+3. Values are decimals as written: nothing is rounded on the way, so that limits such as half a
+   unit of the last place are exact. What no floating-point format can hold (more than 1000
    characters, exponents of more than four digits) is text.
 """
 
@@ -101,10 +101,10 @@ def scan(text: str) -> tuple[Number, ...]:
 
 
 def _scan(text: str) -> Iterator[Number]:
-    for found in _TOKEN.finditer(text):
-        kind = found.lastgroup
-        if kind in ("number", "imaginary", "special") and found.end() - found.start() <= _LONGEST:
-            yield _number(found.start(), found.group())
+    for match in _TOKEN.finditer(text):
+        kind = match.lastgroup
+        if kind in ("number", "imaginary", "special") and match.end() - match.start() <= _LONGEST:
+            yield _number(match.start(), match.group())
 
 
 def scan_prose(text: str) -> tuple[Number, ...]:
@@ -117,8 +117,8 @@ def scan_prose(text: str) -> tuple[Number, ...]:
         if power is None or not number.finite:
             numbers.append(number)
             continue
-        written = power["caret"] or power["raised"].translate(_SUPERSCRIPTS)
-        shift = int(written.replace("\u2212", "-"))
+        exponent = power["caret"] or power["raised"].translate(_SUPERSCRIPTS)
+        shift = int(exponent.replace("\u2212", "-"))
         end = power.end()
         numbers.append(
             replace(
@@ -143,24 +143,24 @@ def unit(place: int) -> Decimal:
     return Decimal((0, (1,), place))
 
 
-def within_half_unit(written: Number, value: Decimal) -> bool:
-    """Whether `value` is within half a unit of the last place of `written`, borders included."""
-    gap = difference(written.value, value)
-    return _EXACT.add(gap, gap) <= unit(written.place)
+def within_half_unit(shown: Number, value: Decimal) -> bool:
+    """Whether `value` is within half a unit of the last place of `shown`, borders included."""
+    gap = difference(shown.value, value)
+    return _EXACT.add(gap, gap) <= unit(shown.place)
 
 
-def within_tolerance(written: Decimal, value: Decimal, rtol: Decimal, atol: Decimal) -> bool:
-    """Whether `|value - written| <= atol + rtol * |written|`, exactly; all finite."""
-    return difference(written, value) <= _EXACT.add(
-        atol, _EXACT.multiply(rtol, _EXACT.abs(written))
+def within_tolerance(recorded: Decimal, value: Decimal, rtol: Decimal, atol: Decimal) -> bool:
+    """Whether `|value - recorded| <= atol + rtol * |recorded|`, exactly; all finite."""
+    return difference(recorded, value) <= _EXACT.add(
+        atol, _EXACT.multiply(rtol, _EXACT.abs(recorded))
     )
 
 
-def relative_error(recorded: Decimal, ran: Decimal) -> Decimal | None:
-    """`|ran - recorded| / |recorded|` to 34 digits; `None` where it does not exist."""
-    if not (recorded.is_finite() and ran.is_finite()) or recorded == 0:
+def relative_error(recorded: Decimal, printed: Decimal) -> Decimal | None:
+    """`|printed - recorded| / |recorded|` to 34 digits; `None` where it does not exist."""
+    if not (recorded.is_finite() and printed.is_finite()) or recorded == 0:
         return None
-    return _QUOTIENT.divide(difference(recorded, ran), _EXACT.abs(recorded))
+    return _QUOTIENT.divide(difference(recorded, printed), _EXACT.abs(recorded))
 
 
 def agreeing_digits(error: Decimal) -> int | None:
@@ -171,29 +171,29 @@ def agreeing_digits(error: Decimal) -> int | None:
     return max(0, -power if error == unit(power) else -power - 1)
 
 
-def round_like(written: Number, value: Decimal) -> str | None:
-    """`value` (finite) rounded to as many decimals as `written` shows, in its notation.
+def round_like(sample: Number, value: Decimal) -> str | None:
+    """`value` (finite) rounded to as many decimals as `sample` shows, in its notation.
 
-    A plus sign and a U+2212 minus are kept where `written` has them, exponents keep their width.
+    A plus sign and a U+2212 minus are kept where `sample` has them, exponents keep their width.
     `None` where the notation is not a machine's (`3.9 × 10⁻¹¹`, `nan`).
     """
-    found = _NOTATION.fullmatch(written.text)
-    if found is None:
+    match = _NOTATION.fullmatch(sample.text)
+    if match is None:
         return None
-    decimals = len(found["decimals"] or "")
-    if found["mark"]:
+    decimals = len(match["decimals"] or "")
+    if match["mark"]:
         mantissa, _, power = f"{abs(value):.{decimals}e}".partition("e")
-        width = len(found["power"])
-        sign = found["power_sign"] or ""
+        width = len(match["power"])
+        sign = match["power_sign"] or ""
         minus_power = "\u2212" if sign == "\u2212" else "-"
         shown_sign = minus_power if int(power) < 0 else "+" if sign == "+" or width > 1 else ""
-        exponent = f"{found['mark']}{shown_sign}{abs(int(power)):0{width}d}"
+        exponent = f"{match['mark']}{shown_sign}{abs(int(power)):0{width}d}"
     else:
         mantissa, exponent = f"{abs(value):.{decimals}f}", ""
-    if found["decimals"] == "":
+    if match["decimals"] == "":
         mantissa += "."
-    if not found["whole"]:
+    if not match["whole"]:
         mantissa = mantissa.removeprefix("0")
     negative = value < 0 and any(c in "123456789" for c in mantissa)
-    minus = "\u2212" if found["sign"] == "\u2212" else "-"
-    return f"{minus if negative else '+' if found['sign'] == '+' else ''}{mantissa}{exponent}"
+    minus = "\u2212" if match["sign"] == "\u2212" else "-"
+    return f"{minus if negative else '+' if match['sign'] == '+' else ''}{mantissa}{exponent}"

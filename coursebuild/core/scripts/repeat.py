@@ -1,9 +1,9 @@
-"""Two runs of a script, with nothing changed that it depends on, that do not do the same.
+"""Two runs of a script that differ although nothing that it depends on has changed.
 
-Entry points: `repeat_findings`, about what is remembered and a later run; `unstable`, about two
-runs of which the output is to be recorded.
+Entry points: `repeat_findings`, for a remembered run and a later one; `instability_diagnostic`, for
+two runs whose output is to be recorded.
 
-An output that its lesson calls volatile may differ, and so may one that matches what is recorded
+An output that its lesson calls volatile may differ, and so may one that matches the recorded output
 both times.
 """
 
@@ -15,7 +15,7 @@ from coursebuild.core.model import Comparison, Course, Recording, Table, documen
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.align import Step, StepKind, align
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.diff import quoted, text_diff
+from coursebuild.core.scripts.diff import quote, text_diff
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
@@ -27,13 +27,13 @@ _NAMED, _QUOTED = 10, 80
 def repeat_findings(
     course: Course,
     extractions: Iterable[Extraction],
-    differing: Sequence[tuple[ScriptRun, ScriptRun]],
+    differing_runs: Sequence[tuple[ScriptRun, ScriptRun]],
 ) -> tuple[Diagnostic, ...]:
-    """A warning for each script; `differing` holds what is remembered and what was done now."""
+    """A warning for each script; `differing_runs` are pairs of a remembered run and a new one."""
     by_path = {extraction.path: extraction for extraction in extractions}
     return tuple(
         _unrepeatable(by_path[now.path], before, now)
-        for before, now in differing
+        for before, now in differing_runs
         if now.path in by_path and not _may_differ(course, before, now)
     )
 
@@ -57,7 +57,9 @@ def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
 def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
     notes = []
     if (before.outcome, before.status) != (now.outcome, now.status):
-        notes.append(Note(f"it ended otherwise: before {_end(before)}, now {_end(now)}"))
+        notes.append(
+            Note(f"it ended otherwise: before {_describe_end(before)}, now {_describe_end(now)}")
+        )
     diff = text_diff(before.stdout, now.stdout)
     if diff:
         notes.append(Note("its output:\n" + diff))
@@ -72,20 +74,22 @@ def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> 
     )
 
 
-def _end(run: ScriptRun) -> str:
+def _describe_end(run: ScriptRun) -> str:
     return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
 
 
-def unstable(recording: Recording, first: Side, second: Side, comparison: Comparison) -> Diagnostic:
-    """Names the lines that differ between two runs.
+def instability_diagnostic(
+    recording: Recording, first: Side, second: Side, comparison: Comparison
+) -> Diagnostic:
+    """Say which lines differ between two runs.
 
-    `first` is what would be recorded, or is, and matches the first run.
+    `first` is the recorded or new text that matches the first run.
     """
     steps = align(first, second, LineMatcher(comparison))
-    differ = [step for step in steps if step.kind in _DIFFERENT]
-    notes = [Note(_difference(step, first, second)) for step in differ[:_NAMED]]
-    if (more := len(differ) - _NAMED) > 0:
-        notes.append(Note(f"and {more} more {'line' if more == 1 else 'lines'}"))
+    different_steps = [step for step in steps if step.kind in _DIFFERENT]
+    notes = [Note(_describe_difference(step, first, second)) for step in different_steps[:_NAMED]]
+    if (rest := len(different_steps) - _NAMED) > 0:
+        notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
     return diagnose(
         "output-unstable",
         recording.caption_span,
@@ -105,11 +109,11 @@ _TABLE_HELP = f"{_REPEATABLE}, or record the output in a `text` fence with `vola
 _DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
 
 
-def _difference(step: Step, first: Side, second: Side) -> str:
+def _describe_difference(step: Step, first: Side, second: Side) -> str:
     if step.kind is StepKind.MISSING:
-        return f"{quoted(first.lines[step.recorded], _QUOTED)} was printed in the first run only"
+        return f"{quote(first.lines[step.recorded], _QUOTED)} was printed in the first run only"
     if step.kind is StepKind.EXTRA:
-        return f"{quoted(second.lines[step.ran], _QUOTED)} was printed in the second run only"
-    a, b = first.lines[step.recorded], second.lines[step.ran]
-    number = second.raw_line(step.ran)
-    return f"line {number}: {quoted(a, _QUOTED)} in one run, {quoted(b, _QUOTED)} in the next"
+        return f"{quote(second.lines[step.printed], _QUOTED)} was printed in the second run only"
+    a, b = first.lines[step.recorded], second.lines[step.printed]
+    number = second.raw_line(step.printed)
+    return f"line {number}: {quote(a, _QUOTED)} in one run, {quote(b, _QUOTED)} in the next"

@@ -2,12 +2,12 @@
 
 Entry points: `compare_table`, `table_rows`, `TableMatcher`.
 
-1. A body row's cells, as plain text, must stand in order in one line that ran, white space folded;
-   the rows in order in lines further and further down. The header row and all other lines are free.
-2. A cell stands only where whole words and whole numbers do: `4` not in `14`, `implicit` not in
+1. A body row's cells, as plain text, must stand in order in one printed line, white space folded;
+   each row in a line further down than the row before. The header row and all other lines are free.
+2. Cells match whole words and whole numbers only: `4` not in `14`, `implicit` not in
    `implicitfast`. Numbers match by the comparison's mode.
-3. Where a row has no such line, rows and lines are aligned; a row that fits a line but for its
-   numbers has drifted, and each of its numbers is compared with the one that it is nearest to.
+3. Where a row has no such line, rows and lines are aligned; a row that fits a line except for its
+   numbers has drifted, and each of its numbers is compared with the nearest printed one.
 """
 
 from __future__ import annotations
@@ -26,12 +26,18 @@ from coursebuild.core.scripts.changes import number_change
 from coursebuild.core.scripts.lines import (
     Canon,
     SameNumber,
-    any_number,
-    canonical,
-    fits,
+    always_match,
+    canonicalize,
+    numbers_fit,
     same_number,
 )
-from coursebuild.core.scripts.mapped_text import MappedText, MappingSegment, Side, filtered, plain
+from coursebuild.core.scripts.mapped_text import (
+    MappedText,
+    MappingSegment,
+    Side,
+    apply_filters,
+    plain_text,
+)
 from coursebuild.core.scripts.numbers import Number, relative_error
 from coursebuild.core.text.source import Span
 
@@ -54,8 +60,8 @@ class RowCell(Struct, frozen=True):
 class RowMatch(Struct, frozen=True):
     """A row of a table and the line that it stands in; `line` is -1 where there is none.
 
-    Where its numbers are not all those of the line, `pairs` are the numbers of the row, each with
-    its cell and the printed one.
+    Where some of its numbers differ from the line's, `pairs` holds each cell, its recorded number
+    and the printed one.
     """
 
     row: tuple[RowCell, ...]
@@ -70,7 +76,9 @@ def table_rows(
     rules = tuple(filters)
     texts = ([(cell, _cell_text(cell, rules)) for cell in row] for row in table.rows)
     rows = (
-        tuple(RowCell(cell, mapped, canonical(mapped.text)) for cell, mapped in row if mapped.text)
+        tuple(
+            RowCell(cell, mapped, canonicalize(mapped.text)) for cell, mapped in row if mapped.text
+        )
         for row in texts
     )
     return tuple(row for row in rows if row)
@@ -81,13 +89,13 @@ def compare_table(
     table: model.Table,
     comparison: model.Comparison,
     filters: tuple[model.Filter, ...],
-    ran: Side,
+    printed: Side,
 ) -> Verdict:
     """The verdict on a recorded table."""
     changes = tuple(
         change
-        for found in TableMatcher(table_rows(table, filters), ran, comparison).match()
-        for change in _row_changes(found, comparison)
+        for match in TableMatcher(table_rows(table, filters), printed, comparison).match()
+        for change in _row_changes(match, comparison)
     )
     return Verdict(recording, comparison, "drift" if changes else "verified", changes)
 
@@ -96,12 +104,12 @@ def _row_text(row: Sequence[RowCell]) -> str:
     return "  ".join(cell.mapped.text for cell in row)
 
 
-def _row_changes(found: RowMatch, comparison: model.Comparison) -> list[Change]:
-    if found.line < 0:
-        first, last = found.row[0].cell.span, found.row[-1].cell.span
-        return [Change(DriftKind.MISSING, first.to(last), _row_text(found.row), "")]
+def _row_changes(match: RowMatch, comparison: model.Comparison) -> list[Change]:
+    if match.line < 0:
+        first, last = match.row[0].cell.span, match.row[-1].cell.span
+        return [Change(DriftKind.MISSING, first.to(last), _row_text(match.row), "")]
     changes = []
-    for cell, recorded, printed in found.pairs:
+    for cell, recorded, printed in match.pairs:
         if not same_number(recorded, printed, comparison):
             span = cell.span(recorded)
             changes.append(number_change(span, span.text, printed.text, (recorded, printed)))
@@ -112,48 +120,50 @@ class TableMatcher:
     """Matches the rows of one table with the lines of one output."""
 
     def __init__(
-        self, rows: Sequence[tuple[RowCell, ...]], ran: Side, comparison: model.Comparison
+        self, rows: Sequence[tuple[RowCell, ...]], printed: Side, comparison: model.Comparison
     ) -> None:
         self.rows = rows
-        self._same = partial(same_number, comparison=comparison)
-        self.lines = [plain(text) for text in ran.lines]
-        self.canon = cache(lambda line: canonical(self.lines[line]))
+        self._numbers_match = partial(same_number, comparison=comparison)
+        self.lines = [plain_text(text) for text in printed.lines]
+        self._canon = cache(lambda line: canonicalize(self.lines[line]))
 
     def match(self) -> tuple[RowMatch, ...]:
-        """For each row its line: with its numbers if it can be, else but for them."""
-        lines = self.all_match() or self._aligned()
-        return tuple(self._row_match(row, line) for row, line in zip(self.rows, lines, strict=True))
+        """The line of each row: with its numbers if possible, else with the rest of it."""
+        lines = self.find_matching_lines() or self._align_lines()
+        return tuple(self._match_row(row, line) for row, line in zip(self.rows, lines, strict=True))
 
-    def all_match(self) -> list[int] | None:
+    def find_matching_lines(self) -> list[int] | None:
         """A line for each row, in order, if all of them match."""
-        found: list[int] = []
-        below = 0
+        line_numbers: list[int] = []
+        first_line = 0
         for row in self.rows:
-            lines = range(below, len(self.lines))
-            line = next((n for n in lines if _stands(row, self.canon(n), self._same)), None)
+            lines = range(first_line, len(self.lines))
+            line = next(
+                (n for n in lines if _stands_in(row, self._canon(n), self._numbers_match)), None
+            )
             if line is None:
                 return None
-            found.append(line)
-            below = line + 1
-        return found
+            line_numbers.append(line)
+            first_line = line + 1
+        return line_numbers
 
-    def _aligned(self) -> list[int]:
-        """A line for each row that stands in one but for its numbers; -1 for the others."""
-        found = [-1] * len(self.rows)
+    def _align_lines(self) -> list[int]:
+        """A line for each row that stands in one except for its numbers; -1 for other rows."""
+        line_numbers = [-1] * len(self.rows)
         for row, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
-            found[row] = line
-        return found
+            line_numbers[row] = line
+        return line_numbers
 
     def _weight(self, row: int, line: int) -> int:
-        if _stands(self.rows[row], self.canon(line), self._same):
+        if _stands_in(self.rows[row], self._canon(line), self._numbers_match):
             return MATCH
-        return _ALIKE if _stands(self.rows[row], self.canon(line), any_number) else 0
+        return _ALIKE if _stands_in(self.rows[row], self._canon(line), always_match) else 0
 
-    def _row_match(self, row: tuple[RowCell, ...], line: int) -> RowMatch:
-        if line < 0 or _stands(row, self.canon(line), self._same):
+    def _match_row(self, row: tuple[RowCell, ...], line: int) -> RowMatch:
+        if line < 0 or _stands_in(row, self._canon(line), self._numbers_match):
             return RowMatch(row, line, ())
-        canon = self.canon(line)
-        places = _nearest_places(row, canon, self._same)
+        canon = self._canon(line)
+        places = _nearest_places(row, canon, self._numbers_match)
         pairs = tuple(
             (cell, recorded, printed)
             for cell, place in zip(row, places, strict=True)
@@ -168,58 +178,58 @@ def _is_word(character: str) -> bool:
     return character.isalnum() or character == "_"
 
 
-def _places(cell: Canon, line: Canon, start: int, same: SameNumber) -> Iterator[int]:
+def _find_places(cell: Canon, line: Canon, start: int, numbers_match: SameNumber) -> Iterator[int]:
     """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
-    text, wanted = line.skeleton, cell.skeleton
-    place = text.find(wanted, start)
+    text, cell_text = line.skeleton, cell.skeleton
+    place = text.find(cell_text, start)
     while place >= 0:
-        end = place + len(wanted)
-        cuts = (place > 0 and _is_word(wanted[0]) and _is_word(text[place - 1])) or (
-            end < len(text) and _is_word(wanted[-1]) and _is_word(text[end])
+        end = place + len(cell_text)
+        splits_word = (place > 0 and _is_word(cell_text[0]) and _is_word(text[place - 1])) or (
+            end < len(text) and _is_word(cell_text[-1]) and _is_word(text[end])
         )
-        if not cuts and fits(cell, line, place, same):
+        if not splits_word and numbers_fit(cell, line, place, numbers_match):
             yield place
-        place = text.find(wanted, place + 1)
+        place = text.find(cell_text, place + 1)
 
 
-def _stands(row: Sequence[RowCell], line: Canon, same: SameNumber) -> bool:
-    """Whether the cells stand in a line in order, each at its first place after the one before."""
+def _stands_in(row: Sequence[RowCell], line: Canon, numbers_match: SameNumber) -> bool:
+    """Whether the cells stand in a line in order, each after the one before."""
     at = 0
     for cell in row:
-        place = next(_places(cell.canon, line, at, same), None)
+        place = next(_find_places(cell.canon, line, at, numbers_match), None)
         if place is None:
             return False
         at = place + len(cell.canon.skeleton)
     return True
 
 
-def _nearest_places(row: Sequence[RowCell], line: Canon, same: SameNumber) -> list[int]:
+def _nearest_places(row: Sequence[RowCell], line: Canon, numbers_match: SameNumber) -> list[int]:
     """Places of the cells in order such that their numbers are nearest to the line's.
 
-    The row is known to stand in the line but for its numbers.
+    The row is known to stand in the line except for its numbers.
     """
     # For each place of the last cell: the cost so far, the places, the offset where it ends.
     best: list[tuple[float, list[int], int]] = [(0.0, [], 0)]
     for cell in row:
         extended: list[tuple[float, list[int], int]] = []
         start = min(end for _, _, end in best)
-        for place in islice(_places(cell.canon, line, start, any_number), _PLACES):
+        for place in islice(_find_places(cell.canon, line, start, always_match), _PLACES):
             before = [way for way in best if way[2] <= place]
             if before:
                 cost, places, _ = min(before, key=lambda way: way[0])
-                total = cost + _cost(cell.canon, line, place, same)
+                total = cost + _cost(cell.canon, line, place, numbers_match)
                 end = place + len(cell.canon.skeleton)
                 extended.append((total, [*places, place], end))
         best = extended
     return min(best, key=lambda way: way[0])[1]
 
 
-def _cost(cell: Canon, line: Canon, place: int, same: SameNumber) -> float:
+def _cost(cell: Canon, line: Canon, place: int, numbers_match: SameNumber) -> float:
     """How far the numbers of a cell are from those of the line: relative errors, each at most 1."""
     cost = 0.0
-    for recorded, ran in zip(cell.numbers, line.numbers_at(cell, place), strict=True):
-        if not same(recorded, ran):
-            error = relative_error(recorded.value, ran.value)
+    for recorded, printed in zip(cell.numbers, line.numbers_at(cell, place), strict=True):
+        if not numbers_match(recorded, printed):
+            error = relative_error(recorded.value, printed.value)
             cost += 0.01 + (1.0 if error is None else min(1.0, float(error)))
     return cost
 
@@ -239,19 +249,19 @@ def _cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     texts: list[str] = []
     segments: list[MappingSegment] = []
     at = 0
-    for text, span in _stretches(cell.children):
+    for text, span in _text_stretches(cell.children):
         if text:
             segments.append(MappingSegment(at, span.start, span.end, span.text == text))
             texts.append(text)
             at += len(text)
     if not segments:
         segments.append(MappingSegment(0, cell.span.start, cell.span.end, False))
-    mapped = filtered(MappedText("".join(texts), tuple(segments)), filters)
-    folded = mapped.substituted(_RUN, " ").substituted(_ENDS, "")
+    mapped = apply_filters(MappedText("".join(texts), tuple(segments)), filters)
+    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
     return MappedText(folded.text.replace("\u2212", "-"), folded.segments)
 
 
-def _stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
+def _text_stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
     for inline in model.walk_inlines(inlines):
         match inline:
             case model.Text():
@@ -274,9 +284,9 @@ def _stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
 
 def _inside_backticks(code: model.CodeSpan) -> Span:
     """The place of a code span's text: what stands between the backticks, without padding."""
-    written = code.span.text
-    ticks = len(written) - len(written.lstrip("`"))
-    inner = written[ticks : len(written) - ticks]
+    markdown = code.span.text
+    ticks = len(markdown) - len(markdown.lstrip("`"))
+    inner = markdown[ticks : len(markdown) - ticks]
     padding = 1 if len(inner) == len(code.text) + 2 else 0
     start = code.span.start + ticks + padding
     return Span(code.span.source, start, code.span.end - ticks - padding)

@@ -20,7 +20,7 @@ from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import text_diff
 from coursebuild.core.scripts.extract import extract
-from coursebuild.core.scripts.figures import ReadFile, difference
+from coursebuild.core.scripts.figures import ReadFile, describe_difference
 from coursebuild.core.scripts.findings import classes
 from coursebuild.core.text.source import Excerpt
 from coursebuild.features.truth.claims import Claims, claims_of, documents_of, total
@@ -175,7 +175,7 @@ def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
 
 
 def _redrawn(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
-    return difference(*before, now[1]) or "less than can be seen"
+    return describe_difference(*before, now[1]) or "less than can be seen"
 
 
 def _labs(course: Course) -> dict[tuple[str, str], LabState]:

@@ -20,7 +20,7 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course, Recording, Script
 from coursebuild.core.model.results import Outcome, ScriptRun, Sign
 from coursebuild.core.pages.marks import fence
-from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Excerpt, Source, Span
@@ -153,7 +153,7 @@ def _output_edits(
     for recording in recordings:
         if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
             comparison = recording.comparison or course.comparison
-            edit = updated_body(recording, comparison, course.filters, printed, printed)
+            edit = update_body(recording, comparison, course.filters, printed, printed)
             if isinstance(edit, Edit):
                 yield edit
     if not recordings and printed.strip() and not script.prefix:

@@ -146,7 +146,7 @@ def test_the_network_by_address_and_by_name(confine: Confine) -> None:
     assert abstract_one.startswith("ConnectionRefusedError")
     assert run.trace is not None
     asked = ["127.0.0.1", "192.0.2.1", "localhost", "example.org"]
-    assert [each.what for each in run.trace.effects] == asked
+    assert [each.target for each in run.trace.effects] == asked
 
 
 @pytest.mark.usefixtures("neighbour")

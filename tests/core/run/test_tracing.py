@@ -278,7 +278,7 @@ def test_effects_are_told_once_for_each_line(traced: Traced, root: Path, tmp_pat
         "socket.socket().bind(('127.0.0.1', 0))\n"
     )
     assert (trace.opaque, trace.outside) == ("it writes files outside its temporary folder", ())
-    assert sorted((each.what, each.path, each.line) for each in trace.effects) == [
+    assert sorted((each.target, each.path, each.line) for each in trace.effects) == [
         (str(tmp_path / "o"), "examples/x.py", 2),
         ("127.0.0.1:0", "examples/x.py", 7),
         ("data/0", "examples/x.py", 3),

@@ -12,7 +12,7 @@ from coursebuild.core.model import (
     document_blocks,
 )
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.scripts.bindings import Printed, check_bindings, leaning_on
+from coursebuild.core.scripts.bindings import PrintedOutputs, check_bindings, dependent_bindings
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
 from support.sample_lessons import course, document, ran, told
@@ -51,7 +51,7 @@ def check(
         if isinstance(block, Script)
     ]
     verdicts = verify(course(lesson, *others), runs)
-    printed = Printed(verdicts, runs, [*known, *scripts])
+    printed = PrintedOutputs(verdicts, runs, [*known, *scripts])
     return check_bindings(lesson, printed)
 
 
@@ -201,11 +201,11 @@ def leaning(text: str, printed: str, *others: Document) -> list[tuple[str, str, 
     lesson = document(text)
     runs = [ran(printed)]
     verdicts = verify(course(lesson, *others), runs)
-    printed_now = Printed(verdicts, runs)
+    printed_now = PrintedOutputs(verdicts, runs)
     return [
-        (leans.binding.text, leans.change.recorded, leans.change.ran)
+        (leans.binding.text, leans.change.recorded, leans.change.printed)
         for verdict in verdicts
-        for leans in leaning_on(verdict, [lesson, *others], printed_now)
+        for leans in dependent_bindings(verdict, [lesson, *others], printed_now)
     ]
 
 

@@ -48,7 +48,7 @@ def test_places_in_nested_fences(prefix: str, eol: str) -> None:
 )
 def test_classes_of_numbers(recorded: str, printed: str, kind: DriftKind) -> None:
     found = verdict(f"E {recorded} J", f"E {printed} J")
-    assert [(c.kind, c.recorded, c.ran) for c in found.changes] == [(kind, recorded, printed)]
+    assert [(c.kind, c.recorded, c.printed) for c in found.changes] == [(kind, recorded, printed)]
 
 
 def test_enormous_errors_stay_finite() -> None:

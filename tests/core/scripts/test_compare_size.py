@@ -25,7 +25,7 @@ def test_a_few_changes_among_thousands_of_lines_are_found() -> None:
         DriftKind.MISSING,
         *[DriftKind.NUMERIC] * 3,
     ]
-    assert [change.ran for change in found.changes[2:]] == ["9.5", "1e-3", "77"]
+    assert [change.printed for change in found.changes[2:]] == ["9.5", "1e-3", "77"]
 
 
 def test_thousands_of_lines_that_all_differ_are_compared_in_step() -> None:

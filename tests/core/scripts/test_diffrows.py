@@ -16,7 +16,7 @@ def rows(recorded: str, ran: str) -> list[str]:
     block = recording(recorded)
     verdict = compare(block, DIGITS_ELLIPSIS, (), ran)
     return [
-        row.mark + "".join(f"[{p.text}]" if p.changed else p.text for p in row.pieces)
+        row.mark + "".join(f"[{p.text}]" if p.is_changed else p.text for p in row.pieces)
         for row in diff_rows(verdict, (), ran)
     ]
 

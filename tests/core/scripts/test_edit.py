@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.model import Comparison, Filter
-from coursebuild.core.scripts.edit import apply_edits, updated_body
+from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source
 from support.sample_lessons import (
@@ -49,7 +49,7 @@ def test_what_matches_is_left_alone() -> None:
         ("took 1 s", "took  23 s", VOLATILE),
         ("took   1.5 s, E 2", "took 23.5 s, E 2", SECONDS),
     ):
-        assert updated_body(recording(recorded), comparison, (), printed, printed) is None
+        assert update_body(recording(recorded), comparison, (), printed, printed) is None
 
 
 def test_volatile_text_is_refreshed_where_more_than_its_numbers_changed() -> None:
@@ -103,7 +103,7 @@ def test_stable_is_what_the_comparison_takes() -> None:
     new = edited(recording("a 1\n..."), "a 2\n0x1", ELLIPSIS, again="a 2\n0x2")
     assert new.body_span.text == "a 2\n...\n"
     filters = (Filter("0x.", "0x"),)
-    found = updated_body(recording("a"), EXACT, filters, "b 0x1", "b 0x2")
+    found = update_body(recording("a"), EXACT, filters, "b 0x1", "b 0x2")
     assert isinstance(found, Edit) and found.text == "b 0x1\n"
 
 

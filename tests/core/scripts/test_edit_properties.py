@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.edit import updated_body
+from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from support.sample_lessons import (
     DIGITS,
@@ -64,7 +64,7 @@ def test_after_an_update_all_is_well(
 ) -> None:
     assume_writable(recorded, printed)
     lesson = recording(recorded, prefix=prefix, eol=eol)
-    found = updated_body(lesson, comparison, filters, printed, printed)
+    found = update_body(lesson, comparison, filters, printed, printed)
     if found is None:
         assert compare(lesson, comparison, filters, printed).status != "drift"
     else:
@@ -86,7 +86,7 @@ def test_an_update_with_ellipses_is_right_or_refused(
 ) -> None:
     assume_writable(recorded, printed)
     lesson = recording(recorded, prefix=prefix, eol=eol)
-    found = updated_body(lesson, comparison, (), printed, printed)
+    found = update_body(lesson, comparison, (), printed, printed)
     if isinstance(found, Edit):
         edited(lesson, printed, comparison)
     elif isinstance(found, Diagnostic):
@@ -99,7 +99,7 @@ def test_an_update_with_ellipses_is_right_or_refused(
 def test_what_two_runs_disagree_on_is_never_written(recorded: str, first: str, second: str) -> None:
     assume_writable(recorded, first)
     lesson = recording(recorded)
-    found = updated_body(lesson, EXACT, (), first, second)
+    found = update_body(lesson, EXACT, (), first, second)
     same = compare(recording(first), EXACT, (), second).status == "verified"
     if isinstance(found, Diagnostic):
         assert not same and found.rule == "output-unstable"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.edit import updated_body
+from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from support.sample_lessons import DIGITS, EXACT, edited, table, within
 
@@ -39,7 +39,7 @@ def test_a_table_under_digits_keeps_its_decimals() -> None:
 
 
 def test_lines_that_no_row_shows_may_differ_between_runs() -> None:
-    found = updated_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5\nt 1", "x 2.5\nt 2")
+    found = update_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5\nt 1", "x 2.5\nt 2")
     assert isinstance(found, Edit) and found.text == "2.5"
 
 
@@ -61,7 +61,7 @@ def test_tables_are_updated_right_or_refused(
 ) -> None:
     lesson = table(HEAD + "\n".join(f"| {a} | {b} | {c} |" for a, b, c in rows))
     printed = "\n".join(lines)
-    found = updated_body(lesson, comparison, (), printed, printed)
+    found = update_body(lesson, comparison, (), printed, printed)
     if isinstance(found, Edit):
         edited(lesson, printed, comparison)
     elif isinstance(found, Diagnostic):

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.failures import failure
+from coursebuild.core.scripts.failures import failure_diagnostic
 from support.sample_lessons import course, document, ran, told
 
 
@@ -31,7 +31,9 @@ go()
 
 def said(stderr: str = "", outcome: Outcome = Outcome.FAILED, status: int = 1) -> str:
     found = extractions()
-    diagnostic = failure(found[0], ran(outcome=outcome, status=status, stderr=stderr), found)
+    diagnostic = failure_diagnostic(
+        found[0], ran(outcome=outcome, status=status, stderr=stderr), found
+    )
     assert diagnostic is not None
     return f"{diagnostic.span.path}\n{told(diagnostic)}"
 

@@ -6,7 +6,7 @@ import io
 
 from PIL import Image
 
-from coursebuild.core.scripts.figures import difference, drawn_file
+from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {}">{}</svg>'
 
@@ -16,7 +16,7 @@ def svg(inside: str, size: str = "100 50") -> bytes:
 
 
 def recorded(inside: str) -> bytes:
-    drawn = drawn_file("x.svg", svg(inside))
+    drawn = prepare_figure("x.svg", svg(inside))
     assert isinstance(drawn, bytes), drawn
     return drawn
 
@@ -55,18 +55,18 @@ DIFFERENT = {
 
 def test_svg_differs_by_parts_words_and_places() -> None:
     base = recorded('<path d="M0 0L10 1"/>')
-    told = {inside: difference("x.svg", base, recorded(inside)) for inside in DIFFERENT}
+    told = {inside: describe_difference("x.svg", base, recorded(inside)) for inside in DIFFERENT}
     assert told == DIFFERENT
 
 
 def test_png_differs_by_pixels() -> None:
     base = png()
-    assert difference("x.png", base, png(spots={(3, 3): 254})) == ""
-    told = difference("x.png", base, png(spots={(3, 4): 0, (7, 8): 0}))
+    assert describe_difference("x.png", base, png(spots={(3, 3): 254})) == ""
+    told = describe_difference("x.png", base, png(spots={(3, 4): 0, (7, 8): 0}))
     assert told == "pixels differ in columns 3 to 8, rows 4 to 9"
-    told = difference("x.png", base, png((10, 10)))
+    told = describe_difference("x.png", base, png((10, 10)))
     assert told == "it has 10×10 pixels where 20×10 are recorded"
-    assert difference("x.png", b"no", base) == "the recorded file is no PNG"
+    assert describe_difference("x.png", b"no", base) == "the recorded file is no PNG"
 
 
 DIFFERENT_TABLES = {
@@ -78,16 +78,16 @@ DIFFERENT_TABLES = {
 
 
 def test_data_differ_by_cells() -> None:
-    base = drawn_file("x.csv", b"time,x\r\n0,1.0\r\n1,nan\r\n")
+    base = prepare_figure("x.csv", b"time,x\r\n0,1.0\r\n1,nan\r\n")
     assert base == b"time,x\n0,1.0\n1,nan\n"
-    told = {table: difference("x.csv", base, table) for table in DIFFERENT_TABLES}
+    told = {table: describe_difference("x.csv", base, table) for table in DIFFERENT_TABLES}
     assert told == DIFFERENT_TABLES
 
 
 def test_what_cannot_be_shown_is_told() -> None:
     bomb = b'<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg xmlns="http://www.w3.org/2000/svg">&a;</svg>'
     told = [
-        drawn_file("x.svg", data)
+        prepare_figure("x.svg", data)
         for data in (
             b"",
             b"<p/>",
@@ -107,4 +107,4 @@ def test_what_cannot_be_shown_is_told() -> None:
         "holds active content, `foreignObject`",
         "leads to `https://example.org/x.png`",
     ]
-    assert drawn_file("x.png", png()[:50]) == "is no PNG"
+    assert prepare_figure("x.png", png()[:50]) == "is no PNG"

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Filter
-from coursebuild.core.scripts.mapped_text import MappedText, filtered
+from coursebuild.core.scripts.mapped_text import MappedText, apply_filters
 
 TEXTS = st.text(alphabet="ab1 \n-x", max_size=30)
 PATTERNS = st.sampled_from(
@@ -27,11 +27,11 @@ def test_filtering_is_substitution(text: str, rules: list[tuple[str, str]]) -> N
     expected = text
     for pattern, replacement in rules:
         expected = re.sub(pattern, replacement, expected, flags=re.MULTILINE)
-    mapped = filtered(MappedText.of_text(text), [Filter(*rule) for rule in rules])
+    mapped = apply_filters(MappedText.of_text(text), [Filter(*rule) for rule in rules])
     assert mapped.text == expected
 
 
 def test_a_filter_ends_where_backtracking_would_not() -> None:
     text = "a" * 5000 + "b"
     rules = (Filter(r"(a+)+$", ""), Filter(r"(a|a)*c", ""), Filter("(a*)*b$", "end"))
-    assert filtered(MappedText.of_text(text), rules).text == "end"
+    assert apply_filters(MappedText.of_text(text), rules).text == "end"

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import ScriptRun
-from coursebuild.core.scripts.bindings import HeldLines, Printed, check_bindings
+from coursebuild.core.scripts.bindings import BindingEvidence, PrintedOutputs, check_bindings
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
 from support.sample_lessons import course, document, ran, told
@@ -20,10 +20,10 @@ def lesson(prose: str, output: str, fence: str = "text") -> str:
     return f"```python file=examples/a.py\nprint(1)\n```\n\nOutput:\n\n{body}\n{prose}\n"
 
 
-def look(held: HeldLines, text: str, *runs: ScriptRun) -> tuple[Diagnostic, ...]:
+def look(held: BindingEvidence, text: str, *runs: ScriptRun) -> tuple[Diagnostic, ...]:
     here = document(text)
     verdicts = verify(course(here), runs)
-    return check_bindings(here, Printed(verdicts, runs, ["examples/a.py"]), held)
+    return check_bindings(here, PrintedOutputs(verdicts, runs, ["examples/a.py"]), held)
 
 
 def anew(binding: str, before: str, now: str, fence: str = "text") -> Diagnostic:
@@ -31,7 +31,7 @@ def anew(binding: str, before: str, now: str, fence: str = "text") -> Diagnostic
 
     In between the old one stands beside the new run, as it does before it is accepted.
     """
-    prose, held = f"`{binding}`{{out}}", HeldLines()
+    prose, held = f"`{binding}`{{out}}", BindingEvidence()
     assert look(held, lesson(prose, before, fence), ran(before)) == ()
     assert look(held, lesson(prose, before, fence), ran(now)) == ()
     (found,) = look(held, lesson(prose, now, fence), ran(now))
@@ -143,7 +143,7 @@ def test_which_line_is_the_same(before: str, now: str, successor: str | None) ->
 
 
 def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
-    held, prose = HeldLines(), "`7.5`{out}"
+    held, prose = BindingEvidence(), "`7.5`{out}"
     recorded = "start\n...\nend 1.5\n"
     text = lesson(prose, recorded, "text ellipsis")
     assert look(held, text, ran("start\nx 7.52\nend 1.5\n")) == ()
@@ -152,7 +152,7 @@ def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
 
 
 def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
-    held, now = HeldLines(), "period 2.950 s\nhalf 1.975 s\n"
+    held, now = BindingEvidence(), "period 2.950 s\nhalf 1.975 s\n"
     assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
     twice = lesson("\nOutput:\n\n```text\n" + now + "```\n`2.006`{out}", now)
     (found,) = look(held, twice, ran(now))
@@ -182,7 +182,7 @@ def test_where_nothing_is_known_of_before(
     binding: str, printed: str, near: str, better: str
 ) -> None:
     text = lesson(f"`{binding}`{{out}}", printed + "\n")
-    (found,) = look(HeldLines(), text, ran(printed + "\n"))
+    (found,) = look(BindingEvidence(), text, ran(printed + "\n"))
     assert found.label.replace("values are", "value is") == f"the nearest printed value is {near}"
     assert found.help == (better and f"write `{better}`")
     assert [edit.text for edit in found.edits] == [better][: bool(better)]

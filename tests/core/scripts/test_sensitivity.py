@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import Comparison, Filter, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
 from coursebuild.core.model.sensitivity import Sensitivity, Standing
-from coursebuild.core.scripts.sensitivity import noise, sensitivity, worth_moving
+from coursebuild.core.scripts.sensitivity import is_worth_moving, noise_warnings, sensitivity
 from support.sample_lessons import (
     DIGITS,
     EXACT,
@@ -65,7 +65,7 @@ def flips(found: Sensitivity) -> list[tuple[str, str]]:
 
 
 def warnings(found: Sensitivity) -> list[str]:
-    return [told_text(diagnostic) for diagnostic in noise(found)]
+    return [told_text(diagnostic) for diagnostic in noise_warnings(found)]
 
 
 # --- numbers
@@ -209,7 +209,7 @@ def test_why_nothing_can_be_said(base: ScriptRun, moved: ScriptRun, standing: St
     found = sensitivity(whole, "examples/a.py", "1.1", [one], base, [moved] * 4)
     assert found == Sensitivity("examples/a.py", "1.1", standing)
     if standing not in (Standing.FAILED, Standing.NOT_MOVED):
-        assert not worth_moving(whole, [one], base)
+        assert not is_worth_moving(whole, [one], base)
 
 
 # --- warnings

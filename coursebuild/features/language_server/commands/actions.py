@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from lsprotocol import types
 
 from coursebuild.core.model import CodeSpan, NumberBinding, Text, document_inlines
-from coursebuild.core.scripts.bindings import Printed
-from coursebuild.core.scripts.bound_numbers import Shown
+from coursebuild.core.scripts.bindings import PrintedOutputs
+from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source, Span
@@ -71,7 +71,7 @@ def _outputs(texts: OpenTexts, place: Span, found: list[Diagnostic]) -> Iterator
 def _numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:
     library, document = texts.library, texts.document(place.source)
     verdicts = library.results.verdicts
-    printed = Printed(verdicts, library.results.runs, library.scripts)
+    printed = PrintedOutputs(verdicts, library.results.runs, library.scripts)
     recorded = [v.recording.span for v in verdicts if v.recording.span.source == place.source]
     for inline in () if document is None else document_inlines(document):
         if not _meet(inline.span, place) or any(_meet(output, inline.span) for output in recorded):
@@ -84,8 +84,8 @@ def _numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:
                 start, end = inline.span.start + number.start, inline.span.start + number.end
                 found.append((number.text, Span(place.source, start, end), f"`{number.text}`"))
         for text, span, code in found:
-            shown, binding = Shown.of(text), NumberBinding(span, text, span, None)
-            above = printed.recorded(binding) if shown.numbers and _meet(span, place) else []
+            shown, binding = BoundText.of(text), NumberBinding(span, text, span, None)
+            above = printed.of_binding(binding) if shown.numbers and _meet(span, place) else []
             if any(shown.is_in(printed.lines(verdict)) for verdict in above):
                 title = f"bind `{text}` to what `{above[0].recording.script}` prints"
                 yield _action(texts.places, title, [Edit(span, f"{code}{{out}}")])

@@ -17,7 +17,7 @@ from functools import lru_cache
 from lsprotocol import types
 from msgspec.structs import replace
 
-from coursebuild.core.scripts.bindings import Printed
+from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Note
 from coursebuild.core.text.rules import HELP
@@ -49,7 +49,9 @@ def _diagnoses(session: Session, version: int) -> tuple[Diagnostic, ...]:
         changed = {path for path, source in now.items() if source != then.get(path)}
         if changed:
             last = tuple(d for d in last if d.span.path not in changed or d.rule not in _COMPARED)
-            printed = Printed(library.results.verdicts, library.results.runs, library.scripts)
+            printed = PrintedOutputs(
+                library.results.verdicts, library.results.runs, library.scripts
+            )
             edited = [one for one in course.owned_documents if one[1].source.path in changed]
             found += tuple(output_findings(course, edited, printed))
         found += tuple(d for one in last if (d := _moved(one, now)) is not None)

@@ -22,8 +22,8 @@ from coursebuild.core.model import Owner
 from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.results import Formula, ModelFacts
 from coursebuild.core.pages.library import Library, models_named
-from coursebuild.core.scripts.bindings import Printed
-from coursebuild.core.scripts.bound_numbers import Shown
+from coursebuild.core.scripts.bindings import PrintedOutputs
+from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
@@ -239,9 +239,9 @@ class _Lookup:
 
     def binding(self, binding: model.NumberBinding) -> Referent | None:
         """The printed line that bears a number out."""
-        results, shown = self.library.results, Shown.of(binding.text)
-        printed = Printed(results.verdicts, results.runs, self.library.scripts)
-        for verdict in printed.recorded(binding) if shown.numbers else ():
+        results, shown = self.library.results, BoundText.of(binding.text)
+        printed = PrintedOutputs(results.verdicts, results.runs, self.library.scripts)
+        for verdict in printed.of_binding(binding) if shown.numbers else ():
             for window in shown.windows(printed.lines(verdict)):
                 if shown.shows(window) and window.line.locate is not None:
                     place = window.line.locate(window.numbers[0].start, window.numbers[-1].end)
