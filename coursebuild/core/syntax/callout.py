@@ -2,7 +2,7 @@
 
 `[!kind]- Title` makes one that starts folded.
 
-Entry point: `read_head`, what the first line says.
+Entry point: `read_head`, which reads the first line.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from coursebuild.core.text.source import Excerpt, Span
 
 _HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 FALLBACK = "note"
-"""What a callout of an unknown kind is read as, so that all in it is still checked."""
+"""The kind that a callout of an unknown kind gets, so that its content is still checked."""
 
 
 class Head(Struct, frozen=True):
@@ -31,28 +31,29 @@ class Head(Struct, frozen=True):
     rest: Excerpt
 
 
-def read_head(paragraph: Excerpt, known: Collection[str]) -> Parsed[Head] | None:
+def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None:
     """The head of a callout, if a blockquote's first paragraph begins with one.
 
-    Its kind is one that is known, without regard to case.
+    Its kind is one of `kinds`, without regard to case.
     """
-    found = _HEAD.match(paragraph.text)
-    if found is None:
+    match = _HEAD.match(paragraph.text)
+    if match is None:
         return None
-    written, name, wrong = trim(paragraph.slice(*found.span(1))), FALLBACK, None
-    if found[3][:1].strip():
-        start = found.start(3)
-        message = f"`{found[3][0]}` cannot follow the kind of a callout"
+    name, kind, diagnostic = trim(paragraph.slice(*match.span(1))), FALLBACK, None
+    if match[3][:1].strip():
+        start = match.start(3)
+        message = f"`{match[3][0]}` cannot follow the kind of a callout"
         help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
-        wrong = diagnose("callout-unknown", paragraph.span(start, start + 1), message, help=help)
-    elif written.text.lower() in known:
-        name = written.text.lower()
+        place = paragraph.span(start, start + 1)
+        diagnostic = diagnose("callout-unknown", place, message, help=help)
+    elif name.text.lower() in kinds:
+        kind = name.text.lower()
     else:
-        kinds = ", ".join(f"`{kind}`" for kind in sorted(known))
+        choice = ", ".join(f"`{kind}`" for kind in sorted(kinds))
         message = "the kind of this callout is missing"
-        message = f"no callout kind `{written.text}`" if written.text else message
-        help = did_you_mean(written.text.lower(), known) or f"known: {kinds}"
-        wrong = diagnose("callout-unknown", written.span(), message, help=help)
-    title, rest = trim(paragraph.slice(*found.span(3))), trim(paragraph.slice(found.end()))
-    head = Head(name, written.span(), title, bool(found[2]), rest)
-    return Parsed(head, () if wrong is None else (wrong,))
+        message = f"no callout kind `{name.text}`" if name.text else message
+        help = did_you_mean(name.text.lower(), kinds) or f"known: {choice}"
+        diagnostic = diagnose("callout-unknown", name.span(), message, help=help)
+    title, rest = trim(paragraph.slice(*match.span(3))), trim(paragraph.slice(match.end()))
+    head = Head(kind, name.span(), title, bool(match[2]), rest)
+    return Parsed(head, () if diagnostic is None else (diagnostic,))

@@ -1,6 +1,6 @@
-"""What course.toml says about building: comparing outputs, callouts, silenced warnings.
+"""Settings of course.toml for the build: comparison of outputs, callouts, silenced warnings.
 
-Entry points: `check_settings`, and one function for each setting that gives its value.
+Entry points: `check_settings`; `comparison` and `callout_kinds`, the values of these settings.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
-    """Everything that the types of these tables cannot say."""
+    """Check what the types of these tables cannot say."""
     verify = root.object("verify")
     for node, fields in decoding.valid_structs([verify], VerifyTable):
         yield from _check_verify(node, fields)
@@ -57,7 +57,7 @@ def _check_verify(node: ObjectNode, fields: VerifyTable) -> Iterator[Diagnostic]
 
 
 def comparison(node: ObjectNode, fields: VerifyTable) -> Comparison:
-    """How outputs are compared where a fence says nothing; tolerances alone mean `rtol`."""
+    """The comparison of outputs whose fence names none; tolerances alone mean `rtol`."""
     rtol, atol = _decimal(node, "rtol"), _decimal(node, "atol")
     implied = "exact" if rtol is None and atol is None else "rtol"
     mode = Mode(fields.compare or implied)
@@ -95,15 +95,15 @@ def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind
     for name, table in tables.items():
         label = table if isinstance(table, str) else table.label
         promise = "" if isinstance(table, str) else table.promise
-        known = kinds.get(name)
-        kinds[name] = CalloutKind(name, label, promise or (known.promise if known else ""))
+        default = kinds.get(name)
+        kinds[name] = CalloutKind(name, label, promise or (default.promise if default else ""))
     return tuple(kinds.values())
 
 
 def _check_silence(node: ObjectNode, fields: Silence) -> Iterator[Diagnostic]:
     rule = RULES.get(fields.rule)
     if rule is None:
-        warning_names = [name for name, known in RULES.items() if known.severity == "warning"]
+        warning_names = [name for name, entry in RULES.items() if entry.severity == "warning"]
         message = f"there is no rule {format_name(fields.rule)}"
         help = did_you_mean(fields.rule, warning_names)
         yield diagnose("silence-rule", node.place("rule"), message, help=help)

@@ -3,13 +3,13 @@
 Entry point: `parse_course_map(source)` → a `Course` whose lessons and pages have no documents yet.
 
 1. The TOML is read into nodes, and these into the declared tables.
-2. What no type can say is checked on every table whose own fields are right: ids, prerequisites,
-   files, settings.
-3. When nothing is wrong, the tables become the course.
+2. Rules that types cannot express are checked on every table whose own fields are right: ids,
+   prerequisites, files, settings.
+3. If nothing is wrong, the tables become the course.
 
-An id of a level is letters and digits (`4`, `A`); that of a lesson is its level's id, a dot, and
-more such parts joined by dots (`4.2`, `A.1`). Ids that differ in upper and lower case only count as
-the same: file names may not tell them apart.
+The id of a level consists of letters and digits (`4`, `A`). That of a lesson is its level's id, a
+dot, and more such parts joined by dots (`4.2`, `A.1`). Ids that differ in upper and lower case only
+count as the same, as not every file system tells them apart.
 """
 
 from __future__ import annotations
@@ -46,50 +46,50 @@ from coursebuild.core.text.source import Source, Span
 
 
 def parse_course_map(source: Source) -> Parsed[Course | None]:
-    """The course that the map describes, without what its files hold. Never raises."""
-    parsed = parse_toml(source)
-    root = parsed.value
+    """The course that the map describes, its lessons and pages not read yet. Never raises."""
+    parsed_toml = parse_toml(source)
+    root = parsed_toml.value
     if root is None:
-        return Parsed(None, sort_diagnostics(parsed.diagnostics))
+        return Parsed(None, sort_diagnostics(parsed_toml.diagnostics))
     decoding = decode(root, CourseFile, "the course map", TOML)
-    levels = tuple(_levels(root, decoding))
+    levels = tuple(_read_levels(root, decoding))
     lessons = [lesson for level in levels for lesson in level.lessons]
     nodes = [node for level in root.objects("level") for node in level.objects("lesson")]
-    found = [
-        *parsed.diagnostics,
+    diagnostics = [
+        *parsed_toml.diagnostics,
         *decoding.diagnostics,
         *_check_ids(root, nodes),
         *_check_files(root, decoding),
         *check_settings(root, decoding),
     ]
-    unusable = bool(found)
-    found += _check_places(root, decoding)
-    found += _check_prerequisites(lessons, _ids(nodes))
+    unusable = bool(diagnostics)
+    diagnostics += _check_levels(root, decoding)
+    diagnostics += _check_prerequisites(lessons, _read_ids(nodes))
     if unusable or decoding.value is None:
-        return Parsed(None, sort_diagnostics(found))
-    course = _course(source, root, decoding.value, levels)
-    found += check_contrast(root.object("theme"), course.theme)
-    return Parsed(course, sort_diagnostics(found))
+        return Parsed(None, sort_diagnostics(diagnostics))
+    course = _build_course(source, root, decoding.value, levels)
+    diagnostics += check_contrast(root.object("theme"), course.theme)
+    return Parsed(course, sort_diagnostics(diagnostics))
 
 
-def _course(
+def _build_course(
     source: Source,
     root: ObjectNode,
     fields: CourseFile,
     levels: tuple[Level, ...],
 ) -> Course:
-    about, verify = fields.course, fields.verify or VerifyTable()
+    settings, verify = fields.course, fields.verify or VerifyTable()
     table, gate = root.object("course"), root.object("verify")
     return Course(
         map=source,
-        title=about.title,
-        summary=about.summary,
-        language=about.language,
-        base_url=about.base_url or "",
-        repository=about.repository or "",
-        licence=about.licence,
-        id=about.id or "",
-        engine=about.engine,
+        title=settings.title,
+        summary=settings.summary,
+        language=settings.language,
+        base_url=settings.base_url or "",
+        repository=settings.repository or "",
+        licence=settings.licence,
+        id=settings.id or "",
+        engine=settings.engine,
         engine_span=table.place("engine"),
         comparison=comparison(gate, verify),
         truth=verify.truth,
@@ -103,8 +103,8 @@ def _course(
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
-        features=_paths(table, "features", about.features),
-        packages=_paths(table, "packages", about.packages),
+        features=_named_paths(table, "features", settings.features),
+        packages=_named_paths(table, "packages", settings.packages),
         environment=tuple(sorted(verify.env.items())),
         pace=fields.pace,
         width=fields.format.width if fields.format is not None else 0,
@@ -115,7 +115,7 @@ def _course(
     )
 
 
-def _paths(table: ObjectNode, field: str, paths: tuple[str, ...]) -> tuple[NamedPath, ...]:
+def _named_paths(table: ObjectNode, field: str, paths: tuple[str, ...]) -> tuple[NamedPath, ...]:
     places = (item.span for item in table.items(field))
     return tuple(map(NamedPath, paths, places))
 
@@ -123,25 +123,25 @@ def _paths(table: ObjectNode, field: str, paths: tuple[str, ...]) -> tuple[Named
 # --------------------------------------------------------------------------- levels and lessons
 
 
-def _levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Level]:
+def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Level]:
     """The levels, with those of their lessons whose fields are right."""
     for node in root.objects("level"):
-        name = _id(node.get("id"))
+        name = _read_id(node.get("id"))
         inner = decoding.valid_structs(node.objects("lesson"), LessonTable)
-        lessons = tuple(_lesson(*lesson, name) for lesson in inner)
+        lessons = tuple(_build_lesson(*lesson, name) for lesson in inner)
         fields = next((fields for _, fields in decoding.valid_structs([node], LevelTable)), None)
         title, summary = ("", "") if fields is None else (fields.title, fields.summary)
         yield Level(node.span, name, title, summary, lessons)
 
 
-def _lesson(node: ObjectNode, table: LessonTable, level: str) -> Lesson:
+def _build_lesson(node: ObjectNode, table: LessonTable, level: str) -> Lesson:
     spans = tuple(item.span for item in node.items("prerequisites"))
     fields = asdict(table)
     return Lesson(**fields, span=node.span, prerequisite_spans=spans, level=level, document=None)
 
 
-def _id(node: Node | None) -> str:
-    """An id as it was meant, also where its quotes are missing."""
+def _read_id(node: Node | None) -> str:
+    """The text of an id, even if its quotes are missing; empty if it is of another type."""
     match node:
         case StringNode():
             return node.value
@@ -151,37 +151,37 @@ def _id(node: Node | None) -> str:
             return ""
 
 
-def _ids(nodes: Iterable[ObjectNode]) -> list[str]:
-    return [name for node in nodes if (name := _id(node.get("id")))]
+def _read_ids(nodes: Iterable[ObjectNode]) -> list[str]:
+    return [name for node in nodes if (name := _read_id(node.get("id")))]
 
 
 # ---------------------------------------------------------------------------------------- checks
 
-_TAKEN = frozenset({"index", "404"})
+_RESERVED_IDS = frozenset({"index", "404"})
 """Names of pages that every site has."""
 
 
 def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diagnostic]:
     kinds = (("level", root.objects("level")), ("lesson", lessons), ("page", root.objects("page")))
     for kind, nodes in kinds:
-        known: dict[str, tuple[str, Span]] = {}
-        for place in (given for node in nodes if (given := node.get("id"))):
-            name = _id(place)
-            first, span = known.setdefault(name.casefold(), (name, place.span))
-            if not name or span == place.span:
+        first_by_id: dict[str, tuple[str, Span]] = {}
+        for node in (id_node for node in nodes if (id_node := node.get("id"))):
+            name = _read_id(node)
+            first, span = first_by_id.setdefault(name.casefold(), (name, node.span))
+            if not name or span == node.span:
                 continue
             message = f"the {kind} id `{shorten(name)}` is used twice"
             if name != first:
                 differ = "differ in upper and lower case only"
                 message = f"the {kind} ids `{shorten(first)}` and `{shorten(name)}` {differ}"
             notes = (Note("the first one is here", span),)
-            yield diagnose("id-repeated", place.span, message, notes=notes)
+            yield diagnose("id-repeated", node.span, message, notes=notes)
 
 
-def _check_places(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
-    """Each lesson stands in the level that its id begins with."""
+def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
+    """Check that each lesson stands in the level that its id begins with."""
     for level in root.objects("level"):
-        name = _id(level.get("id"))
+        name = _read_id(level.get("id"))
         for node, fields in decoding.valid_structs(level.objects("lesson"), LessonTable):
             if name and not fields.id.startswith(f"{name}."):
                 message = f"the lesson `{fields.id}` stands in the level `{shorten(name)}`"
@@ -194,7 +194,7 @@ def _check_files(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[D
     for node, fields in decoding.valid_structs(root.objects("page"), PageTable):
         place = node.place("file")
         files.append((fields.file, place))
-        if fields.id in _TAKEN:
+        if fields.id in _RESERVED_IDS:
             message = f"a page cannot have the id `{fields.id}`"
             help = "the site has a file of this name already"
             yield diagnose("field-value", node.place("id"), message, help=help)
@@ -207,7 +207,7 @@ def _check_files(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[D
 
 
 def _path_problem(path: str) -> str:
-    """What is wrong with the path of a page; empty when nothing is."""
+    """What is wrong with the path of a page; empty if nothing is."""
     if "\\" in path:
         return "has a backslash: folders are separated by `/`"
     if path.startswith(("/", "~")) or re.match(r"[A-Za-z]:", path):
@@ -226,12 +226,12 @@ def _path_problem(path: str) -> str:
 
 
 def _check_prerequisites(lessons: list[Lesson], ids: Iterable[str]) -> Iterator[Diagnostic]:
-    """Unknown and repeated prerequisites, and lessons that require each other in a circle.
+    """Report unknown and repeated prerequisites, and lessons that require each other in a circle.
 
-    `ids` are those of all lessons, also of those with mistakes in other fields.
+    `ids` has those of all lessons, even of those with mistakes in other fields.
     """
-    known = {lesson.id: lesson for lesson in reversed(lessons)}
-    names = {*known, *ids}
+    lesson_by_id = {lesson.id: lesson for lesson in reversed(lessons)}
+    names = {*lesson_by_id, *ids}
     for lesson in lessons:
         pairs = list(zip(lesson.prerequisites, lesson.prerequisite_spans, strict=True))
         yield from check_unique(pairs, "field-value", "the prerequisite `{}` is named twice")
@@ -240,14 +240,14 @@ def _check_prerequisites(lessons: list[Lesson], ids: Iterable[str]) -> Iterator[
                 message = f"no lesson of the map has the id `{shorten(name)}`"
                 help = did_you_mean(name, names)
                 yield diagnose("prerequisite-unknown", span, message, help=help)
-    graph = {lesson.id: known[lesson.id].prerequisites for lesson in lessons}
-    while circle := _circle(graph):
-        yield _circle_diagnostic([known[name] for name in circle])
+    graph = {lesson.id: lesson_by_id[lesson.id].prerequisites for lesson in lessons}
+    while circle := _find_cycle(graph):
+        yield _diagnose_cycle([lesson_by_id[name] for name in circle])
         graph = {name: graph[name] for name in graph if name not in circle}
 
 
-def _circle(graph: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """Names that require each other in a circle, the first one of the map first; may be empty."""
+def _find_cycle(graph: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """Lessons that require each other in a circle, the first of the map first; empty if none do."""
     try:
         graphlib.TopologicalSorter(graph).prepare()
     except graphlib.CycleError as error:
@@ -257,7 +257,7 @@ def _circle(graph: Mapping[str, tuple[str, ...]]) -> list[str]:
     return []
 
 
-def _circle_diagnostic(circle: list[Lesson]) -> Diagnostic:
+def _diagnose_cycle(circle: list[Lesson]) -> Diagnostic:
     places = []
     for lesson, required in zip(circle, [*circle[1:], circle[0]], strict=True):
         span = lesson.prerequisite_spans[lesson.prerequisites.index(required.id)]

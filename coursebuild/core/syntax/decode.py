@@ -2,13 +2,13 @@
 
 Entry points: `decode(node, type, name, format)` → `Decoding`; `field_description` of a field.
 
-1. One walk over the nodes, led by what `msgspec.inspect` says of the type, reports everything that
-   is wrong in one go: unknown and missing fields, wrong types, impossible values. (Repeated fields
-   were reported by the parser that made the nodes.)
-2. A struct is made as soon as all its own fields are right: an unknown field beside them is a
+1. One walk over the nodes, guided by what `msgspec.inspect` says of the type, reports everything
+   that is wrong: unknown and missing fields, wrong types, impossible values. (The parser that made
+   the nodes has reported repeated fields.)
+2. A struct is made as soon as all its own fields are right. An unknown field beside them is a
    mistake, but no reason to leave the rest unchecked.
-3. What was right is kept by node, so that checks of what no type can say run on all of it, even
-   when the whole is wrong.
+3. These structs are kept by node, so that checks of rules that types cannot express run on them,
+   even if the whole is wrong.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _FAILED = object()
-"""The value of a node that is wrong."""
+"""Stands for the value of a node that is wrong."""
 
 
 class Decoding(Struct, Generic[S], frozen=True):
-    """What a tree of nodes holds."""
+    """The values of a tree of nodes."""
 
     value: S | None
-    """The whole; it can be there along with diagnostics (an unknown field takes nothing away)."""
+    """The whole; it can be there along with diagnostics, as an unknown field does no harm."""
     diagnostics: tuple[Diagnostic, ...]
     structs: Mapping[ObjectNode, Struct]
     """Every object whose own fields are all right."""
@@ -66,7 +66,7 @@ class Decoding(Struct, Generic[S], frozen=True):
     def valid_structs(
         self, nodes: Iterable[ObjectNode], type: type[T]
     ) -> Iterator[tuple[ObjectNode, T]]:
-        """Those of some objects whose own fields are right, each with its struct."""
+        """The objects whose own fields are right, each with its struct."""
         for node in nodes:
             struct = self.structs.get(node)
             if isinstance(struct, type):
@@ -76,20 +76,21 @@ class Decoding(Struct, Generic[S], frozen=True):
 def decode(node: Node, type: type[S], name: str, format: Format) -> Decoding[S]:
     """Read a node as a struct; messages call the whole `name`, as in `the quiz`."""
     decoder = _Decoder(format)
-    value = decoder.value(node, _type_info(type), name)
+    value = decoder.decode_value(node, _inspect_type(type), name)
     whole = value if isinstance(value, type) else None
     return Decoding(whole, tuple(decoder.diagnostics), decoder.structs, tuple(decoder.texts))
 
 
 @functools.cache
-def _type_info(type: type[Struct]) -> inspect.Type:
+def _inspect_type(type: type[Struct]) -> inspect.Type:
     return inspect.type_info(type)
 
 
 class _Decoder:
-    """Gathers what one walk finds. A method gives the value of a node, or reports and `_FAILED`.
+    """Collects the results of one walk.
 
-    `name` is what messages call the node.
+    A method returns the value of a node, or reports a diagnostic and returns `_FAILED`. `name` is
+    what messages call the node.
     """
 
     def __init__(self, format: Format) -> None:
@@ -103,46 +104,48 @@ class _Decoder:
         return _FAILED
 
     def wrong_type(self, node: Node, type: inspect.Type, name: str, help: str = "") -> object:
-        if isinstance(node, ErrorNode):  # reported when it was read
+        if isinstance(node, ErrorNode):  # the parser has reported it
             return _FAILED
         message = wrong_type(node, name, type, self.format)
-        help = help or type_help(node, type) or _described(name, type)
+        help = help or type_help(node, type) or _field_help(name, type)
         return self.report("field-type", node.mark, message, help)
 
-    def value(
+    def decode_value(
         self, node: Node, type: inspect.Type, name: str, remarks: Mapping[str, str] = _NO_REMARKS
     ) -> object:
-        """The value of a node of which a type is declared, in a `Meta` with these remarks."""
+        """The value of a node of a declared type; `remarks` are the `extra` of its `Meta`."""
         if not accepts(type, node):
             return self.wrong_type(node, type, name)
         match type, node:
             case inspect.Metadata(), _:
-                return self.value(node, type.type, name, type.extra or _NO_REMARKS)
+                return self.decode_value(node, type.type, name, type.extra or _NO_REMARKS)
             case inspect.StrType(), StringNode():
-                return self.string(node, type, name, remarks)
+                return self.decode_string(node, type, name, remarks)
             case inspect.LiteralType(), StringNode():
-                return self.literal(node, type, name)
+                return self.decode_literal(node, type, name)
             case inspect.IntType() | inspect.FloatType(), NumberNode():
-                return self.number(node, type, name)
+                return self.decode_number(node, type, name)
             case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
-                return self.array(node, type, name)
+                return self.decode_array(node, type, name)
             case inspect.DictType(), ObjectNode():
-                return self.map(node, type)
+                return self.decode_map(node, type)
             case inspect.StructType(), ObjectNode():
-                return self.struct(node, type)
+                return self.decode_struct(node, type)
             case inspect.UnionType(), _:
-                structs = [one for one in type.types if isinstance(one, inspect.StructType)]
-                tagged = {str(one.tag): one for one in structs if one.tag is not None}
+                structs = [
+                    member for member in type.types if isinstance(member, inspect.StructType)
+                ]
+                tagged = {str(member.tag): member for member in structs if member.tag is not None}
                 if tagged and isinstance(node, ObjectNode):
-                    return self.tagged(node, tagged)
-                fitting = next(one for one in type.types if accepts(one, node))
-                return self.value(node, fitting, name)
+                    return self.decode_tagged(node, tagged)
+                fitting = next(member for member in type.types if accepts(member, node))
+                return self.decode_value(node, fitting, name)
             case _:
                 return node.value if isinstance(node, BoolNode) else None
 
     # ---------------------------------------------------------------------------------- scalars
 
-    def string(
+    def decode_string(
         self, node: StringNode, type: inspect.StrType, name: str, remarks: Mapping[str, str]
     ) -> object:
         value = node.value
@@ -157,25 +160,25 @@ class _Decoder:
             self.texts.append((node, remarks["text"]))
         return value
 
-    def literal(self, node: StringNode, type: inspect.LiteralType, name: str) -> object:
+    def decode_literal(self, node: StringNode, type: inspect.LiteralType, name: str) -> object:
         if node.value in type.values:
             return node.value
         message = f"{format_name(name)} cannot be {format_value(node)}"
         help = did_you_mean(node.value, map(str, type.values))
         return self.report("field-value", node.mark, message, help)
 
-    def number(
+    def decode_number(
         self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
     ) -> object:
-        value = node.value if isinstance(type, inspect.IntType) else _double(node.value)
-        problem = _not_a_double(node) or _out_of_bounds(value, node, type)
+        value = node.value if isinstance(type, inspect.IntType) else _to_double(node.value)
+        problem = _check_double(node) or _check_bounds(value, node, type)
         if problem:
             return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
         return value
 
     # ------------------------------------------------------------------------------- containers
 
-    def array(
+    def decode_array(
         self, node: ArrayNode, type: inspect.VarTupleType | inspect.TupleType, name: str
     ) -> object:
         length, problem = len(node.items), ""
@@ -191,28 +194,28 @@ class _Decoder:
         if problem:
             return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
         values = [
-            self.value(item, type, f"{name}[{i}]")
+            self.decode_value(item, type, f"{name}[{i}]")
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))
         ]
         return _FAILED if _FAILED in values else tuple(values)
 
-    def map(self, node: ObjectNode, type: inspect.DictType) -> object:
+    def decode_map(self, node: ObjectNode, type: inspect.DictType) -> object:
         values: dict[str, object] = {}
         for member in node.members:
             key = member.key.value
             if key not in values:
-                values[key] = self.value(member.value, type.value_type, key)
+                values[key] = self.decode_value(member.value, type.value_type, key)
         return _FAILED if _FAILED in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
 
-    def struct(
+    def decode_struct(
         self,
         node: ObjectNode,
         type: inspect.StructType,
-        tagged: Mapping[str, inspect.StructType] | None = None,
+        variants: Mapping[str, inspect.StructType] | None = None,
     ) -> object:
-        """The struct; `tagged` are the other variants of its union, by their tags."""
+        """The struct; `variants` are those of its union, by their tags."""
         fields = {field.name: field for field in type.fields}
         values: dict[str, object] = {}
         unknown: dict[str, StringNode] = {}
@@ -220,66 +223,69 @@ class _Decoder:
             key = member.key.value
             if key in fields:
                 if key not in values:
-                    values[key] = self.value(member.value, fields[key].type, key)
-            elif not tagged or key != type.tag_field:
+                    values[key] = self.decode_value(member.value, fields[key].type, key)
+            elif not variants or key != type.tag_field:
                 unknown.setdefault(key, member.key)
-        meant: set[str] = set()
+        misspelt: set[str] = set()
         if type.forbid_unknown_fields and unknown:
-            meant = self.unknown(unknown.values(), fields, values, type, tagged or {})
+            misspelt = self.report_unknown(unknown.values(), fields, values, type, variants or {})
         missing = [field for field in type.fields if field.required and field.name not in values]
-        for lacking in missing:
-            if lacking.name not in meant:  # a misspelt field is one mistake
-                help = _described(lacking.name, lacking.type)
-                self.report("field-missing", node.mark, f"`{lacking.name}` is missing", help)
+        for absent in missing:
+            if absent.name not in misspelt:  # a misspelt field is one mistake
+                help = _field_help(absent.name, absent.type)
+                self.report("field-missing", node.mark, f"`{absent.name}` is missing", help)
         if missing or _FAILED in values.values():
             return _FAILED
         struct: Struct = type.cls(**values)
         self.structs[node] = struct
         return struct
 
-    def unknown(
+    def report_unknown(
         self,
         keys: Iterable[StringNode],
         fields: Iterable[str],
-        given: Iterable[str],
+        present: Iterable[str],
         type: inspect.StructType,
-        tagged: Mapping[str, inspect.StructType],
+        variants: Mapping[str, inspect.StructType],
     ) -> set[str]:
-        """Report unknown fields; the fields that were surely meant."""
-        meant: set[str] = set()
+        """Report unknown fields; return the fields of which they are misspellings."""
+        misspelt: set[str] = set()
         for key in keys:
-            near = nearest(key.value, set(fields) - set(given) - meant)
-            owners = _owners(key.value, tagged)
-            if near is not None:
-                meant.add(near)
-                help = f"did you mean `{near}`?"
+            likely = nearest(key.value, set(fields) - set(present) - misspelt)
+            owners = _variants_with_field(key.value, variants)
+            if likely is not None:
+                misspelt.add(likely)
+                help = f"did you mean `{likely}`?"
             elif owners:
                 names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
                 help = f"it is a field of {names}"
             else:
                 help = did_you_mean(key.value, fields)
             self.report("field-unknown", key.span, f"unknown field {format_name(key.value)}", help)
-        return meant
+        return misspelt
 
-    def tagged(self, node: ObjectNode, variants: Mapping[str, inspect.StructType]) -> object:
+    def decode_tagged(self, node: ObjectNode, variants: Mapping[str, inspect.StructType]) -> object:
         """The struct that the tag of an object names."""
         tag = str(next(iter(variants.values())).tag_field)
-        given = node.get(tag)
-        if given is None:
-            return self.untagged(node, tag, variants)
-        if not isinstance(given, StringNode):
-            return self.wrong_type(given, inspect.StrType(), tag, did_you_mean("", variants))
-        if given.value in variants:
-            return self.struct(node, variants[given.value], variants)
-        message = f"{format_name(tag)} cannot be {format_value(given)}"
-        help = did_you_mean(given.value, variants)
-        return self.report("field-value", given.mark, message, help)
+        tag_node = node.get(tag)
+        if tag_node is None:
+            return self.decode_untagged(node, tag, variants)
+        if not isinstance(tag_node, StringNode):
+            return self.wrong_type(tag_node, inspect.StrType(), tag, did_you_mean("", variants))
+        if tag_node.value in variants:
+            return self.decode_struct(node, variants[tag_node.value], variants)
+        message = f"{format_name(tag)} cannot be {format_value(tag_node)}"
+        help = did_you_mean(tag_node.value, variants)
+        return self.report("field-value", tag_node.mark, message, help)
 
-    def untagged(
+    def decode_untagged(
         self, node: ObjectNode, tag: str, variants: Mapping[str, inspect.StructType]
     ) -> object:
-        """Without a tag: the implied variant, unless the fields are clearly those of another."""
-        owners = {member.key.value: _owners(member.key.value, variants) for member in node.members}
+        """The struct of the implied variant, unless the fields are clearly those of another."""
+        owners = {
+            member.key.value: _variants_with_field(member.key.value, variants)
+            for member in node.members
+        }
         for key in (member.key for member in node.members):
             if not owners[key.value] and nearest(key.value, [tag], cutoff=0.7):
                 message = f"unknown field {format_name(key.value)}"
@@ -289,25 +295,25 @@ class _Decoder:
         if implied is not None:
             foreign = [tags for tags in owners.values() if tags and implied not in tags]
             if not foreign or [implied] in owners.values():
-                return self.struct(node, variants[implied], variants)
+                return self.decode_struct(node, variants[implied], variants)
             help = f'its fields are those of `"{tag}": "{foreign[0][0]}"`'
         return self.report("field-missing", node.mark, f"`{tag}` is missing", help)
 
 
 def field_description(type: inspect.Type) -> str:
-    """What a field of this type is, as its declaration says."""
+    """The description in the declaration of a field; may be empty."""
     extra = type.extra_json_schema if isinstance(type, inspect.Metadata) else None
     return str((extra or {}).get("description", ""))
 
 
-def _described(name: str, type: inspect.Type) -> str:
-    about = field_description(type)
-    return about and f"`{name}`: {about}"
+def _field_help(name: str, type: inspect.Type) -> str:
+    text = field_description(type)
+    return text and f"`{name}`: {text}"
 
 
-def _owners(key: str, variants: Mapping[str, inspect.StructType]) -> list[str]:
-    """The tags of the variants that have a field."""
-    return [tag for tag, one in variants.items() if key in one.cls.__struct_fields__]
+def _variants_with_field(key: str, variants: Mapping[str, inspect.StructType]) -> list[str]:
+    """The tags of the variants that have the field `key`."""
+    return [tag for tag, variant in variants.items() if key in variant.cls.__struct_fields__]
 
 
 # ----------------------------------------------------------------------------------------- numbers
@@ -320,26 +326,24 @@ _BOUNDS = (
 )
 
 
-def _out_of_bounds(
-    value: float, node: NumberNode, type: inspect.IntType | inspect.FloatType
-) -> str:
-    for bound, words, holds in _BOUNDS:
-        limit = getattr(type, bound)
+def _check_bounds(value: float, node: NumberNode, type: inspect.IntType | inspect.FloatType) -> str:
+    for attribute, words, holds in _BOUNDS:
+        limit = getattr(type, attribute)
         if limit is not None and not holds(value, limit):
             return f"must be {words} {limit:g}, not {node.raw}"
     return ""
 
 
-def _double(value: float) -> float:
+def _to_double(value: float) -> float:
     try:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
 
 
-def _not_a_double(node: NumberNode) -> str:
-    """Why a number cannot be used in a calculation; empty when it can."""
-    value = _double(node.value)
+def _check_double(node: NumberNode) -> str:
+    """Why a number cannot be used in a calculation; empty if it can."""
+    value = _to_double(node.value)
     if node.raw.strip("+-") in ("inf", "nan"):
         return f"must be a finite number, not {node.raw}"
     if math.isinf(value):

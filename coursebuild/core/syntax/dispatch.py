@@ -1,6 +1,6 @@
-"""What a fence becomes, by its kind.
+"""Fences become blocks according to their kind.
 
-Entry point: `fence_block`. Scripts are read in `script`, and other fences by their features.
+Entry point: `read_block`. Scripts are read in `script`, fences of features by the features.
 
 `mjcf` is a kind of the core, a model or a fragment of one. Keys: `fragment="worldbody"` (where the
 fragment goes; `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
@@ -23,30 +23,30 @@ from coursebuild.core.text.diagnostics import Note, diagnose
 _HEAD_RULES = frozenset(
     {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
 )
-"""Mistakes that may have kept a block from being a script."""
+"""Mistakes that may be why a block is no script."""
 
 
-def fence_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block:
-    """The block of a fence that records no output."""
+def read_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block:
+    """The block of a fence; those with recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
-        return _unclosed(fence, session)
+        return _read_unclosed(fence, session)
     match fence.kind:
         case "python":
-            return _python(fence, session)
+            return _read_script(fence, session)
         case "text":
             check_stray_keys(fence, session)
             return fence.code()
         case "mjcf":
-            return _mjcf(fence, session)
+            return _read_mjcf(fence, session)
         case name if (kind := fence_kind(name)) is not None:
-            return _of_feature(kind, fence, session, texts)
+            return _read_feature_block(kind, fence, session, texts)
         case _:
             session.diagnostics += check_kind(fence)
             return fence.code()
 
 
-def _unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
-    """What is inside may be anything, so that nothing is said about it."""
+def _read_unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
+    """Report a fence without end, and show it as code; its content is not checked."""
     if session.closes_indented and not fence.info.text:
         session.closes_indented = False
         return fence.code()
@@ -63,44 +63,44 @@ def _unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
     return fence.code()
 
 
-def _python(fence: Fence, session: ParsingState) -> Block:
-    parsed = parse_python(fence)
-    session.diagnostics += parsed.diagnostics
-    if isinstance(parsed.value, Script):
-        session.script, session.has_invalid_script = parsed.value.path, False
-        names = (figure.name for figure in parsed.value.figures)
+def _read_script(fence: Fence, session: ParsingState) -> Block:
+    parsed_block = parse_python(fence)
+    session.diagnostics += parsed_block.diagnostics
+    if isinstance(parsed_block.value, Script):
+        session.script, session.has_invalid_script = parsed_block.value.path, False
+        names = (figure.name for figure in parsed_block.value.figures)
         session.figures += [name for name in names if not name.endswith(".csv")]
-    elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed.diagnostics):
+    elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed_block.diagnostics):
         session.script, session.has_invalid_script = None, True
-    return parsed.value
+    return parsed_block.value
 
 
-def _of_feature(
+def _read_feature_block(
     kind: FenceKind[FeatureBlock], fence: Fence, session: ParsingState, texts: TextParser
 ) -> Block:
     if fence.nested and not kind.nested:
         message = f"a text of a quiz or lab cannot hold a {fence.kind}"
         session.report(diagnose("fence-info", fence.head, message))
         return fence.code()
-    parsed = kind.parse(fence, texts)
-    session.diagnostics += parsed.diagnostics
-    return parsed.value or fence.code()
+    parsed_block = kind.parse(fence, texts)
+    session.diagnostics += parsed_block.diagnostics
+    return parsed_block.value or fence.code()
 
 
 _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
-def _mjcf(fence: Fence, session: ParsingState) -> Mjcf | CodeBlock:
-    """An `mjcf` fence; one that says in a wrong way what it is cannot be compiled, and is code."""
-    parsed = fence.keys(values=("fragment", "error"))
-    session.diagnostics += parsed.diagnostics
-    keys, fragment = parsed.value, parsed.value.get("fragment")
+def _read_mjcf(fence: Fence, session: ParsingState) -> Mjcf | CodeBlock:
+    """An `mjcf` fence; with wrong keys it cannot be compiled, and is shown as code."""
+    parsed_keys = fence.keys(values=("fragment", "error"))
+    session.diagnostics += parsed_keys.diagnostics
+    keys, fragment = parsed_keys.value, parsed_keys.value.get("fragment")
     if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
         message = f"`{fragment.value}` is not the name of an element"
         help = 'name the element that it goes into, for example `fragment="worldbody"`'
         session.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
         return fence.code()
-    if parsed.diagnostics:
+    if parsed_keys.diagnostics:
         return fence.code()
     return Mjcf(
         fence.span, fence.body, keys.value("fragment"), keys.value("error"), keys.place("error")

@@ -2,11 +2,10 @@
 
 Entry point: `parse_document`. It never raises, whatever the text:
 
-1. Line ends, NUL and a byte order mark are dealt with; front matter is reported and left out.
-2. `tree` reads the blocks and, with `inlines`, what is in them; fences of ours go to their own
-   modules.
+1. Line ends, NUL and a byte order mark are normalized; front matter is reported and left out.
+2. `tree` reads the blocks and, with `inlines`, their content; other modules read our fences.
 3. Footnotes are read last, in the order of their numbers.
-4. What stands where it must not is found in the whole (`_misplaced`).
+4. Terms and labels in wrong places are found in the whole document (`_check_placement`).
 """
 
 from __future__ import annotations
@@ -46,67 +45,67 @@ _TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
     """Parse a lesson or a page.
 
-    `callouts` are the known kinds; a lesson, unlike a page, has no heading of level 1. A page's
-    title, if it opens with it, is not in the document. All mistakes are diagnostics, in the order
-    of their places; the document holds all that could be read.
+    `callouts` are the known kinds. A lesson, unlike a page, has no heading of level 1. The title
+    with which a page may begin is not in the document. Mistakes become diagnostics, in the order of
+    their places; the document holds all that could be read.
     """
     session = ParsingState(callouts, lesson)
-    base = _without_front_matter(read_markdown(source), session)
+    base = _remove_front_matter(read_markdown(source), session)
     title = None if lesson else title_line(source)
     if title is not None:
         base = base.slice(len(base.text.partition("\n")[0]))
     reader = TextReader(base, session, session.references, nested=False)
     blocks = reader.read()
     anchor = "" if title is None else slug(title.text)
-    free = not session.anchors.has(anchor)
-    document = Document(source, blocks, session.notes.finish(), anchor if free else "")
-    session.diagnostics += _misplaced(document)
+    is_free = not session.anchors.has(anchor)
+    document = Document(source, blocks, session.notes.finish(), anchor if is_free else "")
+    session.diagnostics += _check_placement(document)
     return Parsed(document, sort_diagnostics(session.diagnostics))
 
 
-def _without_front_matter(text: Excerpt, session: ParsingState) -> Excerpt:
-    found = _YAML.match(text.text) or _TOML.match(text.text)
-    if found is None:
+def _remove_front_matter(text: Excerpt, session: ParsingState) -> Excerpt:
+    match = _YAML.match(text.text) or _TOML.match(text.text)
+    if match is None:
         return text
-    what = "lesson" if session.lesson else "page"
-    message = f"a {what} has no front matter"
+    subject = "lesson" if session.lesson else "page"
+    message = f"a {subject} has no front matter"
     help = "its title and everything else about it are in content/course.toml; begin with the text"
     session.report(diagnose("front-matter", text.span(0, 3), message, help=help))
-    return text.slice(found.end())
+    return text.slice(match.end())
 
 
 _MARKS = ("]{", "{#eq:")
 
 
-def _misplaced(document: Document) -> tuple[Diagnostic, ...]:
-    """Terms and labels that stand where a reader would not find them.
+def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
+    """Report terms and labels in places where no link could lead to them.
 
-    The glossary shows the sentence around a term, so it is defined in a paragraph. What stands in a
-    quiz, a lab or a heading is shown elsewhere too, so nothing can lead to it.
+    The glossary shows the sentence around a term, so it is defined in a paragraph. The texts of
+    quizzes, labs and headings are shown in several places, so no link can name one of them.
     """
     if not any(mark in document.source.text for mark in _MARKS):
         return ()
     elsewhere = blocks_elsewhere(document)
-    found = [*_taken(document)]
+    diagnostics = [*_check_ids_of_terms(document)]
     for block in document_blocks(document):
-        away = id(block) in elsewhere
+        is_elsewhere = id(block) in elsewhere
         inlines = [*walk_inlines(block_inlines(block))]
-        if away or not isinstance(block, Paragraph):
+        if is_elsewhere or not isinstance(block, Paragraph):
             message = "a term is not defined here"
             help = "define it in a paragraph of the text, whose sentence the glossary can show"
             terms = (term.span for term in inlines if isinstance(term, Term))
-            found += [diagnose("term-place", span, message, help=help) for span in terms]
-        if away or isinstance(block, Heading):
+            diagnostics += [diagnose("term-place", span, message, help=help) for span in terms]
+        if is_elsewhere or isinstance(block, Heading):
             message = "a formula has no label here"
             help = "label formulas of the text, but not those of quizzes, labs and headings"
-            formulas = (one for one in (block, *inlines) if isinstance(one, Math | MathBlock))
+            formulas = (node for node in (block, *inlines) if isinstance(node, Math | MathBlock))
             labels = (formula.label.span for formula in formulas if formula.label is not None)
-            found += [diagnose("equation-label", span, message, help=help) for span in labels]
-    return tuple(found)
+            diagnostics += [diagnose("equation-label", span, message, help=help) for span in labels]
+    return tuple(diagnostics)
 
 
-def _taken(document: Document) -> Iterator[Diagnostic]:
-    """Headings whose explicit ids are those of terms."""
+def _check_ids_of_terms(document: Document) -> Iterator[Diagnostic]:
+    """Report headings whose explicit ids are those of terms."""
     terms = {
         inline.anchor: inline.span
         for inline in document_inlines(document)

@@ -1,7 +1,7 @@
-"""Fences: a code block of the text, and what makes one of ours out of it.
+"""Fences: code blocks of the text, of which other modules make scripts, quizzes and so on.
 
-Entry points: `read_fence` (a token into a `Fence`), `check_kind` (of a kind that looks misspelt,
-or that a feature would read that is not installed).
+Entry points: `read_fence`, which makes a `Fence` of a token; `check_kind`, which reports kinds that
+look misspelt or need a feature that is not installed.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from coursebuild.core.syntax.spans import PositionedToken, locate, trim
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 
-# Names of languages and file types that highlighters know and that are spelt like kinds of ours.
 _LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
+"""Names of languages and file types that look like misspelt kinds of ours."""
 
 _FOREIGN = {"math": "a formula on a line of its own stands between two `$$`"}
-"""Kinds of blocks that other tools read."""
+"""Kinds of blocks that other tools read, with what to write here."""
 
 INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
-"""How an indented block begins that was surely meant to be a fence."""
+"""The first line of an indented block that was surely meant to be a fence."""
 
 
 class Fence(Struct, frozen=True):
@@ -44,7 +44,7 @@ class Fence(Struct, frozen=True):
     body_span: Span
     """Those lines in the source, from the start of the first to that of the closing line."""
     prefix: str
-    """What stands before each of those lines in the source."""
+    """The text before each of those lines in the source."""
     is_closed: bool
     nested: bool
     """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
@@ -59,47 +59,47 @@ class Fence(Struct, frozen=True):
     def keys(
         self, *, values: Sequence[str] = (), flags: Sequence[str] = (), has_name: bool = False
     ) -> Parsed[FenceKeys]:
-        """What the info string says beside the kind; see `read_keys`."""
+        """The keys in the info string after the kind; see `read_keys`."""
         return read_keys(self.info, values=values, flags=flags, has_name=has_name)
 
     def code(self) -> CodeBlock:
-        """It as a code block of no special kind."""
+        """The fence as an ordinary code block."""
         return CodeBlock(self.span, unescapeAll(self.kind), unescapeAll(self.info.text), self.body)
 
 
 def is_known_kind(kind: str) -> bool:
-    """Whether a block of a kind is more than code."""
+    """Whether a block of a kind is more than code to be shown."""
     return kind in CORE_FENCES or kind in fence_names()
 
 
 def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     """The fence of a `fence` token of the text `base`."""
     assert token.map is not None
-    info_at = token.start + len(token.markup)
-    info_end = info_at + len(token.info)
-    info = trim(base.slice(info_at, info_end))
+    info_start = token.start + len(token.markup)
+    info_end = info_start + len(token.info)
+    info = trim(base.slice(info_start, info_end))
     is_closed = len(token.rows) == token.map[1] - token.map[0] - 2
     body = locate(base, token.rows) if token.rows else base.slice(info_end + 1, info_end + 1)
     if token.rows and not body.text.endswith("\n"):
         body = Excerpt(base.source, body.text + "\n", body.pieces)
     span = base.span(token.start, token.end)
-    head = base.span(token.start, info_at + len(token.info.rstrip()))
-    body_span, prefix = (body.span(), "") if nested else _lines(span, head, is_closed)
-    inner = _inner(body, token.markup)
+    head = base.span(token.start, info_start + len(token.info.rstrip()))
+    body_span, prefix = (body.span(), "") if nested else _body_lines(span, head, is_closed)
+    inner = _find_inner_opening(body, token.markup)
     return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner)
 
 
-def _inner(body: Excerpt, marks: str) -> Span | None:
+def _find_inner_opening(body: Excerpt, marks: str) -> Span | None:
     """The first line that would begin a fence of these marks, were it not inside one."""
     if marks not in body.text:
         return None
     opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)
-    found = opening.search(body.text)
-    return None if found is None else body.span(found.start(1), found.end(1))
+    match = opening.search(body.text)
+    return None if match is None else body.span(match.start(1), match.end(1))
 
 
-def _lines(span: Span, head: Span, is_closed: bool) -> tuple[Span, str]:
-    """The whole lines between the fences, and what new ones must begin with."""
+def _body_lines(span: Span, head: Span, is_closed: bool) -> tuple[Span, str]:
+    """The whole lines between the fences, and the prefix that new ones need."""
     source, last = span.source, span.end_line
     start = source.line_start(head.line + 1)
     end = source.line_start(last if is_closed else last + 1)
@@ -107,21 +107,21 @@ def _lines(span: Span, head: Span, is_closed: bool) -> tuple[Span, str]:
 
 
 def line_prefix(place: Span) -> str:
-    """What further lines of a block must begin with, by what stands before its first."""
+    """The prefix that further lines of a block need, such as `> `; `place` is its first line."""
     prefix = place.source.text[place.source.line_start(place.line) : place.start]
     prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
     return prefix + " " if prefix.endswith(">") else prefix
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:
-    """What looks wrong with a code block that is none of ours."""
+    """Report what looks wrong with the kind of a code block that is none of ours."""
     package = missing_package(fence.kind)
     if package:
         message = f"nothing that is installed reads a block of kind `{fence.kind}`"
         yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
     kind = kind_of(fence.info)
-    name, known = kind.text.lower(), (*CORE_FENCES, *fence_names())
-    near = "lab simlab" if name == "simlab" else nearest(name, known, cutoff=0.75)
+    name, kinds = kind.text.lower(), (*CORE_FENCES, *fence_names())
+    likely = "lab simlab" if name == "simlab" else nearest(name, kinds, cutoff=0.75)
     if not name:
         return
     words = split_words(fence.info).value
@@ -129,21 +129,21 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
         message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
         help = "a script is a block of kind `python`"
         yield diagnose("script-kind", kind.span(), message, help=help)
-    elif name in _FOREIGN or (name.startswith("{") and near is None):
+    elif name in _FOREIGN or (name.startswith("{") and likely is None):
         message = f"a block of kind `{kind.text}` is shown as code here"
         help = _FOREIGN.get(
             name, "a callout is a quotation: `> [!note]`, and `> ` before each line"
         )
         yield diagnose("markup-foreign", kind.span(), message, help=help)
-    elif near is not None and name not in _LANGUAGES:
+    elif likely is not None and name not in _LANGUAGES:
         message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
-        yield diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{near}`?")
-    elif not package and (unread := _unread_object(fence)) is not None:
-        yield unread
+        yield diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{likely}`?")
+    elif not package and (diagnostic := _check_unread_json(fence)) is not None:
+        yield diagnostic
 
 
-def _unread_object(fence: Fence) -> Diagnostic | None:
-    """That a block holds a JSON object that was surely meant for a kind that nothing reads."""
+def _check_unread_json(fence: Fence) -> Diagnostic | None:
+    """Report a JSON object in a block of a kind that neither we nor a highlighter know."""
     body = fence.body.text.strip()
     if not fence.kind or not body.startswith("{") or not body.endswith("}"):
         return None
@@ -161,7 +161,7 @@ def _unread_object(fence: Fence) -> Diagnostic | None:
 
 def _is_language(name: str) -> bool:
     """Whether code of a kind is highlighted."""
-    from pygments.lexers import find_lexer_class_by_name  # which this rare question alone needs
+    from pygments.lexers import find_lexer_class_by_name  # slow to import, and rarely needed
     from pygments.util import ClassNotFound
 
     try:

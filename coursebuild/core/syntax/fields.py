@@ -1,4 +1,4 @@
-"""Checks of how the fields of a declaration hang together.
+"""Checks of several fields of a declaration together.
 
 Entry points: `has_value`, `require_one_of`, `check_unique`.
 """
@@ -24,30 +24,30 @@ def has_value(node: ObjectNode, name: str) -> bool:
 def require_one_of(
     node: ObjectNode, type: type[Struct], names: tuple[str, ...], *, only: bool = True
 ) -> Iterator[Diagnostic]:
-    """One of the fields is needed and, with `only`, no more than one is taken."""
-    there = [member for name in names if (member := node.member(name)) and has_value(node, name)]
-    if not there and not _misspelt(node, type, names):
+    """Report if none of the fields is there or, with `only`, more than one of them."""
+    members = [member for name in names if (member := node.member(name)) and has_value(node, name)]
+    if not members and not _has_misspelling(node, type, names):
         choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
         yield diagnose("field-missing", node.mark, f"{choice} is missing")
-    for second in there[1:] if only else ():
-        first, help = there[0].key, "leave one of them out"
+    for second in members[1:] if only else ():
+        first, help = members[0].key, "leave one of them out"
         notes = (Note("the other one is here", first.span),)
         message = f"`{first.value}` and `{second.key.value}` exclude each other"
         yield diagnose("field-value", second.key.span, message, help=help, notes=notes)
 
 
-def _misspelt(node: ObjectNode, type: type[Struct], names: tuple[str, ...]) -> bool:
-    """Whether an unknown field was surely meant for one of the names: that is reported already."""
+def _has_misspelling(node: ObjectNode, type: type[Struct], names: tuple[str, ...]) -> bool:
+    """Whether an unknown field is surely a misspelling of one of the names, already reported."""
     keys = (member.key.value for member in node.members)
     return any(nearest(key, names) for key in keys if key not in type.__struct_fields__)
 
 
 def check_unique(
-    named: Iterable[tuple[str | float, Span]], rule: str, message: str, *, help: str = ""
+    names: Iterable[tuple[str | float, Span]], rule: str, message: str, *, help: str = ""
 ) -> Iterator[Diagnostic]:
-    """Each name that stands there again; `{}` in the message is the name."""
+    """Report each name that is repeated; `{}` in the message is the name."""
     first: dict[str | float, Span] = {}
-    for name, span in named:
+    for name, span in names:
         if first.setdefault(name, span) is not span:
             notes = (Note("the first one is here", first[name]),)
             text = message.format(shorten(name) if isinstance(name, str) else f"{name:g}")

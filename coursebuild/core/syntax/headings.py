@@ -30,7 +30,7 @@ _HELP = (
 
 
 class Attributes(Struct, frozen=True):
-    """What stands in braces after a heading, and the heading's text before it."""
+    """The attributes in braces after a heading, and the heading's text before them."""
 
     title: Excerpt
     id: Excerpt | None = None
@@ -40,42 +40,43 @@ class Attributes(Struct, frozen=True):
 
 def read_attributes(content: Excerpt) -> Parsed[Attributes]:
     """Split a heading's content into its text and its attributes."""
-    found = _CANDIDATE.search(content.text) if "{" in content.text else None
-    if found is None:
+    match = _CANDIDATE.search(content.text) if "{" in content.text else None
+    if match is None:
         return Parsed(Attributes(content))
-    title, braces = trim(content.slice(0, found.start())), trim(content.slice(found.start()))
-    if not found[1]:
-        return _mistake(title, braces, "the attributes of this heading are never closed")
+    title, braces = trim(content.slice(0, match.start())), trim(content.slice(match.start()))
+    if not match[1]:
+        return _reject(title, braces, "the attributes of this heading are never closed")
     name, classes, inner = None, list[str](), braces.slice(1, len(braces.text) - 1)
-    for word in (inner.slice(*found.span()) for found in _WORD.finditer(inner.text)):
+    for word in (inner.slice(*match.span()) for match in _WORD.finditer(inner.text)):
         if _ID.fullmatch(word.text) and name is None:
             name = word
         elif _CLASS.fullmatch(word.text):
             classes.append(word.text[1:])
         elif word.text.startswith("#") and name is not None:
-            return _mistake(title, word, "a heading has one id")
+            return _reject(title, word, "a heading has one id")
         else:
-            return _mistake(title, word, f"`{word.text}` is neither an id nor a class")
+            return _reject(title, word, f"`{word.text}` is neither an id nor a class")
     return Parsed(Attributes(title, name, tuple(classes)))
 
 
-def _mistake(title: Excerpt, place: Excerpt, message: str) -> Parsed[Attributes]:
-    wrong = diagnose("heading-attributes", place.span(), message, help=_HELP)
-    return Parsed(Attributes(title), (wrong,))
+def _reject(title: Excerpt, place: Excerpt, message: str) -> Parsed[Attributes]:
+    """A heading without attributes, as those that it has are wrong at `place`."""
+    diagnostic = diagnose("heading-attributes", place.span(), message, help=_HELP)
+    return Parsed(Attributes(title), (diagnostic,))
 
 
 def slug(text: str) -> str:
     """The anchor of a text: letters and digits of any script in lower case, hyphens for spaces."""
-    return _words(text) or "section"
+    return _join_words(text) or "section"
 
 
-def _words(text: str) -> str:
+def _join_words(text: str) -> str:
     return _SPACES.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-")
 
 
 def term_id(name: str) -> str:
-    """The id of a term, by which links call it; empty for a name without letters and digits."""
-    return _words(normalize("NFC", name))
+    """The id of a term in links; empty for a name without letters and digits."""
+    return _join_words(normalize("NFC", name))
 
 
 class Anchors(Struct):
@@ -83,11 +84,11 @@ class Anchors(Struct):
 
     report: Callable[[Diagnostic], None]
     explicit: dict[str, Span | None] = field(default_factory=dict)
-    """Each explicit id; the span of the heading that took it, once one has."""
-    taken: set[str] = field(default_factory=set)
-    """Ids that headings got from their text."""
+    """Each explicit id, with the span of the heading or formula that uses it, once it was read."""
+    generated: set[str] = field(default_factory=set)
+    """Ids made of the texts of headings."""
     counts: dict[str, int] = field(default_factory=dict)
-    """How far each text's ids are numbered."""
+    """The last number given to ids made of the same text."""
 
     def reserve(self, name: str) -> None:
         """Keep an id for the heading that asks for it."""
@@ -96,7 +97,7 @@ class Anchors(Struct):
     def take(self, name: str, span: Span) -> None:
         """Use an explicit id."""
         first = self.explicit.get(name)
-        if first is not None or name in self.taken:
+        if first is not None or name in self.generated:
             notes = [Note("first used here", first)] if first is not None else []
             self.report(
                 diagnose("anchor-repeated", span, f"the id `{name}` is already used", notes=notes)
@@ -106,7 +107,7 @@ class Anchors(Struct):
 
     def has(self, name: str) -> bool:
         """Whether a heading or a formula has an id, or asks for it."""
-        return name in self.explicit or name in self.taken
+        return name in self.explicit or name in self.generated
 
     def make(self, text: str) -> str:
         """The anchor of a heading without an id."""
@@ -116,26 +117,26 @@ class Anchors(Struct):
             count += 1
             name = f"{base}-{count}"
         self.counts[base] = count
-        self.taken.add(name)
+        self.generated.add(name)
         return name
 
 
 def check_heading(
-    span: Span, level: int, above: int | None, children: tuple[Inline, ...], *, lesson: bool
+    span: Span, level: int, previous: int | None, children: tuple[Inline, ...], *, lesson: bool
 ) -> list[Diagnostic]:
-    """What is wrong with a heading; `above` is the level before it, where that counts."""
-    found: list[Diagnostic] = []
+    """Check a heading; `previous` is the level of the heading before it, if it must fit to that."""
+    diagnostics: list[Diagnostic] = []
     if not plain_text(children).strip() and not any(
         isinstance(inline, Image) for inline in walk_inlines(children)
     ):
-        found.append(diagnose("heading-empty", span, "the heading has no text"))
+        diagnostics.append(diagnose("heading-empty", span, "the heading has no text"))
     if lesson and level == 1:
         help = "the title comes from the course map; begin with `## `"
         message = "a lesson has no heading of level 1"
-        found.append(diagnose("heading-top", span, message, help=help))
-    if above is not None and level > above + 1:
-        message = f"a heading of level {level} follows one of level {above}"
-        if lesson and above == 1:
+        diagnostics.append(diagnose("heading-top", span, message, help=help))
+    if previous is not None and level > previous + 1:
+        message = f"a heading of level {level} follows one of level {previous}"
+        if lesson and previous == 1:
             message = f"a heading of level {level} stands before any of level 2"
-        found.append(diagnose("heading-skip", span, message))
-    return found
+        diagnostics.append(diagnose("heading-skip", span, message))
+    return diagnostics

@@ -1,10 +1,10 @@
 """Raw HTML: its tags, whether they balance, and the files that it shows.
 
-Entry points: `tags` and `tag_at` (scan), `Balance` (what is open), `find_media`.
+Entry points: `tags` and `tag_at`, which scan; `Balance`, which tracks open elements; `find_media`.
 
-Balance is judged with care: elements whose end tag may be left out, void elements, comments and raw
-text never give a false alarm. An element must be closed in the block, list item or emphasis that it
-was opened in, as the page would be torn otherwise.
+Elements whose end tag may be left out, void elements, comments and raw text never give a false
+alarm. An element must be closed in the block, list item or emphasis in which it was opened, as it
+would break the structure of the page otherwise.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coursebuild.core.text.source import Excerpt, Span
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 _IMPLIED = frozenset("body colgroup head html tbody tfoot thead".split())
-"""Elements that may be there without any tag."""
+"""Elements that exist without any tag."""
 _OPTIONAL = frozenset("caption dd dt li optgroup option p rp rt td th tr".split())
 """Elements whose end tag may be left out."""
 _RAW_TEXT = frozenset("script style textarea title".split())
@@ -35,10 +35,10 @@ _TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'
 _ATTRIBUTE = re.compile(
     r"""\s([^\s"'<>/=]+)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))|\s[^\s"'<>/=]+"""
 )
-_LINKS = frozenset("cite href poster src xlink:href".split())
-_SHOWS = frozenset("audio embed iframe img input object source track video".split())
+_LINK_ATTRIBUTES = frozenset("cite href poster src xlink:href".split())
+_MEDIA_ELEMENTS = frozenset("audio embed iframe img input object source track video".split())
 """Elements that show a file."""
-_SHOWN = frozenset("data poster src srcset".split())
+_MEDIA_ATTRIBUTES = frozenset("data poster src srcset".split())
 _CANDIDATE = re.compile(r"[\s,]*([^\s,]+)[^,]*")
 """An address of a `srcset`, with the size that follows it."""
 
@@ -49,34 +49,34 @@ class Tag(NamedTuple):
     start: int
     end: int
     name: str
-    closes: bool
-    complete: bool
-    """Whether nothing is left open by it: a void element, or `<x/>`."""
+    is_end_tag: bool
+    is_complete: bool
+    """Whether it needs no end tag: a void element, or `<x/>`."""
 
 
 def tag_at(text: str, at: int) -> Tag | None:
     """The tag, comment or raw-text element that begins with the `<` at `at`, if one does."""
-    for mark, end in (("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"), ("<!", ">")):
+    for mark, mark_end in (("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>"), ("<!", ">")):
         if text.startswith(mark, at):
-            found = text.find(end, at + len(mark))
-            return Tag(at, len(text) if found < 0 else found + len(end), "", False, True)
+            position = text.find(mark_end, at + len(mark))
+            return Tag(at, len(text) if position < 0 else position + len(mark_end), "", False, True)
     tag = _TAG.match(text, at)
     if tag is None:
         return None
-    name, closes = tag[2].lower(), bool(tag[1])
-    complete = name in VOID or (tag[3].endswith("/") and not closes)
-    if name in _RAW_TEXT and not closes and not complete:
-        ends = _ends(text, name)
+    name, is_end_tag = tag[2].lower(), bool(tag[1])
+    is_complete = name in VOID or (tag[3].endswith("/") and not is_end_tag)
+    if name in _RAW_TEXT and not is_end_tag and not is_complete:
+        ends = _end_tag_ends(text, name)
         following = bisect_right(ends, tag.end())
         if following < len(ends):
             return Tag(at, ends[following], name, False, True)
-    return Tag(at, tag.end(), name, closes, complete)
+    return Tag(at, tag.end(), name, is_end_tag, is_complete)
 
 
 @functools.lru_cache(maxsize=4)
-def _ends(text: str, name: str) -> list[int]:
-    """Where the end tags of an element end."""
-    return [end.end() for end in re.finditer(rf"</{name}\s*>", text, re.IGNORECASE)]
+def _end_tag_ends(text: str, name: str) -> list[int]:
+    """The offsets at which the end tags of an element end."""
+    return [match.end() for match in re.finditer(rf"</{name}\s*>", text, re.IGNORECASE)]
 
 
 def tags(text: str) -> Iterator[Tag]:
@@ -90,51 +90,51 @@ def tags(text: str) -> Iterator[Tag]:
 
 
 class Balance:
-    """Which elements are open while a document is walked."""
+    """The elements that are open while a document is walked."""
 
     def __init__(self, report: Callable[[Diagnostic], None]) -> None:
         self._report = report
         self._open: list[tuple[str, Span]] = []
         self._scopes: list[int] = [0]
-        self._seen: set[str] = set()
-        self._excused: Counter[str] = Counter()
-        """End tags whose start tags were already reported."""
+        self._opened_names: set[str] = set()
+        self._reported: Counter[str] = Counter()
+        """How many start tags without end were reported, so that a late end tag is no mistake."""
 
     def enter(self) -> None:
-        """Begin a block or inline that elements must not reach out of."""
+        """Begin a block or inline in which elements opened there must be closed."""
         self._scopes.append(len(self._open))
 
     def leave(self) -> None:
-        """End it."""
+        """End the block or inline that was entered last."""
         base = self._scopes.pop()
         if len(self._open) > base:
             self._unwind(base)
 
     def finish(self) -> None:
-        """The text is over."""
+        """Report what is still open at the end of the text."""
         self._unwind(0)
 
     def add(self, tag: Tag, html: Excerpt) -> None:
-        """Take note of a tag of a piece of HTML."""
+        """Record a tag of a piece of HTML, and report its mistakes."""
         name, span, text = tag.name, html.span(tag.start, tag.end), html.text
         for attribute, start, end in _attributes(text, tag):
-            if attribute not in _LINKS:
+            if attribute not in _LINK_ATTRIBUTES:
                 continue
-            wrong = check_raw_scheme(unescape(text[start:end]), html.span(start, end))
-            if wrong is not None:
-                self._report(wrong)
+            diagnostic = check_raw_scheme(unescape(text[start:end]), html.span(start, end))
+            if diagnostic is not None:
+                self._report(diagnostic)
         if text.startswith("<!--", tag.start) and text.find("-->", tag.start) < 0:
             message, help = "this comment is never closed", "close it with `-->`"
             opening = html.span(tag.start, tag.start + 4)
             self._report(diagnose("html-unbalanced", opening, message, help=help))
-        if not name or tag.complete or name in VOID or name in _IMPLIED:
+        if not name or tag.is_complete or name in VOID or name in _IMPLIED:
             return
         if name in _OPTIONAL:
-            if not tag.closes:
-                self._seen.add(name)
-            elif name not in self._seen:
-                self._stray(name, span)
-        elif tag.closes:
+            if not tag.is_end_tag:
+                self._opened_names.add(name)
+            elif name not in self._opened_names:
+                self._report_stray(name, span)
+        elif tag.is_end_tag:
             self._close(name, span)
         else:
             self._open.append((name, span))
@@ -146,20 +146,20 @@ class Balance:
                 self._unwind(i + 1)
                 self._open.pop()
                 return
-        if self._excused[name]:
-            self._excused[name] -= 1
+        if self._reported[name]:
+            self._reported[name] -= 1
         else:
-            self._stray(name, span)
+            self._report_stray(name, span)
 
     def _unwind(self, base: int) -> None:
         for name, span in self._open[base:]:
-            self._excused[name] += 1
+            self._reported[name] += 1
             message = f"`<{name}>` is never closed"
             help = f"write `</{name}>` in the same block, list item or emphasis"
             self._report(diagnose("html-unbalanced", span, message, help=help))
         del self._open[base:]
 
-    def _stray(self, name: str, span: Span) -> None:
+    def _report_stray(self, name: str, span: Span) -> None:
         message = f"`</{name}>` closes an element that is not open here"
         self._report(diagnose("html-unbalanced", span, message))
 
@@ -170,25 +170,25 @@ def find_media(html: Excerpt) -> tuple[MediaAddress, ...]:
     return tuple(
         MediaAddress(start, end, unescape(text[start:end]), html.span(start, end))
         for tag in tags(text)
-        if tag.name in _SHOWS
+        if tag.name in _MEDIA_ELEMENTS
         for attribute in _attributes(text, tag)
-        if attribute[0] in _SHOWN
+        if attribute[0] in _MEDIA_ATTRIBUTES
         for start, end in _addresses(text, *attribute)
     )
 
 
 def _attributes(text: str, tag: Tag) -> Iterator[tuple[str, int, int]]:
-    """The attributes of a tag that have a value, by name, and where their values stand.
+    """The names of the attributes with a value, and where these values stand.
 
-    They are read one after the other: one may stand in the value of another.
+    They are read one after the other, as the text of one may occur in the value of another.
     """
-    for found in _ATTRIBUTE.finditer(text, tag.start, tag.end) if tag.name else ():
-        if found[1]:
-            yield found[1].lower(), *found.span(found.lastindex or 0)
+    for match in _ATTRIBUTE.finditer(text, tag.start, tag.end) if tag.name else ():
+        if match[1]:
+            yield match[1].lower(), *match.span(match.lastindex or 0)
 
 
 def _addresses(text: str, attribute: str, start: int, end: int) -> Iterator[tuple[int, int]]:
-    """Where the addresses in the value of an attribute stand."""
+    """The places of the addresses in the value of an attribute."""
     if attribute == "srcset":
         for candidate in _CANDIDATE.finditer(text, start, end):
             yield candidate.span(1)

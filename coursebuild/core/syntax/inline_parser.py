@@ -162,8 +162,8 @@ def _html(state: StateInline, silent: bool) -> bool:
     tag = tag_at(state.src, state.pos)
     if tag is None:
         return False
-    if tag.name in LITERAL and not tag.complete and state.literal in ("", tag.name):
-        state.literal = "" if tag.closes else tag.name
+    if tag.name in LITERAL and not tag.is_complete and state.literal in ("", tag.name):
+        state.literal = "" if tag.is_end_tag else tag.name
     state.push("html_inline", "", 0).content = state.src[tag.start : tag.end]
     state.pos = tag.end
     return True

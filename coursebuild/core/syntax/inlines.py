@@ -304,7 +304,7 @@ class _Pass:
         html = self.content.slice(token.start, token.end)
         for tag in tags(html.text):
             self.reader.balance.add(tag, html)
-            step = 0 if tag.complete else -1 if tag.closes else 1
+            step = 0 if tag.is_complete else -1 if tag.is_end_tag else 1
             if tag.name == "a":
                 self.links = max(0, self.links + step)
             elif tag.name in LITERAL:

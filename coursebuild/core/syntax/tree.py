@@ -18,7 +18,7 @@ from collections.abc import Callable
 from coursebuild.core import model
 from coursebuild.core.syntax.attributes import LABEL, read_label
 from coursebuild.core.syntax.callout import Head, read_head
-from coursebuild.core.syntax.dispatch import fence_block
+from coursebuild.core.syntax.dispatch import read_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
 from coursebuild.core.syntax.headings import Attributes, check_heading, read_attributes
 from coursebuild.core.syntax.html import Balance, find_media, tags
@@ -171,7 +171,7 @@ class TextReader:
 
     def _fence(self, token: PositionedToken) -> model.Block:
         fence = read_fence(token, self.base, nested=self.nested)
-        block = fence_block(fence, self.session, self.texts)
+        block = read_block(fence, self.session, self.texts)
         if isinstance(block, model.Script) and not block.norun and self._next_kind() == "text":
             below = self.tokens[self.at]
             if below.info.split() == ["text"]:  # its keys are told as what they are
