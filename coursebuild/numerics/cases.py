@@ -213,10 +213,10 @@ def closed_motion(
     Raises:
         SceneError: the scene begins otherwise than the hard case, but for the place of free bodies.
     """
-    problem, place = all_problems()[declaration.closed], declaration.place("reference")
+    problem, place = all_problems()[declaration.closed_form], declaration.place("reference")
     case_model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     if (case_model.jnt_type.tolist(), case_model.nq) != (model.jnt_type.tolist(), model.nq):
-        message = f"the model has other joints than the hard case `{declaration.closed}`"
+        message = f"the model has other joints than the hard case `{declaration.closed_form}`"
         raise SceneError(message, place)
     scene_start, case_start = _start(model, scene.scenario), _start(case_model, problem.scenario)
     shift = scene_start.position - case_start.position
@@ -225,7 +225,7 @@ def closed_motion(
     free_columns = np.repeat(of_free, widths)
     speeds = np.abs(scene_start.velocity - case_start.velocity).max(initial=0.0)
     if np.abs(shift[:, ~free_columns]).max(initial=0.0) > 1e-9 or speeds > 1e-9:
-        message = f"the scenario begins otherwise than the hard case `{declaration.closed}`"
+        message = f"the scenario begins otherwise than the hard case `{declaration.closed_form}`"
         raise SceneError(message, place, "its closed form holds for its own beginning only")
     turn = quat_mul(scene_start.attitude, quat_conj(case_start.attitude))
     motion = problem.reference.solution.motion(times)

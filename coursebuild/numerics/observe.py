@@ -51,7 +51,7 @@ def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:
 
 def quantity_name(model: Any, scene: Scene) -> str:
     """The declared quantity of a scenario, with its unit in brackets; empty without one."""
-    quantity = scene.declaration.measured
+    quantity = scene.declaration.observable
     if quantity is None:
         return ""
     if quantity.kind != "sensor":
@@ -88,7 +88,7 @@ _UNITS = {
 
 def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     """The declared quantity of a scenario at every sample: (n, d)."""
-    quantity = scene.declaration.measured
+    quantity = scene.declaration.observable
     assert quantity is not None
     data = initial_data(scene.scenario, model)
     values = []

@@ -118,10 +118,10 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
     if reference is None:
         reference = replace(self_reference(model, pilot, quick=quick), note=note)
-    if declaration.closed:
+    if declaration.closed_form:
         problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
         subject, place = (
-            f"the closed form of `{declaration.closed}`",
+            f"the closed form of `{declaration.closed_form}`",
             declaration.place("reference"),
         )
         source = problem.reference.source

@@ -129,8 +129,8 @@ def _said(declared: Declarations) -> str:
     for one in declared.scenarios:
         said = (
             *(one.name, one.title or "", one.keyframe, one.qpos, one.qvel, one.duration),
-            *(one.sample, one.controls, one.hold, one.measured),
-            *(None if one.closed else one.reference, one.closed),
+            *(one.sample, one.controls, one.hold, one.observable),
+            *(None if one.closed_form else one.reference, one.closed_form),
             *(one.conserved, one.timesteps),
         )
         parts.append(repr(said))

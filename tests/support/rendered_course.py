@@ -158,9 +158,9 @@ class Made(Struct, frozen=True):
                 site = SiteMaker(library, self.assets, documents, options).made()
                 made = {file.path: file.make() for file in site.files}
         assert [file.path for file in site.files] == sorted(made)
-        assert site.listed is not None
+        assert site.file_list is not None
         facts = [FileFacts(path, sha256(d).hexdigest(), len(d)) for path, d in made.items()]
-        return dict(sorted({**made, site.listed.path: site.listed.make(facts)}.items()))
+        return dict(sorted({**made, site.file_list.path: site.file_list.make(facts)}.items()))
 
 
 KEPT = TemporaryDirectory()

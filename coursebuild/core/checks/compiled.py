@@ -237,7 +237,7 @@ def _check_lengths(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Di
 
 
 def _check_measure(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    measure = scenario.measured
+    measure = scenario.observable
     if measure is None:
         return
     names = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}[measure.kind]

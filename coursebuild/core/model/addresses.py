@@ -1,9 +1,8 @@
-"""Relative addresses in a document, as the files of the course that they name.
+"""Relative addresses in a document, and the anchors of listings, outputs and models.
 
-Entry points: `local_file`, `resolve`; `listing_anchor` and its siblings, by which listings and
-outputs are linked to on their page, and `model_anchors`, those of a model's. A link to the file of
-a lesson or of a page means the lesson or the page, so that the same link works on the site and
-where the files themselves are read.
+Entry points: `local_file`, `resolve`; `listing_anchor`, `line_anchor`, `output_anchor` and
+`model_anchors`. A link to the file of a lesson or page means the lesson or page itself, so that the
+same link works on the site and where the files are read.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ def local_file(url: str, document_path: str) -> str:
 
 
 def resolve(target: Target, course: Course, document_path: str) -> Target:
-    """What a link leads to: a lesson or page where it names the file of one, else as it was."""
+    """The target of a link: a lesson or page if the link names its file, else unchanged."""
     if not isinstance(target, UrlTarget) or ".md" not in target.url:
         return target
     try:
@@ -67,12 +66,12 @@ def _stem(path: str) -> str:
 
 
 def model_anchors(scenarios: Iterable[str]) -> tuple[str, ...]:
-    """The ids of a model's page, but those of its file; `scenarios` are those that it declares."""
+    """The ids on a model's page, without those in its file, given its declared scenarios."""
     return ("facts", "measured", *map(scenario_anchor, scenarios), "diet", "used", "file")
 
 
 def scenario_anchor(name: str) -> str:
-    """The id of what was measured in a scenario that is declared."""
+    """The id of the measurements of a declared scenario."""
     return f"measured-{name}"
 
 
@@ -80,14 +79,14 @@ _LINES = re.compile(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-
 
 
 def linked_lines(anchor: str) -> tuple[str, int, int] | None:
-    """The stem of a listing's anchors, and the lines that an anchor names.
+    """The listing's stem and the first and last line that an anchor names.
 
-    `l4_2_inertia.L12-L20` gives `("l4_2_inertia", 12, 20)`; `None` for the anchor of something
-    else, or of a range that ends before it begins.
+    `l4_2_inertia.L12-L20` gives `("l4_2_inertia", 12, 20)`; any other anchor, or a range that ends
+    before it begins, gives `None`.
     """
-    found = _LINES.fullmatch(anchor)
-    if found is None:
+    match = _LINES.fullmatch(anchor)
+    if match is None:
         return None
-    first = int(found["first"])
-    last = int(found["last"] or first)
-    return (found["stem"], first, last) if first <= last else None
+    first = int(match["first"])
+    last = int(match["last"] or first)
+    return (match["stem"], first, last) if first <= last else None

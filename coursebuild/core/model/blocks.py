@@ -32,18 +32,18 @@ class Heading(Struct, frozen=True):
 
     @property
     def goes_further(self) -> bool:
-        """Whether its section is beside the main path, for who wants to know more."""
+        """Whether its section is off the main path, for readers who want to know more."""
         return "further" in self.classes
 
 
 class Paragraph(Struct, frozen=True):
-    """A paragraph; `tight` when it stands in a tight list, where it gets no element of its own."""
+    """A paragraph; a `tight` one, in a tight list, gets no `<p>`."""
 
     span: Span
     children: tuple[Inline, ...]
     tight: bool = False
     figure: bool = False
-    """Whether it begins with `Figure:` and shows an image, whose caption the rest of it is."""
+    """Whether it begins with `Figure:` and shows an image; the rest of it is the caption."""
 
 
 class ListItem(Struct, frozen=True):
@@ -63,7 +63,7 @@ class ListBlock(Struct, frozen=True):
 
 
 class BlockQuote(Struct, frozen=True):
-    """A blockquote that is no callout."""
+    """A blockquote that is not a callout."""
 
     span: Span
     blocks: tuple[Block, ...]
@@ -82,7 +82,7 @@ class Callout(Struct, frozen=True):
 
 
 class CodeBlock(Struct, frozen=True):
-    """A fenced or indented code block that is none of ours.
+    """A fenced or indented code block that has no meaning of its own here.
 
     `info` is the raw info string, `language` its first word.
     """
@@ -94,7 +94,7 @@ class CodeBlock(Struct, frozen=True):
 
 
 class HtmlBlock(Struct, frozen=True):
-    """A block of raw HTML, kept."""
+    """A block of raw HTML."""
 
     span: Span
     html: str
@@ -105,7 +105,7 @@ class HtmlBlock(Struct, frozen=True):
 class HtmlFlow(Struct, frozen=True):
     """HTML in a quiz text, where math between the tags is still math.
 
-    Raw tags and inlines in order, in no paragraph.
+    `children` are raw tags and inlines in order, without a paragraph around them.
     """
 
     span: Span
@@ -127,7 +127,7 @@ class MathBlock(Struct, frozen=True):
 
 
 class Cell(Struct, frozen=True):
-    """A table cell; `text` is its Markdown, escaped pipes made plain."""
+    """A table cell; `text` is its Markdown, with escaped pipes unescaped."""
 
     span: Span
     text: Excerpt
@@ -135,7 +135,7 @@ class Cell(Struct, frozen=True):
 
 
 class Table(Struct, frozen=True):
-    """A table; `align` has one entry a column."""
+    """A table; `align` has one entry per column."""
 
     span: Span
     align: tuple[Literal["left", "right", "center"] | None, ...]
@@ -159,7 +159,7 @@ class Script(Struct, frozen=True):
     code: Excerpt
     """The block's text, ending in exactly one newline."""
     prefix: str
-    """What stands before each line of the code in the lesson (`> ` in a callout, indentation in a
+    """The text before each line of the code in the lesson (`> ` in a callout, indentation in a
     list)."""
     timeout: float
     """Seconds."""
@@ -170,15 +170,15 @@ class Script(Struct, frozen=True):
     body_span: Span
     """The lines between the fences, to the start of the closing one."""
     diverges: bool = False
-    """Whether a simulation in it is to be lost."""
+    """Whether the author expects a simulation in it to diverge."""
     deep: bool = False
-    """Whether bodies in it are to lie deep in each other."""
+    """Whether the author expects deep penetrations of bodies in it."""
     writes: tuple[str, ...] = ()
     """Folders of the project that it may write into."""
     once: bool = False
-    """Whether the course keeps what it printed, and it runs only when that is asked for."""
+    """Whether the course keeps its output, and it runs only on request."""
     figures: tuple[FigureName, ...] = ()
-    """What it draws."""
+    """The figures that it draws."""
 
 
 class Mode(enum.Enum):
@@ -193,7 +193,8 @@ class Mode(enum.Enum):
 class Comparison(Struct, frozen=True):
     """How a recording is compared.
 
-    `rtol` and `atol` count only in mode `TOLERANCE`; the last two go with all but `VOLATILE`.
+    `rtol` and `atol` count in mode `TOLERANCE` only; `ellipsis` and `volatile` in all modes but
+    `VOLATILE`.
     """
 
     mode: Mode = Mode.EXACT
@@ -201,16 +202,16 @@ class Comparison(Struct, frozen=True):
     atol: Decimal = Decimal(0)
     ellipsis: bool = False
     volatile: str = ""
-    """A regular expression: what matches it is not compared."""
+    """A regular expression; text that matches it is not compared."""
 
     @property
     def filters(self) -> tuple[Filter, ...]:
-        """What takes volatile text out of both sides, with the space that its width moves."""
+        """The filter that removes volatile text from both sides, with the space around it."""
         return (Filter(volatile_pattern(self.volatile), "…"),) if self.volatile else ()
 
 
 def volatile_pattern(pattern: str) -> str:
-    """A regular expression for what another one matches and the space beside it."""
+    """A regular expression for what another one matches, with the space around it."""
     return rf"[^\S\n]*(?:{pattern})[^\S\n]*"
 
 
@@ -234,19 +235,19 @@ class Recording(Struct, frozen=True):
     """The lines between the fences (from the start of the first to the start of the closing fence);
     for a table all of it."""
     prefix: str
-    """What stands before each line in the lesson."""
+    """The text before each line in the lesson."""
     comparison: Comparison | None
     """`None`: the course's default."""
     script: str | None
     """The path of the nearest script above; `None` only in a document with an error."""
     readable: bool = True
-    """Whether the fence says in a right way how to compare; if not, nothing is compared."""
+    """Whether the fence's way of comparing is valid; if not, nothing is compared."""
 
 
 class Mjcf(Struct, frozen=True):
-    """A model or fragment.
+    """A model or fragment in MJCF.
 
-    `fragment` names the element that it goes into, `error` the message it must fail with.
+    `fragment` names the element that it belongs into, `error` the message it must fail with.
     """
 
     span: Span
@@ -266,11 +267,11 @@ class SourcePart(Struct, frozen=True):
     """Where the fence names it."""
     body_span: Span
     prefix: str
-    """What stands before each line in the lesson."""
+    """The text before each line in the lesson."""
 
 
 class PlainCode(Struct, frozen=True):
-    """A Python block without `file=`: shown, not run; `fragment` says that it need not parse."""
+    """A Python block without `file=`, shown but not run; a `fragment` need not parse."""
 
     span: Span
     code: Excerpt
@@ -279,23 +280,23 @@ class PlainCode(Struct, frozen=True):
 
 
 class FeatureBlock(Struct, frozen=True):
-    """A block that a feature adds, and what the rest of the tool asks of it.
+    """A block that a feature adds; its methods answer what the rest of the tool must know.
 
-    What a method does not say, the block does not have.
+    A block without something need not override the method.
     """
 
     span: Span
 
     def child_blocks(self) -> tuple[Block, ...]:
-        """The blocks of Markdown in it, in the order of the page."""
+        """The Markdown blocks in it, in the order of the page."""
         return ()
 
     def child_inlines(self) -> tuple[Inline, ...]:
-        """The lines of Markdown in it that are in none of its blocks."""
+        """The lines of Markdown in it, outside its child blocks."""
         return ()
 
     def summary(self) -> FeatureBlock | None:
-        """The block without what only its own page shows; `None` where nothing is left."""
+        """The block without what only its own page shows; `None` if nothing is left."""
         return None
 
     def anchors(self) -> tuple[str, ...]:
@@ -303,7 +304,7 @@ class FeatureBlock(Struct, frozen=True):
         return ()
 
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:
-        """Lines of verified outputs that it shows: the script's path, and the line from 1."""
+        """Lines of verified output that it quotes: the script's path, and the line from 1."""
         return ()
 
     def models(self) -> tuple[str, ...]:
@@ -311,23 +312,23 @@ class FeatureBlock(Struct, frozen=True):
         return ()
 
     def mentioned_models(self) -> tuple[str, ...]:
-        """The names of models that it is about, and does not show."""
+        """The names of models that it is about, but does not show."""
         return ()
 
     def mjcf(self) -> Excerpt | None:
-        """The text of a whole model that it holds, which is compiled with the course's."""
+        """The text of a whole model in it, which is compiled with those of the course."""
         return None
 
     def is_docked(self) -> bool:
-        """Whether it stands beside the text around it, where the screen is wide."""
+        """Whether it stands beside the text on a wide screen."""
         return False
 
     def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
-        """What a reader's progress is kept for: an id, unique in the course, and keys under it."""
+        """What a reader's progress is recorded for: an id, unique in the course, and its keys."""
         return None
 
     def tasks(self) -> int:
-        """How many things it gives a reader to do."""
+        """How many tasks it gives a reader."""
         return 0
 
 
@@ -352,9 +353,9 @@ Block: TypeAlias = (
 
 
 class Footnote(Struct, frozen=True):
-    """A footnote that is referred to.
+    """A footnote that the text refers to.
 
-    `number` in order of first reference, `references` how often.
+    `number` is its place in the order of first reference, `references` how many there are.
     """
 
     span: Span
@@ -370,26 +371,26 @@ class Equation(Struct, frozen=True):
     id: str
     """Its anchor."""
     number: str = ""
-    """By which it is referred to, as `3`; empty where it has no label."""
-    shown: bool = False
-    """Whether its page writes the number beside it: the formula itself does not show one."""
+    """The number that references show, such as `3`; empty where it has no label."""
+    has_margin_number: bool = False
+    """Whether its page writes the number beside it, as the formula itself does not show one."""
 
 
 def title_line(source: Source) -> Span | None:
-    """The title of a page whose text opens with it, as a heading of level 1."""
-    found = _TITLE.match(source.text)
-    return source.span(*found.span(1)) if found is not None else None
+    """The title that a page's text opens with, as a heading of level 1."""
+    match = _TITLE.match(source.text)
+    return source.span(*match.span(1)) if match is not None else None
 
 
 class Document(Struct, frozen=True, dict=True):
-    """One Markdown text, parsed; or its summary, for others than its own page."""
+    """One parsed Markdown text, or its summary for other pages."""
 
     source: Source
     blocks: tuple[Block, ...]
     footnotes: tuple[Footnote, ...]
     title_anchor: str = ""
-    """Of a page's title that the text opens with; empty where a heading has the same."""
+    """The anchor of the title that a page opens with; empty where a heading has the same."""
     equations: tuple[Equation, ...] = ()
-    """Of a summary, which does not have what they were taken from."""
+    """Set in a summary only, which lacks the formulas themselves."""
     summaries: Mapping[str, Struct] | None = None
-    """Of a summary: what features have of the whole text, by their names (`Feature.summary`)."""
+    """Set in a summary only: those that features made of the text, by their names."""

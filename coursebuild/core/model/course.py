@@ -71,7 +71,7 @@ class Lesson(LessonTable, frozen=True, kw_only=True):
 
     @property
     def path(self) -> str:
-        """Where its file is, or would be."""
+        """The path of its file, whether written or not."""
         return f"content/lessons/{self.id}-{self.slug}.md"
 
 
@@ -86,7 +86,7 @@ class Level(Struct, frozen=True):
 
 
 class Page(Struct, frozen=True):
-    """A page that is no lesson."""
+    """A page that is not a lesson."""
 
     span: Span
     id: str
@@ -94,16 +94,16 @@ class Page(Struct, frozen=True):
     path: str
     document: Document | None
     menu: bool = True
-    """Whether every page's menu has it."""
+    """Whether it is in the menu of every page."""
 
     @property
     def is_home(self) -> bool:
-        """Whether it has no page of its own: its text opens the home page."""
+        """Whether its text opens the home page, instead of a page of its own."""
         return self.id == "home"
 
 
 Owner: TypeAlias = Lesson | Page
-"""What a document belongs to."""
+"""The owner of a document."""
 
 
 class MjcfModel(Struct, frozen=True):
@@ -113,15 +113,15 @@ class MjcfModel(Struct, frozen=True):
     source: Source
 
     @property
-    def about(self) -> str:
-        """What it is: the first comment above it that is no licence, on one line."""
+    def description(self) -> str:
+        """The first comment above the model that is no licence, on one line."""
         head = self.source.text.partition("<mujoco")[0]
         comments = (" ".join(text.split()) for text in _COMMENT.findall(head))
         return next((text for text in comments if not _LICENCE.search(text)), "")
 
 
 class CalloutKind(Struct, frozen=True):
-    """A kind of callout: its label, and what it promises."""
+    """A kind of callout: its label, and what it promises the reader."""
 
     name: str
     label: str
@@ -129,7 +129,7 @@ class CalloutKind(Struct, frozen=True):
 
 
 class Pace(Struct, frozen=True, forbid_unknown_fields=True):
-    """How fast a learner is: the minutes of lessons are checked against it."""
+    """How fast a learner works; the minutes of lessons are checked against it."""
 
     words: Annotated[float, Meta(gt=0, description="words of text in a minute")]
     lines: Annotated[float, Meta(gt=0, description="lines of code or output in a minute")]
@@ -155,7 +155,7 @@ class NamedPath(Struct, frozen=True):
 
 
 class Limits(Struct, frozen=True, forbid_unknown_fields=True):
-    """What reading and trying the course may take."""
+    """How much reading and trying the course may take."""
 
     text: Annotated[
         int, Meta(ge=1, le=100_000_000, description="characters of a lesson, page or model")
@@ -183,7 +183,7 @@ class Course(Struct, frozen=True):
     """The MuJoCo version that the course is written for."""
     engine_span: Span
     truth: float | None
-    """Which share of the numbers in the text must be proven."""
+    """The share of the numbers in the text that must be proven."""
     truth_span: Span
     comparison: Comparison
     filters: tuple[Filter, ...]
@@ -196,27 +196,27 @@ class Course(Struct, frozen=True):
     """Other files in `content/` that a page may show or link to (pictures, data), by path relative
     to the root."""
     declarations: tuple[Declarations, ...] = ()
-    """What `models/NAME.toml` say, each of a model that is there."""
+    """The contents of the files `models/NAME.toml`, of existing models only."""
     features: tuple[NamedPath, ...] = ()
     packages: tuple[NamedPath, ...] = ()
-    """Folders that scripts import from before all others but their own."""
+    """Folders that scripts import from, after their own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
-    """Variables of the environment of scripts, sorted."""
+    """Environment variables of scripts, sorted."""
     python: NamedPath | None = None
-    """The interpreter of the scripts, where it is not the one that runs this tool."""
+    """The interpreter of the scripts, if not the one that runs this tool."""
     id: str = ""
-    """Names the course where its title may change; see `key`."""
+    """A name for the course that stays when its title changes; see `key`."""
     pace: Pace | None = None
     width: int = 0
-    """Columns of a line of text as `fmt` wraps it; 0: it leaves the author's lines."""
+    """The columns to which `fmt` wraps text; 0 leaves the author's lines."""
     html: Literal["none", "safe", "trusted"] = "safe"
-    """Which raw HTML lessons and pages may have."""
+    """The raw HTML that lessons and pages may have."""
     limits: Limits = Limits()
     theme: Theme = Theme()
 
     @property
     def key(self) -> str:
-        """What readers' browsers keep their progress under: the id, else made of the title."""
+        """The key of progress in readers' browsers: the id, or a text made from the title."""
         words = re.findall(r"[a-z0-9]+", self.title.lower())
         digest = hashlib.sha256(self.title.encode("utf-8", "surrogatepass")).hexdigest()[:8]
         return self.id or "-".join((*words, digest))
@@ -228,13 +228,13 @@ class Course(Struct, frozen=True):
 
     @property
     def owners(self) -> tuple[Owner, ...]:
-        """Everything that has, or may have, a document: lessons, then pages."""
+        """Everything that may have a document: lessons, then pages."""
         return (*self.lessons, *self.pages)
 
     @property
     def owned_documents(self) -> tuple[tuple[Owner, Document], ...]:
-        """Every parsed document, with what it belongs to."""
-        return tuple((one, one.document) for one in self.owners if one.document is not None)
+        """Every parsed document, with its owner."""
+        return tuple((o, o.document) for o in self.owners if o.document is not None)
 
     @property
     def documents(self) -> tuple[Document, ...]:
@@ -243,7 +243,7 @@ class Course(Struct, frozen=True):
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Every text: the map, the documents, the models and what stands beside them."""
+        """Every text: the map, the documents, the models and their declarations."""
         holders: tuple[Document | MjcfModel | Declarations, ...]
         holders = (*self.documents, *self.models, *self.declarations)
         return (self.map, *(holder.source for holder in holders))

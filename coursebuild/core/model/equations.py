@@ -1,10 +1,10 @@
-"""The formulas of a document that stand on lines of their own, and the ids by which they are found.
+"""The formulas of a document on lines of their own, and their ids.
 
 Entry point: `display_formulas(document)`.
 
-A formula has the id that its author gives it, or one made of its TeX: that stays the same whatever
-is written around it. One in a heading, a quiz or a lab has none, since these are shown elsewhere
-too.
+A formula has the id that its author gives it, or one made from its TeX, which stays the same when
+the text around it changes. A formula in a heading, a quiz or a lab has none, since those are shown
+on other pages too.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class DisplayFormula(NamedTuple):
     """Empty where it has none."""
 
 
-def blocks_elsewhere(document: Document) -> frozenset[int]:
-    """The Python ids of blocks of features and the blocks inside them."""
+def feature_block_ids(document: Document) -> frozenset[int]:
+    """The Python ids of the blocks of features and of all blocks inside them."""
     return frozenset(
         id(block)
         for holder in document_blocks(document)
@@ -45,39 +45,39 @@ def blocks_elsewhere(document: Document) -> frozenset[int]:
 
 
 def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
-    """In the order of the text, footnotes last."""
+    """The formulas of a document in the order of the text, footnotes last."""
     if "$$" not in document.source.text:
         return ()
-    elsewhere = blocks_elsewhere(document)
-    formulas = [
-        (formula, isinstance(block, Heading) or id(block) in elsewhere)
+    in_features = feature_block_ids(document)
+    candidates = [
+        (formula, isinstance(block, Heading) or id(block) in in_features)
         for block in document_blocks(document)
-        for formula in _displayed(block)
+        for formula in _formulas_of(block)
     ]
-    taken = {one.label.id for one, _ in formulas if one.label is not None}
-    found: list[DisplayFormula] = []
-    for formula, away in formulas:
-        label, name = formula.label, ""
-        if not away:
-            name = label.id if label is not None else _name(formula.tex.text, taken)
-            taken.add(name)
-        found.append(DisplayFormula(formula.span.start, formula.tex.text, label, name))
-    return tuple(found)
+    used_ids = {formula.label.id for formula, _ in candidates if formula.label is not None}
+    formulas: list[DisplayFormula] = []
+    for formula, has_no_id in candidates:
+        label, id_ = formula.label, ""
+        if not has_no_id:
+            id_ = label.id if label is not None else _make_id(formula.tex.text, used_ids)
+            used_ids.add(id_)
+        formulas.append(DisplayFormula(formula.span.start, formula.tex.text, label, id_))
+    return tuple(formulas)
 
 
-def _displayed(block: Block) -> list[MathBlock | Math]:
+def _formulas_of(block: Block) -> list[MathBlock | Math]:
     if isinstance(block, MathBlock):
         return [block]
     inlines = walk_inlines(block_inlines(block))
     return [inline for inline in inlines if isinstance(inline, Math) and inline.display]
 
 
-def _name(tex: str, taken: set[str]) -> str:
-    """The id of a formula without a label; the same formula again gets a number."""
+def _make_id(tex: str, used_ids: set[str]) -> str:
+    """Make the id of a formula without a label; a repeated formula gets a number."""
     digest = hashlib.sha256(" ".join(tex.split()).encode("utf-8", "surrogatepass")).hexdigest()
     base = name = f"eq:{digest[:8]}"
     count = 1
-    while name in taken:
+    while name in used_ids:
         count += 1
         name = f"{base}-{count}"
     return name

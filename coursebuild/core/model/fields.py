@@ -3,10 +3,9 @@
 Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`, `Digits`,
 `Slug`, `matching`.
 
-What a type adds to its plain Python type stands in `Meta`: bounds and patterns, which the decoder
-and the JSON Schemas both read, and in `extra` two remarks for the decoder alone: `text` ("blocks"
-or "inlines": the string is Markdown) and `expects` (what a string that does not match the pattern
-should have been).
+`Meta` holds what a type adds to its plain Python type: bounds and patterns, which the decoder and
+the JSON Schemas both read, and in `extra` two remarks for the decoder only: `text` ("blocks" or
+"inlines": the string is Markdown) and `expects` (words for the strings that the pattern allows).
 """
 
 from __future__ import annotations
@@ -16,12 +15,12 @@ from typing import Annotated, Any, TypeAlias
 from msgspec import Meta
 
 NOT_BLANK = r"\S"
-"""The pattern of a text that must say something."""
+"""The pattern of a text that must not be blank."""
 
 _MARKDOWN: dict[str, Any] = {"contentMediaType": "text/markdown"}
 
 Text: TypeAlias = Annotated[str, Meta(pattern=NOT_BLANK)]
-"""Plain text that says something."""
+"""Plain text, not blank."""
 
 Blocks: TypeAlias = Annotated[
     str, Meta(pattern=NOT_BLANK, extra={"text": "blocks"}, extra_json_schema=_MARKDOWN)
@@ -45,7 +44,7 @@ Digits: TypeAlias = Annotated[int, Meta(ge=0, le=15)]
 
 
 def matching(pattern: str, expects: str) -> Meta:
-    """What a string must look like, and the words for it in messages."""
+    """The pattern that a string must match, and the words for it in messages."""
     return Meta(pattern=pattern, extra={"expects": expects})
 
 

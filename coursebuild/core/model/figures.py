@@ -1,4 +1,4 @@
-"""Figures that scripts draw and their data, and the files of the course that they are recorded in.
+"""Recorded figures: files of the course that scripts draw, with their data.
 
 Entry point: `recorded_figures`.
 """
@@ -17,47 +17,47 @@ from coursebuild.core.text.source import Span
 
 
 class RecordedFigure(Struct, frozen=True):
-    """A figure that a script draws, as a lesson shows it, or its data."""
+    """A figure that a script draws and a lesson shows, or its data."""
 
     script: str
     name: str
-    """As the script saves it."""
+    """The name under which the script saves it."""
     path: str
-    """The file of the course that is shown."""
+    """The file of the course that the lesson shows."""
     span: Span
     """Where the lesson names the figure."""
 
     @property
     def has_dark(self) -> bool:
-        """Whether there is a drawing for dark pages, too."""
+        """Whether there is also a drawing for dark pages."""
         return self.name.endswith(".svg")
 
 
 def recorded_figures(document: Document) -> tuple[RecordedFigure, ...]:
-    """The figures of a document's scripts that paragraphs show, each with its data after it."""
-    drawn: dict[str, str] = {}
-    found: list[RecordedFigure] = []
+    """The figures of a document's scripts that its paragraphs show, each followed by its data."""
+    script_by_name: dict[str, str] = {}
+    figures: list[RecordedFigure] = []
     for block in document_blocks(document):
         if isinstance(block, Script):
-            drawn |= {figure.name: block.path for figure in block.figures}
+            script_by_name |= {figure.name: block.path for figure in block.figures}
         elif isinstance(block, Paragraph) and block.figure:
             inlines = walk_inlines(block_inlines(block))
             image = next(inline for inline in inlines if isinstance(inline, Image))
             path = local_file(image.url, document.source.path)
             for file in (path, f"{posixpath.splitext(path)[0]}.csv"):
                 name = posixpath.basename(file)
-                if name in drawn:
-                    found.append(RecordedFigure(drawn[name], name, file, image.url_span))
-    return tuple(found)
+                if name in script_by_name:
+                    figures.append(RecordedFigure(script_by_name[name], name, file, image.url_span))
+    return tuple(figures)
 
 
 def unshown_figures(document: Document) -> tuple[FigureName, ...]:
-    """The figures of a document's scripts that no paragraph below shows, and data of none."""
-    shown = {(figure.script, figure.name) for figure in recorded_figures(document)}
+    """The figures of a document's scripts that no paragraph below shows, and data without one."""
+    shown_names = {(figure.script, figure.name) for figure in recorded_figures(document)}
     return tuple(
         figure
         for block in document_blocks(document)
         if isinstance(block, Script)
         for figure in block.figures
-        if (block.path, figure.name) not in shown
+        if (block.path, figure.name) not in shown_names
     )

@@ -1,4 +1,4 @@
-"""Inlines: what stands in a paragraph, a heading, a cell.
+"""Inlines: the content of a paragraph, a heading or a cell.
 
 Entry points: the union `Inline`; `plain_text`, `without_links`.
 """
@@ -49,16 +49,16 @@ class CodeSpan(Struct, frozen=True):
 
 
 class NumberBinding(Struct, frozen=True):
-    """`` `+6.6 %`{out} ``: a number that must be one the script printed, or one that is given."""
+    """`` `+6.6 %`{out} ``: a number that a script must have printed, or one with a source."""
 
     span: Span
     text: str
     text_span: Span
-    """What stands between the backticks."""
+    """The text between the backticks."""
     script: str | None
     """The path given by `{out=…}`; `None`: the script of the nearest recorded output above."""
     source: str | None = None
-    """Where it is from, by `{given="…"}`, perhaps empty; `None` where a script has printed it."""
+    """Its source from `{given="…"}`, perhaps empty; `None` where a script has printed it."""
 
 
 class Label(Struct, frozen=True):
@@ -67,9 +67,9 @@ class Label(Struct, frozen=True):
     span: Span
     id: str
     source: str | None = None
-    """Where its numbers are from, by `given="…"`, perhaps empty; `None` where nobody says it."""
+    """The source of its numbers from `given="…"`, perhaps empty; `None` where none is given."""
     check: Span | None = None
-    """Where `check` asks that it be proven."""
+    """Where the word `check` stands, which demands a proof."""
 
 
 class Meaning(Struct, frozen=True):
@@ -92,24 +92,24 @@ class Math(Struct, frozen=True):
     meaning: Meaning | None = None
     """Only where it is not."""
     source: str | None = None
-    """The same: where its numbers are from, as in `NumberBinding`."""
+    """Likewise: the source of its numbers, as in `NumberBinding`."""
 
 
 class Term(Struct, frozen=True):
-    """`[inertia tensor]{term}`: where the text says what a term means."""
+    """`[inertia tensor]{term}`: where the text explains a term."""
 
     span: Span
     children: tuple[Inline, ...]
     name: str
-    """As the glossary calls it."""
+    """Its name in the glossary."""
     id: str
-    """Its name in links: `term:inertia-tensor`."""
+    """Its name in links, such as `inertia-tensor`."""
     renamed: bool
     """Whether the name is given, by `{term="…"}`, and not the text itself."""
 
     @property
     def anchor(self) -> str:
-        """The id of the place on its page; no heading's has a colon but an explicit one."""
+        """The id of the place on its page; of headings only explicit ids have a colon."""
         return f"term:{self.id}"
 
 
@@ -121,7 +121,7 @@ class LessonTarget(Struct, frozen=True):
 
 
 class LevelTarget(Struct, frozen=True):
-    """A mention such as "Level 18"; there is no scheme for it in a link."""
+    """A mention such as "Level 18"; links have no scheme for it."""
 
     id: str
 
@@ -147,7 +147,7 @@ class ExampleTarget(Struct, frozen=True):
 
 
 class UrlTarget(Struct, frozen=True):
-    """Anything else: an address elsewhere, `#anchor` on this page, or a relative file."""
+    """Any other address: of another site, `#anchor` on this page, or a relative file."""
 
     url: str
 
@@ -164,12 +164,12 @@ Target: TypeAlias = (
 
 
 class Link(Struct, frozen=True):
-    """A link; `mention` when it is a "Lesson 2.2" or "Level 18" that became a link by itself."""
+    """A link; a `mention` is a "Lesson 2.2" or "Level 18" in prose that became one."""
 
     span: Span
     target: Target
     target_span: Span
-    """Where the destination is written (the whole link where that is not known)."""
+    """Where the destination is written, or the whole link where that is not known."""
     title: str
     children: tuple[Inline, ...]
     mention: bool = False
@@ -187,24 +187,24 @@ class Image(Struct, frozen=True):
 
 
 class MediaAddress(Struct, frozen=True):
-    """Where raw HTML names a file that a page shows: a picture, a video, a frame."""
+    """The address of a file in raw HTML that a page shows: a picture, a video, a frame."""
 
     start: int
-    """In the HTML, as is `end`."""
+    """The offset in the HTML, as is `end`."""
     end: int
     url: str
     span: Span
 
 
 class ForbiddenHtml(Struct, frozen=True):
-    """What a page must not hold of raw HTML, unless the course trusts all who write it."""
+    """Raw HTML that a page must not hold, unless the course trusts all of its authors."""
 
     span: Span
     message: str
 
 
 class RawInline(Struct, frozen=True):
-    """Inline HTML, kept."""
+    """Raw inline HTML."""
 
     span: Span
     html: str
@@ -256,7 +256,7 @@ Inline: TypeAlias = (
 
 
 def plain_text(inlines: tuple[Inline, ...]) -> str:
-    """The text of inlines without marks, formulas as their TeX; for titles and anchors."""
+    """The text of inlines without markup, formulas as TeX; for titles and anchors."""
     parts: list[str] = []
     for inline in inlines:
         match inline:
@@ -278,26 +278,26 @@ def plain_text(inlines: tuple[Inline, ...]) -> str:
 def without_links(
     inlines: tuple[Inline, ...], reference: Callable[[Target], str] = lambda target: ""
 ) -> tuple[Inline, ...]:
-    """Inlines as they may stand inside a link, or on another page than their own.
+    """Inlines as they may stand inside a link or on another page.
 
-    Without links, terms, footnotes, raw HTML and pictures, in one line. `reference` gives what
-    stands for a link without a text.
+    They lose links, terms, footnotes, raw HTML, pictures and line ends. `reference` makes the text
+    of a link that has none.
     """
-    kept: list[Inline] = []
+    plain: list[Inline] = []
     for inline in inlines:
         match inline:
             case Link(children=()):
-                kept.append(Text(inline.span, reference(inline.target)))
+                plain.append(Text(inline.span, reference(inline.target)))
             case Link() | Term():
-                kept += without_links(inline.children, reference)
+                plain += without_links(inline.children, reference)
             case Emphasis() | Strong() | Strikethrough():
-                kept.append(type(inline)(inline.span, without_links(inline.children, reference)))
+                plain.append(type(inline)(inline.span, without_links(inline.children, reference)))
             case Image():
-                kept.append(Text(inline.span, inline.alt))
+                plain.append(Text(inline.span, inline.alt))
             case SoftBreak() | HardBreak():
-                kept.append(Text(inline.span, " "))
+                plain.append(Text(inline.span, " "))
             case RawInline() | FootnoteRef():
                 pass
             case _:
-                kept.append(inline)
-    return tuple(kept)
+                plain.append(inline)
+    return tuple(plain)

@@ -1,7 +1,7 @@
-"""What running a course found: values made by runners, read by comparisons, reports and pages.
+"""The results of running a course: values made by runners, read by comparisons, reports and pages.
 
-Entry points: `ScriptRun`, `Verdict`. They stand beside the model because the stages that make them
-and those that read them don't import each other.
+Entry points: `ScriptRun`, `Verdict`. They are part of the model because the stages that make them
+and those that read them do not import each other.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Outcome(enum.Enum):
 
 
 class ScriptJob(Struct, frozen=True):
-    """A script to run: everything that the runner needs to know."""
+    """A script to run, with everything that the runner needs to know."""
 
     path: str
     """POSIX path relative to the project root, e.g. `examples/l4_2.py`."""
@@ -44,8 +44,8 @@ class ScriptJob(Struct, frozen=True):
     """Seconds."""
     requires: tuple[str, ...]
     perturbation: int = 0
-    """From 1: its initial states are moved a little, in one of several directions; 0: they are
-    not; −1: each of its steps is made as two of half the timestep."""
+    """From 1 on, initial states are moved a little, in one of several directions; at 0 nothing is
+    changed; at −1 each step is made as two of half the timestep."""
     packages: tuple[str, ...] = ()
     """Folders of the project that it imports from, after its own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
@@ -55,24 +55,24 @@ class ScriptJob(Struct, frozen=True):
     figures: tuple[str, ...] = ()
     """Names of the files that it draws."""
     memory: int = Limits().scripts
-    """MiB that it may take, where the system can see to that."""
+    """MiB that it may take, where the system can enforce that."""
 
 
 class Sign(enum.Enum):
-    """What shows that a simulation was lost."""
+    """The sign that a simulation has diverged."""
 
     POSITIONS = "positions"
-    """MuJoCo warned of bad ones, as of the next two."""
+    """MuJoCo warned of bad ones; likewise in the next two."""
     VELOCITIES = "velocities"
     ACCELERATIONS = "accelerations"
     STATE = "state"
-    """It was not finite when it was looked at."""
+    """The state was not finite when it was checked."""
     CONTACT = "contact"
-    """Bodies lay deep in each other when they were looked at, of which MuJoCo does not warn."""
+    """Bodies penetrated each other deeply when they were checked; MuJoCo does not warn of that."""
 
 
 class Divergence(Struct, frozen=True):
-    """A simulation of a script that was lost on the way."""
+    """A simulation of a script that diverged."""
 
     sign: Sign
     time: str
@@ -80,13 +80,13 @@ class Divergence(Struct, frozen=True):
     model: str
     """The model's name; empty where it has none or is not known."""
     path: str
-    """The script that was being executed, relative to the project; empty where none was."""
+    """The file that was being executed, relative to the project; empty where none was."""
     line: int
     """Its line, from 1; 0 where it is not known."""
     depth: str = ""
     """Of a contact: how deep it was, m."""
     geoms: tuple[str, ...] = ()
-    """Of a contact: the names of its geoms, or what stands for them, as words."""
+    """Of a contact: the names of its geoms, or words for those without a name."""
 
 
 _NUMBER = r"(-?0x[01](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}|-?inf|nan)"
@@ -96,10 +96,10 @@ EndState: TypeAlias = Annotated[
 
 
 class EffectKind(enum.Enum):
-    """What a script does that reaches beyond it."""
+    """The kind of an effect of a script on its surroundings."""
 
     WRITE = "w"
-    """Outside its temporary folder, where it may not."""
+    """It writes outside its temporary folder, where it may not."""
     CONNECTION = "c"
 
 
@@ -114,15 +114,15 @@ class Effect(Struct, frozen=True, rename={"target": "what"}):
     line: int
 
 
-class Trace(Struct, frozen=True):
-    """What a script looked at while it ran: all that its result depends on, beside its text.
+class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
+    """What a script read while it ran: all that its result depends on, besides its text.
 
     Project paths are POSIX and relative to the root. Each tuple is sorted, without repeats.
     """
 
     files: tuple[str, ...]
-    """Files of the project that it read, or tried to read and that were not there. Its own file and
-    files that it wrote itself before are not among them; a compiled module stands as its source."""
+    """Files of the project that it read or tried to read, without its own and those that it had
+    written itself; the source in place of a compiled module."""
     folders: tuple[str, ...]
     """Folders of the project that it listed."""
     outside: tuple[str, ...]
@@ -131,26 +131,26 @@ class Trace(Struct, frozen=True):
     modules: tuple[str, ...]
     """Top-level names of installed packages' modules that it imported; none of Python's own."""
     opaque: str
-    """Why there may be more, as words that end a sentence ("it starts other programs"); empty where
-    this is everything."""
+    """Why the trace may be incomplete, as the end of a sentence ("it starts other programs"); empty
+    where it is complete."""
     divergences: tuple[Divergence, ...] = ()
-    """The simulations that were lost, in the order in which it was noticed, without repeats."""
-    moved: bool = False
-    """Whether there was an initial state to be moved, or a step to be halved, of a run that was to
-    do so."""
+    """The simulations that diverged, in the order in which that was noticed, without repeats."""
+    is_perturbed: bool = False
+    """Of a run with a `ScriptJob.perturbation`: whether any initial state was moved, or any step
+    halved."""
     states: tuple[EndState, ...] = ()
-    """Of such a run, for each `MjData` in words: its number in the order of their first use, the
-    length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest since
-    its simulation began), and the `qpos` and `qvel` that it ended with, as hexadecimal numbers."""
+    """Of such a run, for each `MjData`, separated by blanks: its number in the order of first use,
+    the length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest
+    since its simulation began), and the final `qpos` and `qvel`, as hexadecimal numbers."""
     effects: tuple[Effect, ...] = ()
-    """What it wrote outside its temporary folder, and whom it asked, once for each line."""
+    """What it wrote outside its temporary folder and what it connected to, once for each line."""
     sought: tuple[str, ...] = ()
-    """Modules that it looked for in vain in a folder of the project, such as those that would have
-    been imported instead of Python's own: `folder/{one,two}`."""
+    """Modules that it looked for in a folder of the project but did not find, such as those that
+    would replace Python's own: `folder/{one,two}`."""
 
 
 class ScriptRun(Struct, frozen=True):
-    """What a script did."""
+    """The run of a script."""
 
     path: str
     outcome: Outcome
@@ -159,24 +159,24 @@ class ScriptRun(Struct, frozen=True):
     stdout: str
     """LF line ends."""
     stderr: str
-    """The end of it (64 KiB), with extracted paths still as the interpreter wrote them."""
+    """The last 64 KiB, with extracted paths as the interpreter wrote them."""
     seconds: float
     missing: tuple[str, ...] = ()
-    """Modules that it requires and that are not there."""
+    """Modules that it requires and that are not installed."""
     cached: bool = False
     trace: Trace | None = None
-    """What it looked at; `None` where nobody watched."""
+    """What it read; `None` where that was not traced."""
     recorded: str = ""
-    """When and where it was made, of a run that the course keeps."""
+    """When and where a run that the course keeps was made."""
     figures: tuple[tuple[str, bytes], ...] = ()
-    """The files that it was to draw and did, by name."""
+    """The files among `ScriptJob.figures` that it drew, by name."""
 
 
 class DriftKind(enum.Enum):
-    """The class of a difference between recorded and printed output."""
+    """The kind of a difference between the recorded output and that of a run."""
 
     ROUNDING = "rounding"
-    """Only the last recorded place of numbers differs."""
+    """Numbers differ in their last recorded digit only."""
     NUMERIC = "numeric"
     TEXT = "text"
     MISSING = "missing lines"
@@ -184,9 +184,9 @@ class DriftKind(enum.Enum):
 
 
 class Change(Struct, frozen=True):
-    """One difference.
+    """One difference between a recorded output and a run.
 
-    For a number `relative_error` and `digits` say how far apart the two values are.
+    For a number, `relative_error` and `digits` say how far apart the two values are.
     """
 
     kind: DriftKind
@@ -195,6 +195,7 @@ class Change(Struct, frozen=True):
     stand."""
     recorded: str
     printed: str
+    """What the run printed."""
     relative_error: float | None = None
     digits: int | None = None
     """Leading significant digits that agree."""
@@ -205,7 +206,7 @@ class Verdict(Struct, frozen=True):
 
     recording: Recording
     comparison: Comparison
-    """What was used: the fence's own or the course's default."""
+    """The comparison used: the fence's own or the course's default."""
     status: Literal["verified", "drift", "volatile", "unchecked"]
     """`unchecked`: the script did not run to its end."""
     changes: tuple[Change, ...] = ()
@@ -229,7 +230,7 @@ class MathError(Struct, frozen=True):
 
 
 class CompileResult(Struct, frozen=True):
-    """What compiling a piece of MJCF gave; `error` is empty when it compiled."""
+    """The result of compiling a piece of MJCF; `error` is empty if it compiled."""
 
     error: str
     line: int | None = None
@@ -238,7 +239,7 @@ class CompileResult(Struct, frozen=True):
 
 
 class ModelFacts(Struct, frozen=True):
-    """What a compiled model holds, for its page and for checking the names that labs use."""
+    """Facts about a compiled model, for its page and for checking the names that labs use."""
 
     bodies: int
     """Without the world."""
@@ -257,12 +258,12 @@ class ModelFacts(Struct, frozen=True):
     sites: tuple[str, ...]
     body_names: tuple[str, ...]
     includes: tuple[str, ...] = ()
-    """Files that the model pulls in, relative to the project root; absolute if they lie outside."""
+    """Files that the model includes, relative to the project root; absolute if outside."""
     sensors: tuple[str, ...] = ()
 
 
 class TrialLine(Struct, frozen=True):
-    """How a trial did, as a report lists it."""
+    """The result of a trial as a report lists it."""
 
     name: str
     """Unique in the course: `4.2-lab-1`."""
@@ -274,26 +275,26 @@ class TrialLine(Struct, frozen=True):
     seconds: float = 0.0
     """Wall time."""
     steps_per_second: int | None = None
-    """Of a simulation; `None` where it did not come to its end."""
+    """Of a simulation that ran to its end; else `None`."""
     tried: int = 0
-    """How many things were tried."""
+    """The number of things that were tried."""
     parity: str = ""
-    """How it compares with native MuJoCo, in words; empty where it was not compared."""
+    """A comparison with native MuJoCo in words; empty where there was none."""
     cached: bool = False
     unexported: str = ""
     """Why its page offers no Python script, in words."""
     fill: float | None = None
-    """The part of its picture that what moves fills, in the mean; `None` where nothing does."""
+    """The mean share of its picture that moving things fill; `None` where nothing moves."""
 
 
 class TrialResult(Struct, frozen=True):
-    """What became of a trial, and what its page needs."""
+    """The result of a trial, and what its page needs of it."""
 
     span: Span
-    """What was tried, as it stands in its lesson, by which it is found again."""
+    """The block that was tried, by which its page finds the result."""
     line: TrialLine
     output: Struct
-    """Of a type of the feature's."""
+    """A value of the feature's own type."""
 
 
 class OutputFile(Struct, frozen=True):
@@ -303,26 +304,26 @@ class OutputFile(Struct, frozen=True):
     data: bytes
 
     def make(self) -> bytes:
-        """Its bytes, as `CachedFile` gives them."""
+        """The bytes, as from `CachedFile`."""
         return self.data
 
 
 class CachedFile(Struct, frozen=True):
-    """A file of the site that need not be made where it was published under the same key before."""
+    """A file of the site that is not made again if it was published under the same key."""
 
     path: str
     """Its path in the site (POSIX, relative)."""
     key: str
     """A hash of all that its bytes depend on."""
     make: Callable[[], bytes]
-    """Gives its bytes; called at most once, and not at all where the published file is whole."""
+    """Make its bytes; called at most once, and not at all if the published file is whole."""
 
 
 SiteFile: TypeAlias = OutputFile | CachedFile
 
 
 class FileFacts(Struct, frozen=True):
-    """What a list of a site's files says of one."""
+    """An entry in a list of a site's files."""
 
     path: str
     """Its path in the site."""
@@ -333,23 +334,23 @@ class FileFacts(Struct, frozen=True):
 
 
 class FileList(Struct, frozen=True):
-    """A file of the site that is made of what all others are."""
+    """A file of the site that is made from the facts about all others."""
 
     path: str
     """Its path in the site (POSIX, relative)."""
     key: str
     """A hash of all that its bytes depend on besides the other files."""
     make: Callable[[Iterable[FileFacts]], bytes]
-    """Gives its bytes; the other files come sorted by path."""
+    """Make its bytes; the other files come sorted by path."""
 
 
 class Results(Struct, frozen=True):
-    """All that running a course found."""
+    """All results of running a course."""
 
     runs: tuple[ScriptRun, ...]
     verdicts: tuple[Verdict, ...]
     formulas: tuple[tuple[Formula, str | MathError], ...]
-    """Each different formula of the course, and its MathML."""
+    """Each distinct formula of the course, with its MathML or its error."""
     models: tuple[tuple[str, CompileResult], ...]
     """Each model of `models/` by name."""
     python: str
@@ -360,7 +361,7 @@ class Results(Struct, frozen=True):
 
 
 class Machine(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where something was measured; times mean nothing without it."""
+    """The machine of a measurement; times mean nothing without it."""
 
     engine: str
     """Version of MuJoCo."""
@@ -369,13 +370,13 @@ class Machine(Struct, frozen=True, forbid_unknown_fields=True):
     system: str
     """Operating system and kind of processor, such as `Linux x86_64`."""
     cpu: str
-    """What the processor calls itself; empty where it does not say."""
+    """The processor's own name; empty where it has none."""
     governor: str = ""
-    """By which rule the system sets the processor's clock; empty where it does not say."""
+    """The rule by which the system sets the processor's clock; empty where not known."""
     processors: int = 0
-    """How many of them could be used; 0 where that was not recorded."""
+    """The number of usable processors; 0 where that was not recorded."""
     pinned: bool = False
-    """Whether times were taken on one of them alone."""
+    """Whether times were taken on a single one of them."""
 
     @property
     def hardware(self) -> str:

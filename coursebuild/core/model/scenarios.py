@@ -1,7 +1,7 @@
-"""What a file `models/NAME.toml` says of the model beside it: scenarios, and findings to keep.
+"""The content of a file `models/NAME.toml`: scenarios of the model, and findings to keep.
 
-Entry points: `Declarations`; `keyframe_scenarios`, where there is no such file; `is_multiple`, of
-times. What is left out is `None` or empty: whoever measures fills it in from the model.
+Entry points: `Declarations`; `keyframe_scenarios`, for models without such a file; `is_multiple`,
+for times. What is left out is `None` or empty; measuring fills it in from the model.
 """
 
 from __future__ import annotations
@@ -15,29 +15,28 @@ from coursebuild.core.model import fields
 from coursebuild.core.text.source import Source, Span
 
 DURATION, MOST_STEPS = 2.0, 20_000
-"""Seconds of a scenario that does not say how long it takes, and the model's timesteps that it is
-at most."""
+"""The length of a scenario that does not say its own: seconds, and the most timesteps."""
 
 
 def keyframe_scenarios(keyframes: Sequence[str]) -> tuple[str, ...]:
-    """The scenarios of a model that declares none, by name; one without a name is empty."""
-    found: list[str] = []
-    for number, own in enumerate(keyframes):
-        name = own if own.strip() else f"keyframe-{number}"
-        while not own.strip() and name in keyframes:
+    """The scenarios of a model that declares none: one for each keyframe, or `start`."""
+    names: list[str] = []
+    for number, keyframe in enumerate(keyframes):
+        name = keyframe if keyframe.strip() else f"keyframe-{number}"
+        while not keyframe.strip() and name in keyframes:
             name += "-"
-        found.append(name)
-    return tuple(found) or ("start",)
+        names.append(name)
+    return tuple(names) or ("start",)
 
 
 def is_multiple(length: float, part: float) -> bool:
-    """Whether `part` goes into `length` a whole number of times, rounding aside."""
+    """Whether `length` is a whole multiple of `part`, up to rounding."""
     count = round(length / part) if length / part < 1e15 else 0
     return count >= 1 and abs(count * part - length) <= 1e-9 * length
 
 
 class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """From where on an error would be noticed, and what it may differ by."""
+    """The size from which an error is visible, and by how much it may differ."""
 
     visible: Annotated[float, Meta(gt=0, le=1, description="share of the model's extent")] = 0.01
     visible_angle: Annotated[
@@ -53,15 +52,15 @@ class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = 0.05
 
 
-class Measured(Struct, frozen=True):
-    """What is measured beside coordinates: the place of a thing, or what a sensor says."""
+class Observable(Struct, frozen=True):
+    """A quantity measured besides coordinates: a position, or the reading of a sensor."""
 
     kind: Literal["body", "site", "sensor"]
     name: str
 
 
 class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """What happens to the model: where it begins, how long it takes, what is commanded."""
+    """What happens to the model: initial state, duration, commands."""
 
     name: Annotated[fields.Slug, Meta(description="by which reports call it")]
     title: Annotated[fields.Text | None, Meta(description="shown over its figures")] = None
@@ -115,31 +114,31 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ()
 
     @property
-    def measured(self) -> Measured | None:
-        """What `measure` names."""
+    def observable(self) -> Observable | None:
+        """The quantity that `measure` names."""
         match (self.measure or "").split(":", 1):
             case ["body" | "site" | "sensor" as kind, name]:
-                return Measured(kind, name)
+                return Observable(kind, name)
             case _:
                 return None
 
     @property
-    def closed(self) -> str:
-        """The hard case whose closed form is the reference; empty where none is."""
+    def closed_form(self) -> str:
+        """The hard case whose closed form is the reference; empty if none is."""
         kind, _, name = (self.reference or "").partition(":")
         return name if kind == "closed" else ""
 
 
 class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):
-    """A scenario as its author wrote it, or as a model has it that declares none."""
+    """A scenario that an author declared, or that a model without declarations has."""
 
     span: Span
     """Its table."""
     places: tuple[tuple[str, Span], ...] = ()
-    """Where each field that is given stands."""
+    """The place of each given field."""
 
     def place(self, name: str) -> Span:
-        """What to point at for a field: its value, or the table where it is not given."""
+        """The span of a field's value, or of the table if the field is not given."""
         return dict(self.places).get(name, self.span)
 
 
@@ -147,13 +146,13 @@ SweepValue: TypeAlias = float | str | tuple[float, ...]
 
 
 class Variation(Struct, frozen=True):
-    """A parameter, and the values that it is given."""
+    """A parameter, and the values that a sweep gives it."""
 
     parameter: str
-    """As `geom.solref[0]`: a field of all elements of a kind, or of one, as in `geom:ball.mass`."""
+    """A field of all elements of a kind, `geom.solref[0]`, or of one, `geom:ball.mass`."""
     values: tuple[SweepValue, ...]
     relative: bool
-    """Whether values are factors of what the model has."""
+    """Whether the values are factors of the model's own."""
     span: Span
 
 
@@ -162,7 +161,7 @@ SweepFigure: TypeAlias = Literal[
     "residual", "iterations", "cost", "throughput",
 ]  # fmt: skip
 _SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
-"""How a sweep names a share of what the model has."""
+"""How a sweep names a share of the model's own value."""
 
 
 class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -187,32 +186,32 @@ class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DeclaredSweep(SweepTable, frozen=True, kw_only=True):
-    """The same as its author wrote it."""
+    """A sweep with its variations parsed."""
 
     variations: tuple[Variation, ...]
-    """What `vary` says."""
+    """Those that `vary` describes."""
 
 
 class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
-    """A finding of the scene diet that is wanted as it is."""
+    """A finding of the scene diet that is to stay as it is."""
 
     finding: Annotated[fields.Text, Meta(description="as `coursebuild diet` names it")]
     reason: Annotated[fields.Text, Meta(description="why it stays")]
 
 
 class Keep(KeepTable, frozen=True, kw_only=True):
-    """The same as its author wrote it."""
+    """A kept finding with its place."""
 
     finding_span: Span
 
 
 class Declarations(Struct, frozen=True):
-    """A file `models/NAME.toml`, or what holds of a model that has none."""
+    """A file `models/NAME.toml`, or the defaults of a model without one."""
 
     model: str
-    """Its path below `models/`, without suffix, POSIX: the name of the model."""
+    """The name of the model: its path below `models/`, without suffix, POSIX."""
     source: Source
-    """The model's own where there is no such file."""
+    """The file, or the model's source if there is none."""
     scenarios: tuple[DeclaredScenario, ...] = ()
     keep: tuple[Keep, ...] = ()
     bench: BenchTable = BenchTable()

@@ -1,4 +1,4 @@
-"""What became of a script's numbers when initial states were moved, and timesteps halved.
+"""How a script's numbers react to perturbed initial states and halved timesteps.
 
 Entry point: `Sensitivity`.
 """
@@ -19,50 +19,50 @@ far away."""
 HALVED = -1
 """The number of the run whose timesteps are halved."""
 CHAOTIC = 1e8
-"""A simulation is chaotic where its states at the end are more than this many times as far apart as
-they were at the beginning: of the sixteen digits of a number fewer than eight are left."""
+"""A simulation is chaotic if its states are more than this many times as far apart at the end as at
+the beginning: fewer than eight of a number's sixteen digits are left."""
 
 
 class Standing(enum.Enum):
-    """Whether anything could be said of a script."""
+    """Whether the sensitivity of a script could be measured, and if not, why."""
 
     MEASURED = "measured"
     NO_MUJOCO = "without-mujoco"
     """It does not import MuJoCo."""
     NOT_MOVED = "not-moved"
-    """MuJoCo computes nothing in it from an initial state that could be moved."""
+    """No initial state in it could be moved."""
     UNRECORDED = "unrecorded"
-    """Nothing that it prints is recorded and compared."""
+    """None of its output is recorded and compared."""
     DRIFTED = "drifted"
-    """It does not print what is recorded, or does not run to its end."""
+    """It prints something other than recorded, or does not run to its end."""
     FAILED = "failed"
     """It did not run to its end with moved states."""
 
 
 class Doubt(Struct, frozen=True):
-    """A recorded number of which not all printed digits repeat, or are converged."""
+    """A recorded number with digits that do not repeat, or have not converged."""
 
     span: Span
     printed: str
     digits: int
     """Significant digits printed."""
     repeat: int
-    """How many of them are the same when initial states are moved."""
+    """How many of them stay the same when initial states are moved."""
     converged: int | None
-    """How many of them are those of ever smaller timesteps; `None` where that is not known."""
+    """How many of them are those of ever smaller timesteps; `None` where not known."""
     least: str
     most: str
-    """The smallest and the largest value that was printed in its place, initial states moved."""
+    """The smallest and the largest value printed in its place with moved initial states."""
     halved: str
-    """What was printed in its place with half the timestep; empty where that is not known."""
+    """The text printed in its place with half the timestep; empty where not known."""
     instead: str
-    """The number with only the digits that do both; empty where none does, and of a count."""
+    """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
-    """Whether the verification would take the difference for drift."""
+    """Whether verification would report the difference as drift."""
 
 
 class Flip(Struct, frozen=True):
-    """Recorded text, beside numbers, that was printed otherwise, or not at all, or that came in."""
+    """Text between numbers that changed, disappeared or was added when states were moved."""
 
     span: Span
     printed: str
@@ -71,19 +71,19 @@ class Flip(Struct, frozen=True):
 
 
 class Sensitivity(Struct, frozen=True):
-    """A script."""
+    """The sensitivity of a script."""
 
     path: str
     lesson: str
     """Id of the lesson or page that it is extracted from."""
     standing: Standing
     numbers: int = 0
-    """Recorded numbers that were looked at."""
+    """How many recorded numbers were examined."""
     amplification: float | None = None
-    """How many times as far apart states were at the end as at the beginning, at most; `None`
-    where no state at the end is known."""
+    """The largest growth of the distance between states from beginning to end; `None` where no
+    final state is known."""
     unhalved: str = ""
-    """Why nothing is known of half the timestep; empty where it is."""
+    """Why nothing is known about half the timestep; empty where something is."""
     doubts: tuple[Doubt, ...] = ()
     flips: tuple[Flip, ...] = ()
 

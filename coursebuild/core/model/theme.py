@@ -1,4 +1,4 @@
-"""The look of a course's site: what `[theme]` in its map says, with the files that it names.
+"""The look of a course's site: the table `[theme]` of its map, with the files that it names.
 
 Entry point: `Theme`.
 """
@@ -17,9 +17,9 @@ class ThemeFile(Struct, frozen=True):
 
     path: str
     span: Span
-    """Its name in the map."""
+    """Where the map names it."""
     data: bytes = b""
-    """What it holds, once it was read."""
+    """Its content, once it has been read."""
 
     @property
     def ending(self) -> str:
@@ -28,12 +28,12 @@ class ThemeFile(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """What it holds, as text."""
+        """Its content as text."""
         return self.data.decode("utf-8", "replace")
 
 
 class FontFamily(Struct, frozen=True):
-    """A typeface, and what is set in it."""
+    """A typeface, and what it is used for."""
 
     use: Literal["text", "interface", "code"]
     files: tuple[ThemeFile, ...]
@@ -41,30 +41,32 @@ class FontFamily(Struct, frozen=True):
 
 
 class Theme(Struct, frozen=True):
-    """Logo, icons, colours, style sheets, fonts and templates; the tool's where there is none."""
+    """Logo, icons, colours, style sheets, fonts and templates; empty ones are the tool's own."""
 
     logo: ThemeFile | None = None
     logo_dark: ThemeFile | None = None
     icon: ThemeFile | None = None
     touch_icon: ThemeFile | None = None
     accent: str = ""
-    """The colour of links and of what can be pressed, as `#rrggbb`."""
+    """The colour of links and buttons, as `#rrggbb`."""
     accent_dark: str = ""
     css: tuple[ThemeFile, ...] = ()
     fonts: tuple[FontFamily, ...] = ()
     templates: tuple[Source, ...] = ()
-    """The files of `theme/templates/`, each in the place of the template of that name."""
+    """The files of `theme/templates/`, each replacing the template of that name."""
 
     @property
     def pictures(self) -> tuple[ThemeFile, ...]:
         """Its logo and its icons."""
-        named = (getattr(self, name) for name in PICTURES)
-        return tuple(file for file in named if file is not None)
+        fields = (getattr(self, name) for name in PICTURES)
+        return tuple(file for file in fields if file is not None)
 
     @property
     def template_texts(self) -> tuple[tuple[str, str], ...]:
         """The names and texts of its templates."""
-        return tuple((one.path.removeprefix(TEMPLATES), one.text) for one in self.templates)
+        return tuple(
+            (source.path.removeprefix(TEMPLATES), source.text) for source in self.templates
+        )
 
 
 PICTURES = ("logo", "logo_dark", "icon", "touch_icon")

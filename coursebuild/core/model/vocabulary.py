@@ -1,7 +1,7 @@
-"""The words that every course has: the kinds of callouts, and closed forms to measure against.
+"""The vocabulary of every course: the kinds of callouts, and closed forms to measure against.
 
-Entry points: `CALLOUTS`, what each kind promises, and `CLOSED_FORMS`. A course can add kinds, or
-give these other labels, under `[callouts]` in course.toml.
+Entry points: `CALLOUTS` and `CLOSED_FORMS`. A course can add kinds of callouts, or relabel these,
+under `[callouts]` in course.toml.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ CALLOUTS: tuple[CalloutKind, ...] = (
     CalloutKind("important", "Important", "What the rest of the lesson depends on."),
     CalloutKind("caution", "Caution", "A step that cannot be taken back, or may damage something."),
 )
-"""In the order in which a page that explains them lists them."""
+"""In the order of a page that explains them."""
 
 CLOSED_FORMS: tuple[str, ...] = (
     "tumbling-box",

@@ -37,10 +37,10 @@ from coursebuild.core.model.inlines import (
 
 Value = TypeVar("Value")
 
-_HOLDERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
-"""Blocks that may have others in them."""
-_AROUND = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
-"""Inlines that may have others in them."""
+_BLOCK_CONTAINERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
+"""Blocks that may contain blocks."""
+_INLINE_CONTAINERS = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
+"""Inlines that may contain inlines."""
 _COMMENTS = re.compile(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
 
 
@@ -76,19 +76,19 @@ def block_inlines(block: Block) -> tuple[Inline, ...]:
 
 
 def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
-    """Every block in document order, a container before what it holds."""
+    """Every block in document order, a container before its content."""
     for block in blocks:
         yield block
-        if isinstance(block, _HOLDERS):
+        if isinstance(block, _BLOCK_CONTAINERS):
             yield from walk_blocks(child_blocks(block))
 
 
 def main_and_further(
     blocks: tuple[Block, ...],
 ) -> Iterator[tuple[bool, tuple[Block, ...]]]:
-    """A text cut where a section that goes further begins or ends; such a part is true.
+    """Cut a text into parts, each with whether it is a section that goes further.
 
-    It begins with the section's heading and ends before the next one that is not below it.
+    Such a section ends before the next heading that is not below its own.
     """
     start, level = 0, 0
     for i, block in enumerate(blocks):
@@ -104,7 +104,7 @@ def main_and_further(
 
 
 def computed_once(document: Document, name: str, compute: Callable[[], Value]) -> Value:
-    """What is computed of a document: every check asks for it, so it is kept with the document."""
+    """Return a value computed from a document, which is kept with it, since every check asks."""
     values = document.__dict__
     if name not in values:
         values[name] = compute()
@@ -122,19 +122,19 @@ def document_blocks(document: Document) -> Iterator[Block]:
 
 
 def sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
-    """The blocks of a document, those that stand side by side together."""
-    waiting = [document.blocks, *(footnote.blocks for footnote in document.footnotes)]
-    for group in waiting:  # which grows meanwhile
+    """The blocks of a document in groups of siblings."""
+    groups = [document.blocks, *(footnote.blocks for footnote in document.footnotes)]
+    for group in groups:  # grows in the loop
         yield group
         for block in group:
             if isinstance(block, ListBlock):
-                waiting += [item.blocks for item in block.items]
+                groups += [item.blocks for item in block.items]
             else:
-                waiting.append(child_blocks(block))
+                groups.append(child_blocks(block))
 
 
 def is_blank(blocks: Iterable[Block]) -> bool:
-    """Whether all blocks of a document show nothing: comments, and paragraphs of odd blanks."""
+    """Whether no block shows anything: only comments, and paragraphs of odd blanks."""
     return all(
         (isinstance(block, Paragraph) and not block.children)
         or (isinstance(block, HtmlBlock) and is_comment(block))
@@ -143,7 +143,7 @@ def is_blank(blocks: Iterable[Block]) -> bool:
 
 
 def is_comment(html: HtmlBlock | RawInline) -> bool:
-    """Whether HTML shows nothing: comments only."""
+    """Whether HTML consists of comments only."""
     return _COMMENTS.fullmatch(html.html) is not None
 
 
@@ -157,10 +157,10 @@ def document_scripts(document: Document) -> tuple[Script, ...]:
 
 
 def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
-    """Every inline in order, a container before what it holds."""
+    """Every inline in order, a container before its content."""
     for inline in inlines:
         yield inline
-        if type(inline) in _AROUND:
+        if type(inline) in _INLINE_CONTAINERS:
             yield from walk_inlines(inline.children)  # type: ignore[union-attr]
 
 

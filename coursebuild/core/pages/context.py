@@ -37,7 +37,7 @@ from coursebuild.core.model import (
 from coursebuild.core.pages import blocks, formulas, markup, urls
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import file_address
-from coursebuild.core.pages.equations import numbered
+from coursebuild.core.pages.equations import number_equations
 from coursebuild.core.pages.html_context import Context, OwnBlock
 from coursebuild.core.pages.page_inputs import ShownDocument
 from coursebuild.core.pages.renderer import Renderer
@@ -71,7 +71,7 @@ class PageContext(Context, Struct, frozen=True, dict=True):
     @cached_property
     def equations(self) -> Mapping[int, Equation]:
         """Formulas on lines of their own, by their offset."""
-        return numbered(self.document, self.renderer.mathml)
+        return number_equations(self.document, self.renderer.mathml)
 
     # what the Markdown renderer asks
 

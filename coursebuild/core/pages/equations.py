@@ -1,9 +1,9 @@
-r"""Numbers of formulas: those that an author labels are numbered, in the order of the text.
+r"""Numbers of formulas: those with a label are numbered, in the order of the text.
 
-Entry points: `numbered(document, mathml)`; `equations_of`, for others than their own page.
+Entry points: `number_equations(document, mathml)`; `equations_of`, for other pages.
 
-LaTeX's numbered environments count too: their numbers are written by the style sheet, which counts
-on where ours left off. A formula with such numbers of its own, or with a `\tag`, gets none besides.
+LaTeX's numbered environments count too: the style sheet writes their numbers, continuing ours. A
+formula with such numbers of its own, or with a `\tag`, gets no other.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ _TAGGED = 'class="tml-tag"'
 _TAG = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
-def numbered(document: Document, mathml: Mathml) -> dict[int, Equation]:
-    """The formulas of a document that have an id, by their offset."""
-    found: dict[int, Equation] = {}
+def number_equations(document: Document, mathml: Mathml) -> dict[int, Equation]:
+    """The formulas of a document that have an id, by offset."""
+    equations: dict[int, Equation] = {}
     count = 0
     for formula in display_formulas(document):
         html = mathml(formula.tex, True)
-        counted = html.count(_COUNTED)
+        styled_count = html.count(_COUNTED)
         tag = _TAG.search(html) if _TAGGED in html else None
-        number, shown = "", False
+        number, has_margin_number = "", False
         if formula.label is not None and formula.id:
-            shown = not counted and tag is None
-            number = unescape(tag[1]) if tag is not None and not counted else str(count + 1)
-        count += counted + shown
+            has_margin_number = not styled_count and tag is None
+            number = unescape(tag[1]) if tag is not None and not styled_count else str(count + 1)
+        count += styled_count + has_margin_number
         if formula.id:
-            found[formula.start] = Equation(formula.id, number, shown)
-    return found
+            equations[formula.start] = Equation(formula.id, number, has_margin_number)
+    return equations
 
 
 def equations_of(document: Document, mathml: Mathml) -> tuple[Equation, ...]:
-    """The formulas that have an id, of a document or of a summary."""
+    """The formulas of a document, or of its summary, that have an id."""
     if document.summaries is not None:
         return document.equations
-    return tuple(numbered(document, mathml).values())
+    return tuple(number_equations(document, mathml).values())

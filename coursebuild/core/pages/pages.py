@@ -117,7 +117,7 @@ def _model_card(library: Library, place: urls.Place, model: MjcfModel) -> ModelC
         picture = PictureLink(src, found.width, found.height, model.name, href)
     owners = [use.owner for use in library.uses[model.name]]
     lessons = tuple(lesson_link(library, place, one) for one in owners if isinstance(one, Lesson))
-    return ModelCard(model.name, model.about, href, picture, lessons)
+    return ModelCard(model.name, model.description, href, picture, lessons)
 
 
 def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
@@ -138,12 +138,12 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "href": place.href(urls.model_file_path(model.name)),
         "facts": () if facts is None else (*_facts(library, facts), *more),
         "code": Highlighted("xml", model.source.text.rstrip(), model.source.path),
-        "about": model.about,
+        "about": model.description,
         "opening": _added(parts, shown, opens=True),
         "added": _added(parts, shown, opens=False),
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
-    return PageInputs(PageHead(place.path, "model", title, model.about), "model.html", values)
+    return PageInputs(PageHead(place.path, "model", title, model.description), "model.html", values)
 
 
 def _added(

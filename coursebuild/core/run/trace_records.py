@@ -44,7 +44,7 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         opaque=next(iter(found["o"]), ""),
         divergences=tuple(dict.fromkeys(divergences)),
         effects=tuple(effects),
-        moved=bool(found["p"]),
+        is_perturbed=bool(found["p"]),
         states=tuple(found["s"]),
         sought=_sought(found["v"], top),
     )

@@ -91,7 +91,7 @@ def _reason_unhalved(run: ScriptRun | None) -> str:
         return "it was not run with half the timestep"
     if run.outcome is not Outcome.OK:
         return "it does not run to its end with half the timestep"
-    return "" if run.trace is not None and run.trace.moved else "no step of it can be halved"
+    return "" if run.trace is not None and run.trace.is_perturbed else "no step of it can be halved"
 
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
@@ -125,7 +125,7 @@ def _standing(
         return Standing.MEASURED
     if any(run.outcome is not Outcome.OK for run in moved_runs):
         return Standing.FAILED
-    if not any(run.trace is not None and run.trace.moved for run in moved_runs):
+    if not any(run.trace is not None and run.trace.is_perturbed for run in moved_runs):
         return Standing.NOT_MOVED
     return Standing.MEASURED
 

@@ -26,7 +26,7 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.blocks import title_line
-from coursebuild.core.model.equations import blocks_elsewhere
+from coursebuild.core.model.equations import feature_block_ids
 from coursebuild.core.syntax.headings import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import read_markdown
@@ -85,7 +85,7 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
     """
     if not any(mark in document.source.text for mark in _MARKS):
         return ()
-    elsewhere = blocks_elsewhere(document)
+    elsewhere = feature_block_ids(document)
     diagnostics = [*_check_ids_of_terms(document)]
     for block in document_blocks(document):
         is_elsewhere = id(block) in elsewhere

@@ -219,7 +219,7 @@ def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnost
 
 
 def _check_reference(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
-    if table.closed and table.closed not in CLOSED_FORMS:
-        message = f"no hard case with a closed form is called `{shorten(table.closed)}`"
-        help = did_you_mean(table.closed, CLOSED_FORMS)
+    if table.closed_form and table.closed_form not in CLOSED_FORMS:
+        message = f"no hard case with a closed form is called `{shorten(table.closed_form)}`"
+        help = did_you_mean(table.closed_form, CLOSED_FORMS)
         yield diagnose("field-value", node.place("reference"), message, help=help)

@@ -30,7 +30,7 @@ from coursebuild.core.model import (
     without_links,
 )
 from coursebuild.core.pages import formulas
-from coursebuild.core.pages.equations import numbered
+from coursebuild.core.pages.equations import number_equations
 from coursebuild.core.pages.html_context import Context
 from coursebuild.core.pages.markup import render_inlines
 from coursebuild.core.text.diagnostics import Parsed
@@ -82,7 +82,7 @@ class _Excerpt(Context):
 
 def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     context = _Excerpt(mathml)
-    equations = numbered(document, mathml).values()
+    equations = number_equations(document, mathml).values()
     names = {f"#{one.id}": f"({one.number})" for one in equations if one.number}
 
     def reference(target: Target) -> str:

@@ -56,7 +56,7 @@ class DocumentWriter(BlockWriter):
     def number(self, start: int) -> str:
         """The number beside a formula that does not show one itself."""
         known = self.page.equations.get(start)
-        return known.number if known is not None and known.shown else ""
+        return known.number if known is not None and known.has_margin_number else ""
 
     def own(self, block: OwnBlock) -> str:
         """A block of ours."""

@@ -73,7 +73,7 @@ def test_steps_are_halved_however_they_are_made(run: Run) -> None:
         end = "print(json.dumps([*data.qpos, *data.qvel, data.time, model.opt.timestep]))\n"
         done = run(f"{HEAD}data.ctrl[0] = 2\n{text}{end}", perturbation=number)
         assert done.trace is not None and done.stdout, done.stderr
-        return done.trace.moved, json.loads(done.stdout)
+        return done.trace.is_perturbed, json.loads(done.stdout)
 
     for name, text in TEN.items():
         timestep = 0.05 if "its own timestep" in name else 0.1

@@ -264,13 +264,13 @@ def trace(done: ScriptRun) -> Trace:
 
 def test_what_became_of_the_states_is_noted(moving: Run) -> None:
     found = trace(moving(PULL + STEP))
-    assert found.moved
+    assert found.is_perturbed
     number, length, position, velocity, *end = found.states[0].split()
     assert (number, length, len(end)) == ("0", "2", 4)
     assert moved([float.fromhex(position)], 0.5)
     assert float.fromhex(velocity) == pytest.approx(0.5 / 0.002), "as far in the whole time"
     nothing = trace(moving("tell('mass', model.body_mass)"))
-    assert (nothing.moved, nothing.states) == (False, ())
+    assert (nothing.is_perturbed, nothing.states) == (False, ())
 
 
 def test_states_are_compared_by_the_largest_since_the_simulation_began(moving: Run) -> None:

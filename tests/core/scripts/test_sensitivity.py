@@ -26,7 +26,7 @@ TRACE = Trace((), (), (), ("mujoco",), "")
 
 
 def run(stdout: str, states: Sequence[str] = (), *, moved: bool = True) -> ScriptRun:
-    trace = replace(TRACE, moved=moved, states=tuple(states))
+    trace = replace(TRACE, is_perturbed=moved, states=tuple(states))
     return ScriptRun("examples/a.py", Outcome.OK, 0, stdout, "", 1.0, trace=trace)
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import Declarations, Measured
+from coursebuild.core.model import Declarations, Observable
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
@@ -72,12 +72,12 @@ def test_everything_that_a_file_can_say(newline: str) -> None:
     assert (reach.qpos, reach.qvel) == ((0.0, 1.5), (0.5, 0.0))
     assert (reach.duration, reach.sample, reach.hold) == (2.0, 0.1, 0.5)
     assert reach.controls == ((0.5, 0.3), (-0.5, 1.0), (0.0, 0.0))
-    assert reach.measured == Measured("site", "tip of it")
-    assert (reach.reference, reach.closed, reach.conserved) == ("ode", "", ())
+    assert reach.observable == Observable("site", "tip of it")
+    assert (reach.reference, reach.closed_form, reach.conserved) == ("ode", "", ())
     assert reach.timesteps == (0.001, 0.05)
     assert reach.place("keyframe").text == '"home"'
     assert reach.place("nothing").text == "[[scenario]]"
-    assert (rest.keyframe, rest.closed) == (0, "damped-spring-0.1")
+    assert (rest.keyframe, rest.closed_form) == (0, "damped-spring-0.1")
     assert rest.conserved == ("energy", "angular-momentum")
     assert (rest.duration, rest.sample, rest.hold, rest.measure) == (None, None, None, None)
     assert (other.title, other.keyframe, other.reference) == (None, None, "self")

@@ -91,7 +91,7 @@ def _names(texts: OpenTexts, here: Span, what: str, found: re.Match[str]) -> Map
         case "page":
             return {one.id: one.title for one in library.pages.values()}
         case "model":
-            return {one.name: one.about for one in library.course.models}
+            return {one.name: one.description for one in library.course.models}
         case "term":
             return {id: f"of {one.id}: {one.title}" for id, one in library.terms.items()}
         case "script":

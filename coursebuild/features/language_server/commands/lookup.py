@@ -193,7 +193,7 @@ class _Lookup:
             f"nu = {facts.nu}; {facts.integrator}, timestep {facts.timestep:g} s"
         )
         path = found.source.path
-        return _paragraphs(f"**{path}**", found.about, held or ""), found.source.span(0, 0)
+        return _paragraphs(f"**{path}**", found.description, held or ""), found.source.span(0, 0)
 
     def facts(self, models: Iterable[str]) -> ModelFacts | None:
         """Those of the first of some models that compiles."""

@@ -166,7 +166,7 @@ def _readers(
     """Everything in the course that may use a model, and what is to be measured on it."""
     found = list(readers_of(course, root, files, scene))
     declared = scene.declared.scenarios
-    names = frozenset(one.measured.name for one in declared if one.measured is not None)
+    names = frozenset(one.observable.name for one in declared if one.observable is not None)
     fields = {"energy"} if any("energy" in (one.conserved or ()) for one in declared) else set()
     if names or fields:
         found.append(Reader(scene.declared.source.path, names=names, words=frozenset(fields)))
