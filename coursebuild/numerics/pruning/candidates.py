@@ -1,13 +1,13 @@
-"""What could be left out of a model, and why the motion would be the same in every state.
+"""Candidates: what could be left out of a model, and why all motions would stay the same.
 
-Entry points: `unread(text, scenarios)`, of which no motion is computed; `contacts(text)`, where
-nothing can touch; `idle_contacts`, `far_bodies`, `settings`, for which only runs speak.
+Entry points: `unread_elements(text, scenarios)`, of which no motion is computed;
+`unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `far_bodies`,
+`other_settings`, for which only runs speak.
 
-1. The argument of a kind holds for whatever MuJoCo's compiler lets go: what another element refers
-   to does not compile without it. What else changes in the compiled model is looked at by the
-   survey, and nothing may beyond what belongs to the things that are gone.
-2. Without an argument a thing is tried by running. The integrator and the timestep are not among
-   these: what they change is an error, and is judged against a reference, never against the model.
+1. The proof of a kind holds only if MuJoCo compiles the model without the thing, so that no other
+   element refers to it. The survey checks that nothing else in the compiled model changes.
+2. What has no proof is tried by running. The integrator and the timestep are not candidates: they
+   change an error, which is judged against a reference, never against the model.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from coursebuild.numerics.pruning.compare import WatchedRun
 from coursebuild.numerics.pruning.edits import ModelEdit, set_attributes, set_option
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import ModelText, section_of
-from coursebuild.numerics.pruning.reachability import Pair, each_pair, separate
+from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
 
 MOST_PAIRS = 100_000
-"""Pairs of geoms beyond which nothing is said of them."""
+"""With so many pairs of geoms no contact is examined."""
 
 
 class Item(Struct, frozen=True, eq=False):
-    """One thing that may be in vain, and how to be without it."""
+    """One thing that may be needless, and the changes that take it out."""
 
     kind: str
     """Of the finding, such as `sensor-unread`."""
     name: str
     """What it is called; the way to its element where it has no name."""
     element: Element | None
-    """Where to point at; `None`: at the model."""
-    gone: tuple[Element, ...] = ()
+    """The element to point at; `None` for the model as a whole."""
+    removals: tuple[Element, ...] = ()
     """Elements to take out."""
     drops: tuple[tuple[Element, str], ...] = ()
     """Attributes to take out."""
@@ -52,7 +52,7 @@ class Item(Struct, frozen=True, eq=False):
 
 
 def proof_of(kind: str) -> str:
-    """Why what is of this kind and in vain changes no motion, in any state."""
+    """Why a needless thing of this kind changes no motion, in any state."""
     if kind.startswith("unused-"):
         return "no motion is computed of it, nothing refers to it, and no code can notice"
     return _PROOFS.get(kind, "")
@@ -70,16 +70,16 @@ _PROOFS = {
 
 
 def message_of(kind: str, names: str, count: int) -> str:
-    """What a finding says of so many things with these names."""
-    what = kind.removeprefix("unused-") if kind.startswith("unused-") else _WHAT.get(kind, "")
-    if what == "default":
-        what = "class"
+    """The message of a finding about so many things with these names."""
+    noun = kind.removeprefix("unused-") if kind.startswith("unused-") else _WHAT.get(kind, "")
+    if noun == "default":
+        noun = "class"
     for (_, name, value), words in _SETTINGS.items():
         if (kind, names) == (name, value):
             return words
-    many = "bodies" if what == "body" else what + ("es" if what in ("class", "mesh") else "s")
+    many = "bodies" if noun == "body" else noun + ("es" if noun in ("class", "mesh") else "s")
     return _MESSAGES.get(kind, "nothing uses the {}").format(
-        f"{what if count == 1 else many} {names}"
+        f"{noun if count == 1 else many} {names}"
     )
 
 
@@ -112,23 +112,23 @@ _ASSETS |= {"model": ""}
 _FLAGS = ("energy", "fwdinv")
 
 
-def unread(text: ModelText, scenarios: Collection[Scenario]) -> list[Item]:
-    """Elements that no motion is computed of."""
-    keys = [one for one in text.elements if one.tag == "key" and section_of(one) == "keyframe"]
-    begun = {keys[s.keyframe] for s in scenarios if 0 <= s.keyframe < len(keys)}
-    found = [
-        Item(f"{flag}-flag", flag, one, drops=((one, flag),))
-        for one in text.elements
+def unread_elements(text: ModelText, scenarios: Collection[Scenario]) -> list[Item]:
+    """Elements that no motion is computed from."""
+    keys = [e for e in text.elements if e.tag == "key" and section_of(e) == "keyframe"]
+    start_keys = {keys[s.keyframe] for s in scenarios if 0 <= s.keyframe < len(keys)}
+    flags = [
+        Item(f"{flag}-flag", flag, element, drops=((element, flag),))
+        for element in text.elements
         for flag in _FLAGS
-        if one.tag == "flag" and one.get(flag) == "enable"
+        if element.tag == "flag" and element.get(flag) == "enable"
     ]
-    later: list[tuple[int, Item]] = []
+    removable: list[tuple[int, Item]] = []
     for element in text.elements:
-        known = _unread_kind(text, element, scenarios)
-        if known is not None and element not in begun:
-            kind, view, name, order = known
-            later.append((order, Item(kind, name, element, (element,), view=view)))
-    return [*found, *(item for _, item in sorted(later, key=lambda one: one[0]))]
+        entry = _unread_kind(text, element, scenarios)
+        if entry is not None and element not in start_keys:
+            kind, view, name, order = entry
+            removable.append((order, Item(kind, name, element, (element,), view=view)))
+    return [*flags, *(item for _, item in sorted(removable, key=lambda entry: entry[0]))]
 
 
 def _unread_kind(
@@ -142,9 +142,9 @@ def _unread_kind(
     section = section_of(element)
     if section == "sensor" and tag not in ("user", "plugin"):
         return "sensor-unread", "Sensor", name, 0
-    if section == "actuator" and thing and _forceless(text.model, thing.ids, scenarios):
+    if section == "actuator" and thing and _is_forceless_actuator(text.model, thing.ids, scenarios):
         return "actuator-idle", "Actuator", name, 1
-    if section == "tendon" and thing and _slack(text.model, thing.ids):
+    if section == "tendon" and thing and _is_forceless_tendon(text.model, thing.ids):
         return "tendon-idle", "Tendon", name, 2
     if section == "keyframe" and tag == "key":
         return "unused-keyframe", "Keyframe", name, 3
@@ -169,9 +169,14 @@ def _file_name(element: Element) -> str:
     return name or place_of(element)
 
 
-def _forceless(model: Any, ids: Collection[int], scenarios: Collection[Scenario]) -> bool:
-    """Whether nobody commands these actuators, and a command of 0 gives no force, in any state."""
-    commands = [*model.key_ctrl, *(np.array(row) for one in scenarios for row in one.controls)]
+def _is_forceless_actuator(
+    model: Any, ids: Collection[int], scenarios: Collection[Scenario]
+) -> bool:
+    """Whether these actuators get no command, and give no force without one, in any state."""
+    commands = [
+        *model.key_ctrl,
+        *(np.array(row) for scenario in scenarios for row in scenario.controls),
+    ]
     linear = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
     for i in ids:
         ranges = [(model.actuator_ctrllimited[i], model.actuator_ctrlrange[i])]
@@ -191,33 +196,33 @@ _OF_TENDONS = (
     *("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "armature"),
     "limited",
 )
-"""What makes a tendon exert a force of its own."""
+"""Properties that make a tendon exert a force of its own."""
 
 
-def _slack(model: Any, ids: Collection[int]) -> bool:
+def _is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
     return not any(np.any(getattr(model, f"tendon_{name}")[i]) for name in _OF_TENDONS for i in ids)
 
 
-def contacts(text: ModelText) -> list[Item]:
-    """Contact as a whole, or that of geoms, where a bound says that nothing can touch."""
-    pairs = frozenset(islice(each_pair(text.model), MOST_PAIRS))
+def unreachable_contacts(text: ModelText) -> list[Item]:
+    """Contact as a whole, or of single geoms, where a bound says that nothing can touch."""
+    pairs = frozenset(islice(iterate_pairs(text.model), MOST_PAIRS))
     if len(pairs) == MOST_PAIRS:
         return []
-    near = pairs - separate(text.model, pairs)
-    return _without_contact(text, pairs, near, "contact-off", "collision-unreachable")
+    in_reach = pairs - find_separate(text.model, pairs)
+    return _without_contact(text, pairs, in_reach, "contact-off", "collision-unreachable")
 
 
-def idle_contacts(text: ModelText, seen: Collection[WatchedRun]) -> list[Item]:
-    """The same where nothing touched."""
-    pairs = frozenset(islice(each_pair(text.model), MOST_PAIRS))
-    touching = frozenset(pair for one in seen for pair in one.touching)
+def idle_contacts(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
+    """Contact as a whole, or of single geoms, where nothing touched in these runs."""
+    pairs = frozenset(islice(iterate_pairs(text.model), MOST_PAIRS))
+    touching = frozenset(pair for run in runs for pair in run.touching_pairs)
     return _without_contact(text, pairs, touching, "contact-idle", "collision-idle")
 
 
 def _without_contact(
     text: ModelText, pairs: Collection[Pair], touching: Collection[Pair], whole: str, part: str
 ) -> list[Item]:
-    """Contact as a whole where none of these pairs touch, else that of geoms in no pair that does.
+    """Contact as a whole where none of the pairs touch, else of the geoms in no touching pair.
 
     Geoms of an explicit pair are left alone. `whole` and `part` are kinds of findings.
     """
@@ -237,66 +242,77 @@ def _without_contact(
     ]
 
 
-def far_bodies(text: ModelText, said: Collection[str], seen: Collection[WatchedRun]) -> list[Item]:
+def far_bodies(
+    text: ModelText, code_names: Collection[str], runs: Collection[WatchedRun]
+) -> list[Item]:
     """Bodies that the scene is not about.
 
-    It is about trees of bodies that are driven or couple with others, are set in motion, or of
-    which code (`said`) names something; where there is none, about mechanisms rather than single
-    free bodies; where there is none, about those with names. Where all are alike none is far.
+    It is about trees of bodies that are driven or couple with others, are set in motion, or
+    contain a name that code uses; where there are none, about mechanisms rather than single free
+    bodies; where there are none, about those with names. Where all are alike none is far.
     """
     model, tree = text.model, text.model.body_treeid
-    needed = {value for one in text.elements for value in _references(one, said)} | set(said)
+    needed = {name for inner in text.elements for name in _references(inner, code_names)}
+    needed |= set(code_names)
     needed |= {name.rstrip("0123456789") for name in needed}  # what is repeated has a number
-    ranks = dict.fromkeys(_thrown(model, seen), 3)
+    ranks = dict.fromkeys(_moving_trees(model, runs), 3)
     roots: dict[Element, list[int]] = {}
     for element, ids in text.things("body"):
-        names = {one.get("name") for one in element.walk()} - {None, ""}
+        names = {inner.get("name") for inner in element.walk()} - {None, ""}
         for number in {int(tree[i]) for i in ids} - {-1}:
-            free = model.tree_bodynum[number] == 1 and model.tree_dofnum[number] == 6
-            rank = 3 if names & needed else 0 if free else 2
+            is_free_body = model.tree_bodynum[number] == 1 and model.tree_dofnum[number] == 6
+            rank = 3 if names & needed else 0 if is_free_body else 2
             ranks[number] = max(rank, ranks.get(number, 0), 1 if element.get("name") else 0)
             if int(model.tree_bodyadr[number]) in ids:
                 roots.setdefault(element, []).append(number)
     most = max(ranks.values(), default=0)
-    found = []
+    items = []
     for element, numbers in roots.items():
-        looks = any(one.tag in ("camera", "light") for one in element.walk())
-        if not looks and all(ranks[number] < most for number in numbers):
-            gone = (element, *_referring(text, element))
-            found.append(Item("far-body", display_name(element), element, gone, view="Body"))
-    return found
+        is_viewpoint = any(inner.tag in ("camera", "light") for inner in element.walk())
+        if not is_viewpoint and all(ranks[number] < most for number in numbers):
+            removals = (element, *_pairs_and_sensors_of(text, element))
+            items.append(Item("far-body", display_name(element), element, removals, view="Body"))
+    return items
 
 
 _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
 
 
-def _references(element: Element, said: Collection[str]) -> Iterator[str]:
-    """The names of things that an element needs; excluded pairs and unread sensors need none."""
-    spare = section_of(element) in ("contact", "sensor") and element.get("name") not in said
-    if not spare:
-        yield from (one.value for one in element.attributes if one.name not in _NOT_REFERENCES)
+def _references(element: Element, code_names: Collection[str]) -> Iterator[str]:
+    """The names that an element refers to; excluded pairs and unread sensors do not count."""
+    is_optional = (
+        section_of(element) in ("contact", "sensor") and element.get("name") not in code_names
+    )
+    if not is_optional:
+        yield from (
+            attribute.value
+            for attribute in element.attributes
+            if attribute.name not in _NOT_REFERENCES
+        )
 
 
-def _referring(text: ModelText, body: Element) -> list[Element]:
-    """Pairs and sensors of what is in a body, which go with it."""
-    names = {one.get("name") for one in body.walk()} - {None, ""}
+def _pairs_and_sensors_of(text: ModelText, body: Element) -> list[Element]:
+    """The pairs and sensors that refer to something in a body, and go with it."""
+    names = {element.get("name") for element in body.walk()} - {None, ""}
     return [
-        one
-        for one in text.elements
-        if section_of(one) in ("contact", "sensor")
-        and any(each.value in names for each in one.attributes if each.name != "name")
+        element
+        for element in text.elements
+        if section_of(element) in ("contact", "sensor")
+        and any(
+            attribute.value in names for attribute in element.attributes if attribute.name != "name"
+        )
     ]
 
 
-def _thrown(model: Any, seen: Collection[WatchedRun]) -> set[int]:
+def _moving_trees(model: Any, runs: Collection[WatchedRun]) -> set[int]:
     """The trees that a scenario sets in motion."""
-    found: set[int] = set()
-    for case in (one.scene.scenario for one in seen):
+    trees: set[int] = set()
+    for case in (run.scene.scenario for run in runs):
         velocity = np.array(case.qvel)
         if not case.qvel and case.keyframe >= 0:
             velocity = model.key_qvel[case.keyframe]
-        found |= set(model.dof_treeid[np.flatnonzero(velocity)].tolist())
-    return found
+        trees |= set(model.dof_treeid[np.flatnonzero(velocity)].tolist())
+    return trees
 
 
 _SETTINGS = {
@@ -309,9 +325,9 @@ _SETTINGS = {
 }
 
 
-def settings(text: ModelText, seen: Collection[WatchedRun]) -> list[Item]:
-    """Other ways to compute the same, for a model in which a constraint was ever active."""
-    if not any(one.constrained for one in seen):
+def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
+    """Other solver settings, for a model in which a constraint was ever active."""
+    if not any(run.constrained for run in runs):
         return []
     return [
         Item(name, value, None, edits=set_option(text.main, tag, name, value))

@@ -1,13 +1,13 @@
 """Two models in the same scenario: whether they do the same, bit for bit or nearly.
 
-Entry points: `compare(base, changed, index, scenes)`, `watch(model, scene)`; `pruning_scenes(model,
-declared, quick=…)`, the scenarios that a smaller model is judged by.
+Entry points: `compare(base, variant, index, scenes)`, `watch(model, scene)`; `pruning_scenes(model,
+declarations, quick=…)`, the scenarios by which a smaller model is judged.
 
 1. Both begin in the same state and are stepped side by side. Positions, velocities, activations and
-   the sensors that are left must be the same bits after every step; contacts, with their forces,
-   too, wherever they are looked at.
-2. Where a bit differs, chaos may make much of it. So the base run is followed, and every 0.1 s the
-   changed model starts from its state: what counts is how far both are apart within 50 ms.
+   the sensors that are left must be the same bits after every step; so must contacts with their
+   forces, at every tenth step.
+2. Where a bit differs, chaos may amplify it. So the base run is followed, and every 0.1 s the
+   variant starts from its state: what counts is how far both are apart within 50 ms.
 3. A run that the detector calls lost proves nothing.
 """
 
@@ -30,7 +30,7 @@ from coursebuild.numerics.pruning.index_map import IndexMap, transfer
 from coursebuild.numerics.scene import Scene, scenes, thickness
 
 QUICK = 0.5
-"""Seconds of a scenario where it should be quick, about."""
+"""About how many seconds a scenario takes with `--quick`."""
 TOLERANCE = 1e-8
 """What counts as equal: relative to a number's size, absolute where that is under 1."""
 SHOTS, SHOT = 0.1, 0.05
@@ -39,49 +39,51 @@ _CONTACTS = 10
 """Steps from one look at the contacts to the next."""
 
 
-def pruning_scenes(model: Any, declared: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
-    """What happens to a model, declared or by default.
+def pruning_scenes(
+    model: Any, declarations: Declarations, *, quick: bool = False
+) -> tuple[Scene, ...]:
+    """The scenarios of a model, declared or by default; at least one.
 
     Raises:
         SceneError: a scenario does not fit the model.
     """
-    found = scenes(model, declared, quick=quick)
-    if not found:  # nothing moves, but there are things to be without
-        step, place = float(model.opt.timestep), declared.source.span(0, 0)
+    declared_scenes = scenes(model, declarations, quick=quick)
+    if not declared_scenes:  # nothing moves, but there are things to be without
+        step, place = float(model.opt.timestep), declarations.source.span(0, 0)
         scenario, start = Scenario(10 * step, step), DeclaredScenario("start", span=place)
-        return (Scene("start", "", scenario, (step,), step, declared.bench, start),)
-    return tuple(_shortened(scene) for scene in found) if quick else found
+        return (Scene("start", "", scenario, (step,), step, declarations.bench, start),)
+    return tuple(_shorten(scene) for scene in declared_scenes) if quick else declared_scenes
 
 
-def _shortened(scene: Scene) -> Scene:
+def _shorten(scene: Scene) -> Scene:
     sample, duration = scene.scenario.sample, scene.scenario.duration
     short = sample * max(1, round(min(duration, QUICK) / sample))
     return replace(scene, scenario=replace(scene.scenario, duration=short))
 
 
 class MotionComparison(Struct, frozen=True):
-    """How a changed model did in all scenarios."""
+    """How a variant compares with the base in all scenarios."""
 
     identical: bool
     difference: float
     """The largest; 0 where all bits are the same, infinite where it was lost."""
 
 
-def compare(base: Any, changed: Any, index: IndexMap, scenes: Sequence[Scene]) -> MotionComparison:
-    """Run both in all the scenarios.
+def compare(base: Any, variant: Any, index: IndexMap, scenes: Sequence[Scene]) -> MotionComparison:
+    """Run base and variant in all scenarios.
 
     Raises:
-        ValueError: a state cannot be brought from one to the other.
+        ValueError: a state of the base cannot be transferred.
     """
-    for model in (base, changed):
+    for model in (base, variant):
         without_reset(model)
-    sleeps = int(mujoco.mjtEnableBit.mjENBL_SLEEP) & ~base.opt.enableflags & changed.opt.enableflags
+    sleeps = int(mujoco.mjtEnableBit.mjENBL_SLEEP) & ~base.opt.enableflags & variant.opt.enableflags
     difference, identical = 0.0, True
     for scene in scenes:
-        if not _same_bits(base, changed, index, scene):
+        if not _same_bits(base, variant, index, scene):
             identical = False
             # What sleeps would be awake after each shot.
-            apart = _shots(base, changed, index, scene, whole=bool(sleeps))
+            apart = _largest_departure(base, variant, index, scene, whole=bool(sleeps))
             difference = max(difference, apart)
         if difference > TOLERANCE and not sleeps:
             break
@@ -93,111 +95,113 @@ def without_reset(model: Any) -> None:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
-def _begin(base: Any, changed: Any, index: IndexMap, scene: Scene) -> tuple[Any, Any]:
-    data, other = initial_data(scene.scenario, base), mujoco.MjData(changed)
-    transfer(base, data, index, changed, other)
-    return data, other
+def _begin(base: Any, variant: Any, index: IndexMap, scene: Scene) -> tuple[Any, Any]:
+    data, variant_data = initial_data(scene.scenario, base), mujoco.MjData(variant)
+    transfer(base, data, index, variant, variant_data)
+    return data, variant_data
 
 
-def _same_bits(base: Any, changed: Any, index: IndexMap, scene: Scene) -> bool:
-    data, other = _begin(base, changed, index, scene)
-    end = float(other.time) + scene.scenario.duration
+def _same_bits(base: Any, variant: Any, index: IndexMap, scene: Scene) -> bool:
+    data, variant_data = _begin(base, variant, index, scene)
+    end = float(variant_data.time) + scene.scenario.duration
     for step, command in enumerate(scene.scenario.commands(scene.timestep)):
         if command:
             data.ctrl[:] = command
-            other.ctrl[:] = data.ctrl[index["nu"]]
+            variant_data.ctrl[:] = data.ctrl[index["nu"]]
         advance(base, data)
-        advance(changed, other)
-        if any(mine.tobytes() != his.tobytes() for mine, his in _states(data, other, index)):
+        advance(variant, variant_data)
+        if any(a.tobytes() != b.tobytes() for a, b in _states(data, variant_data, index)):
             return False
-        if step % _CONTACTS == 0 and not _equal_contacts(base, data, changed, other, index):
+        if step % _CONTACTS == 0 and not _equal_contacts(base, data, variant, variant_data, index):
             return False
-    return judge(changed, other, end).ok
+    return judge(variant, variant_data, end).ok
 
 
-def _states(data: Any, other: Any, index: IndexMap) -> tuple[tuple[Any, Any], ...]:
-    """What is left of the base's state and sensors, beside that of the changed model."""
+def _states(data: Any, variant_data: Any, index: IndexMap) -> tuple[tuple[Any, Any], ...]:
+    """The state and sensors of the variant, each beside the same entries of the base."""
     return (
-        (data.qpos[index["nq"]], other.qpos),
-        (data.qvel[index["nv"]], other.qvel),
-        (data.act[index["na"]], other.act),
-        (data.sensordata[index["nsensordata"]], other.sensordata),
+        (data.qpos[index["nq"]], variant_data.qpos),
+        (data.qvel[index["nv"]], variant_data.qvel),
+        (data.act[index["na"]], variant_data.act),
+        (data.sensordata[index["nsensordata"]], variant_data.sensordata),
     )
 
 
-def _equal_contacts(base: Any, data: Any, changed: Any, other: Any, index: IndexMap) -> bool:
+def _equal_contacts(base: Any, data: Any, variant: Any, variant_data: Any, index: IndexMap) -> bool:
     """Whether the geoms that are left touch alike, with the same forces."""
     left = {int(whole): i for i, whole in enumerate(index["ngeom"])}
-    everything = {i: i for i in range(changed.ngeom)}
-    return _contacts(base, data, left) == _contacts(changed, other, everything)
+    identity = {i: i for i in range(variant.ngeom)}
+    return _contacts(base, data, left) == _contacts(variant, variant_data, identity)
 
 
 def _contacts(model: Any, data: Any, left: dict[int, int]) -> list[tuple[object, ...]]:
-    """Contacts between geoms that are left: their numbers, distance and force, as bytes."""
-    found, force = [], np.zeros(6)
+    """The contacts between geoms that are left: their numbers, distance and force, as bytes."""
+    contacts, force = [], np.zeros(6)
     for i, pair in enumerate(data.contact.geom[: data.ncon].tolist()):
         if all(geom < 0 or geom in left for geom in pair):
             mujoco.mj_contactForce(model, data, i, force)
             numbers = tuple(left.get(geom, -1) for geom in pair)
-            found.append((numbers, data.contact.dist[i].tobytes(), force.tobytes()))
-    return sorted(found)
+            contacts.append((numbers, data.contact.dist[i].tobytes(), force.tobytes()))
+    return sorted(contacts)
 
 
-def _shots(base: Any, changed: Any, index: IndexMap, scene: Scene, *, whole: bool) -> float:
-    """How far the changed model is from the base within 50 ms, from states of the base run.
+def _largest_departure(
+    base: Any, variant: Any, index: IndexMap, scene: Scene, *, whole: bool
+) -> float:
+    """How far the variant departs from the base within 50 ms, from states of the base run.
 
     `whole`: over the whole scenario instead, from its beginning.
     """
-    data, other = _begin(base, changed, index, scene)
-    every, length = (max(1, round(span / scene.timestep)) for span in (SHOTS, SHOT))
+    data, variant_data = _begin(base, variant, index, scene)
+    interval, length = (max(1, round(span / scene.timestep)) for span in (SHOTS, SHOT))
     worst = 0.0
     for step, command in enumerate(scene.scenario.commands(scene.timestep)):
         if command:
             data.ctrl[:] = command
-            other.ctrl[:] = data.ctrl[index["nu"]]
-        at = 0 if whole else step % every
+            variant_data.ctrl[:] = data.ctrl[index["nu"]]
+        at = 0 if whole else step % interval
         if at == 0 and not whole:
-            transfer(base, data, index, changed, other)
+            transfer(base, data, index, variant, variant_data)
         advance(base, data)
         if at < length:
-            advance(changed, other)
-            for mine, his in _states(data, other, index):
-                relative = np.abs(mine - his) / np.maximum(1.0, np.abs(mine))
+            advance(variant, variant_data)
+            for a, b in _states(data, variant_data, index):
+                relative = np.abs(a - b) / np.maximum(1.0, np.abs(a))
                 worst = max(worst, float(np.nan_to_num(relative, nan=np.inf).max(initial=0.0)))
             if math.isinf(worst):
                 return math.inf
-    return worst if judge(changed, other, float(other.time)).ok else math.inf
+    return worst if judge(variant, variant_data, float(variant_data.time)).ok else math.inf
 
 
 class WatchedRun(Struct, frozen=True, eq=False):
-    """What a run of the whole model showed."""
+    """The observations of a run of the whole model."""
 
     scene: Scene
     judgement: RunJudgement
-    touching: frozenset[tuple[int, int]]
+    touching_pairs: frozenset[tuple[int, int]]
     """Pairs of geoms between which there was a contact that counts."""
     constrained: bool
     """Whether a constraint was ever active."""
 
 
 def watch(model: Any, scene: Scene) -> WatchedRun:
-    """Run the whole model once."""
+    """Run the whole model in a scenario."""
     without_reset(model)
     data = initial_data(scene.scenario, model)
-    start, made = float(data.time), 0
+    start, steps_made = float(data.time), 0
     touching: set[tuple[int, int]] = set()
-    most, constrained, thick = Peaks(), False, thickness(model)
+    peaks, constrained, thick = Peaks(), False, thickness(model)
     for command in scene.scenario.commands(scene.timestep):
         if command:
             data.ctrl[:] = command
         advance(model, data)
-        made += 1
+        steps_made += 1
         constrained = constrained or data.nefc > 0
         if data.ncon:
-            felt = data.contact.geom[data.contact.exclude == 0]  # none has a force within its gap
-            touching |= {(min(p), max(p)) for p in felt.tolist() if min(p) >= 0}
-        most = update_peaks(data, most, thick)
-        if not most.finite:
+            pairs = data.contact.geom[data.contact.exclude == 0]  # none has a force within its gap
+            touching |= {(min(p), max(p)) for p in pairs.tolist() if min(p) >= 0}
+        peaks = update_peaks(data, peaks, thick)
+        if not peaks.finite:
             break
-    judgement = judge(model, data, start + made * scene.timestep, most)
+    judgement = judge(model, data, start + steps_made * scene.timestep, peaks)
     return WatchedRun(scene, judgement, frozenset(touching), constrained)

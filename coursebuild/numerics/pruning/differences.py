@@ -1,7 +1,7 @@
-"""What differs between two compiled models, and between their states: all by which code could tell.
+"""What differs between two compiled models, and between their states, so that code could notice.
 
-Entry points: `difference(whole, changed)`, `beyond(fields, kinds)`; `VIEWS`, the words by which
-code asks a model for one thing.
+Entry points: `difference(whole, variant)`, `unrelated_fields(fields, kinds)`; `VIEWS`, the words by
+which code asks a model for one thing.
 
 The fields are those that MuJoCo's structures have, whatever their names.
 """
@@ -25,40 +25,40 @@ VIEWS: dict[str, str] = {
 }
 """Words by which one thing is asked for, such as `mat` and `material`, each with its kind."""
 _POINTERS = frozenset(("model", "pbase", "parena", "pstack", "signature", "threadpool", "timer"))
-"""What two equal states may differ in."""
+"""Fields in which two equal states may differ."""
 _LISTS = re.compile(r"n?names(_map)?|n?paths|nbuffer|narena|name_\w+adr|n?bvh.*")
-"""What lists the names, paths and boxes of all things, and says how much memory there is."""
+"""Fields that list the names, paths and boxes of all things, or give sizes of memory."""
 
 
-def beyond(fields: frozenset[str], kinds: frozenset[str]) -> frozenset[str]:
-    """Fields that are neither those of these kinds nor lists nor references by number."""
-    own = tuple(
+def unrelated_fields(fields: frozenset[str], kinds: frozenset[str]) -> frozenset[str]:
+    """The fields that neither belong to these kinds nor are lists nor references by number."""
+    prefixes = tuple(
         start
         for prefix, size, kind in _prefixes()
         if kind in kinds
         for start in (f"{prefix}_", size)
     )
     return frozenset(
-        one
-        for one in fields
-        if not (one.startswith(own) or one.endswith("id") or _LISTS.fullmatch(one))
+        field
+        for field in fields
+        if not (field.startswith(prefixes) or field.endswith("id") or _LISTS.fullmatch(field))
     )
 
 
 @functools.cache
 def _prefixes() -> tuple[tuple[str, str, str], ...]:
-    """Of each kind the prefix of its fields, the field with their number, and its name."""
-    found = ((word, f"n{word}", kind) for word, kind in VIEWS.items())
-    return tuple(one for one in found if hasattr(mujoco.MjModel, one[1]))
+    """For each kind the prefix of its fields, the field with their number, and its name."""
+    prefixes = ((word, f"n{word}", kind) for word, kind in VIEWS.items())
+    return tuple(entry for entry in prefixes if hasattr(mujoco.MjModel, entry[1]))
 
 
-def difference(whole: Any, changed: Any) -> frozenset[str]:
-    """The fields that hold something else in another model, or another state."""
-    rest = dict(_leaves(changed))
+def difference(whole: Any, variant: Any) -> frozenset[str]:
+    """The fields that differ between two models, or two states."""
+    rest = dict(_leaves(variant))
     return frozenset(
         name.rpartition(".")[2]
         for name, value in _leaves(whole)
-        if not _same(value, rest.get(name))
+        if not _are_same(value, rest.get(name))
     )
 
 
@@ -83,7 +83,7 @@ def _names(structure: type) -> tuple[str, ...]:
     )
 
 
-def _same(one: Any, other: Any) -> bool:
-    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        return one.shape == other.shape and one.tobytes() == other.tobytes()
-    return type(one) is type(other) and bool(one == other)
+def _are_same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and a.tobytes() == b.tobytes()
+    return type(a) is type(b) and bool(a == b)

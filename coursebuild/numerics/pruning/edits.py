@@ -1,12 +1,12 @@
 """Changes of MJCF as replacements of bytes: everything else stays as its author wrote it.
 
-Entry points: `ModelEdit`; `remove`, `set_attributes`, `drop_attribute`, `drop_numbers` and
+Entry points: `ModelEdit`; `remove_elements`, `set_attributes`, `drop_attribute`, `drop_numbers` and
 `set_option` make them; `apply_edits` makes the new bytes, `merge_edits` fewer edits of many.
 
-1. An element that has lines of its own goes with these; one that shares its line goes with the
-   blanks beside it. Comments stay, also those beside what goes.
-2. A section goes with the last element in it, and so does the `include` of a file: MuJoCo takes no
-   included file without an element.
+1. An element on lines of its own is removed with these lines; one that shares its line with the
+   blanks before it. Comments stay, also those beside what is removed.
+2. A section is removed with the last element in it, and so is the `include` of a file: MuJoCo takes
+   no included file without an element.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _NUMBER = re.compile(rb"[^\s]+\s*")
 _SECTIONS = frozenset(
     "actuator asset contact default equality keyframe option sensor tendon".split(" ")
 )
-"""What may go when nothing is left in it."""
+"""Elements that are removed when nothing is left in them."""
 
 
 class ModelEdit(Struct, frozen=True, order=True):
@@ -54,50 +54,52 @@ def apply_edits(data: bytes, edits: Iterable[ModelEdit]) -> bytes:
 
 
 def merge_edits(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
-    """The same changes in order: removals that follow each other in one, and none inside of one."""
-    found: list[ModelEdit] = []
-    for edit in sorted(set(edits), key=lambda one: (one.path, one.start, -one.end, one.new)):
-        last = found[-1] if found else None
-        removed = last is not None and last.path == edit.path and not last.new
-        if last is not None and removed and edit.start < last.end and edit.end <= last.end:
+    """The same changes in order; adjoining removals are joined, those inside another dropped."""
+    merged: list[ModelEdit] = []
+    for edit in sorted(set(edits), key=lambda e: (e.path, e.start, -e.end, e.new)):
+        last = merged[-1] if merged else None
+        follows_removal = last is not None and last.path == edit.path and not last.new
+        if last is not None and follows_removal and edit.start < last.end and edit.end <= last.end:
             continue
-        if last is not None and removed and edit.start == last.end and not edit.new:
-            found[-1] = replace(last, end=edit.end)
+        if last is not None and follows_removal and edit.start == last.end and not edit.new:
+            merged[-1] = replace(last, end=edit.end)
         else:
-            found.append(edit)
-    return tuple(found)
+            merged.append(edit)
+    return tuple(merged)
 
 
-def remove(elements: Iterable[Element]) -> tuple[ModelEdit, ...]:
-    """Take elements out of their files, with sections of which nothing is left."""
-    gone = set(elements)
-    waiting = list(gone)
+def remove_elements(elements: Iterable[Element]) -> tuple[ModelEdit, ...]:
+    """Remove elements from their files, with sections that are empty then."""
+    removals = set(elements)
+    queue = list(removals)
     includes: set[Element] = set()
-    while waiting:
-        element = waiting.pop()
+    while queue:
+        element = queue.pop()
         document, parent = element.document, element.parent
-        while document.at is not None and gone.issuperset(document.root.children):
-            includes.add(document.at)
-            document = document.at.document
-        if parent is None or parent in gone or not gone.issuperset(parent.children):
+        while document.include is not None and removals.issuperset(document.root.children):
+            includes.add(document.include)
+            document = document.include.document
+        if parent is None or parent in removals or not removals.issuperset(parent.children):
             continue
-        if _goes_too(parent, includes):
-            gone.add(parent)
-            waiting.append(parent)
+        if _is_left_empty(parent, includes):
+            removals.add(parent)
+            queue.append(parent)
     # A file that nothing includes any more stays as it is.
-    return merge_edits(_removal(o) for o in gone | includes if o.document.at not in includes)
+    return merge_edits(
+        _removal(e) for e in removals | includes if e.document.include not in includes
+    )
 
 
-def _goes_too(section: Element, includes: Collection[Element]) -> bool:
-    """Whether a section holds nothing besides its elements: no attribute, no comment."""
+def _is_left_empty(section: Element, includes: Collection[Element]) -> bool:
+    """Whether a section is empty without its elements: no attribute, no comment."""
     if section.tag not in _SECTIONS or section.attributes:
         return False
-    own = [one for one in section.children if one.document is section.document]
-    inner = [one for one in includes if one.parent is section]
+    children = [element for element in section.children if element.document is section.document]
+    inner = [element for element in includes if element.parent is section]
     data, at, rest = section.document.data, section.head, b""
-    for one in sorted((*own, *inner), key=lambda each: each.start):
-        rest += data[at : one.start]
-        at = one.end
+    for element in sorted((*children, *inner), key=lambda child: child.start):
+        rest += data[at : element.start]
+        at = element.end
     return not (rest + data[at : section.tail]).strip()
 
 
@@ -121,64 +123,66 @@ def set_attributes(element: Element, values: Iterable[tuple[str, str]]) -> tuple
     """Give attributes other values; write those that are not there behind the last."""
     path = element.document.path
     edits: list[ModelEdit] = []
-    new = ""
+    addition = ""
     for name, value in values:
-        there = element.attribute(name)
-        if there is not None:
-            edits.append(ModelEdit(path, *there.inner, value.encode()))
+        attribute = element.attribute(name)
+        if attribute is not None:
+            edits.append(ModelEdit(path, *attribute.inner, value.encode()))
         else:
-            new += f' {name}="{value}"'
-    if new:
+            addition += f' {name}="{value}"'
+    if addition:
         tag = element.start + 1 + len(element.tag.encode())
         at = max([a.end for a in element.attributes], default=tag)
-        edits.append(ModelEdit(path, at, at, new.encode()))
+        edits.append(ModelEdit(path, at, at, addition.encode()))
     return tuple(edits)
 
 
-def emptied(drops: Collection[tuple[Element, str]], edits: Collection[ModelEdit]) -> list[Element]:
-    """Elements of which nothing is left without these attributes; not those in which edits are."""
+def find_emptied(
+    drops: Collection[tuple[Element, str]], edits: Collection[ModelEdit]
+) -> list[Element]:
+    """Elements that have nothing left without these attributes, and no edit inside."""
     return [
         element
         for element in dict.fromkeys(element for element, _ in drops)
         if not element.children
-        and all((element, one.name) in drops for one in element.attributes)
+        and all((element, attribute.name) in drops for attribute in element.attributes)
         and not any(
-            one.path == element.document.path and element.start < one.start < element.end
-            for one in edits
+            edit.path == element.document.path and element.start < edit.start < element.end
+            for edit in edits
         )
     ]
 
 
 def drop_attribute(element: Element, name: str) -> ModelEdit:
-    """Take out an attribute with the blanks before it."""
-    there = element.attribute(name)
-    assert there is not None, name
-    start = len(element.document.data[: there.start].rstrip())
-    return ModelEdit(element.document.path, start, there.end, b"")
+    """Remove an attribute with the blanks before it."""
+    attribute = element.attribute(name)
+    assert attribute is not None, name
+    start = len(element.document.data[: attribute.start].rstrip())
+    return ModelEdit(element.document.path, start, attribute.end, b"")
 
 
 def drop_numbers(element: Element, name: str, places: Collection[int]) -> tuple[ModelEdit, ...]:
-    """Take numbers (from 0) out of an attribute that lists some; nothing where it has fewer."""
-    there = element.attribute(name)
-    if there is None or not places:
+    """Remove the numbers at these places (from 0) from an attribute that is a list."""
+    attribute = element.attribute(name)
+    if attribute is None or not places:
         return ()
-    start, end = there.inner
+    start, end = attribute.inner
     numbers = [match.group() for match in _NUMBER.finditer(element.document.data[start:end])]
-    left = [number for place, number in enumerate(numbers) if place not in places]
-    if len(left) == len(numbers):
+    rest = [number for place, number in enumerate(numbers) if place not in places]
+    if len(rest) == len(numbers):
         return ()
-    if not left:
+    if not rest:
         return (drop_attribute(element, name),)
-    return (ModelEdit(element.document.path, start, end, b"".join(left).rstrip()),)
+    return (ModelEdit(element.document.path, start, end, b"".join(rest).rstrip()),)
 
 
 def set_option(main: Markup, tag: str, name: str, value: str) -> tuple[ModelEdit, ...]:
     """Set an attribute of `option`, or of its `flag`, where it stands or in a new element."""
-    holders = [one for one in main.root.walk() if one.tag == tag]
-    having = [one for one in holders if one.attribute(name) is not None]
-    own = having or [one for one in holders if one.document is main]
-    if own:
-        return set_attributes(own[-1], ((name, value),))
+    holders = [element for element in main.root.walk() if element.tag == tag]
+    carriers = [element for element in holders if element.attribute(name) is not None]
+    choices = carriers or [element for element in holders if element.document is main]
+    if choices:
+        return set_attributes(choices[-1], ((name, value),))
     new = f'<{tag} {name}="{value}"/>'
     if tag == "flag":
         new = f"<option>{new}</option>"

@@ -1,4 +1,4 @@
-"""Which coordinates of a model are left in a changed one, and states brought from one to the other.
+"""Which coordinates of a model a pruned variant still has, and the transfer of states to it.
 
 Entry points: `IndexMap`, `index_map`, `transfer`.
 """
@@ -17,11 +17,11 @@ from coursebuild.numerics.engine import STATE, full_state
 
 Places: TypeAlias = NDArray[np.int64]
 IndexMap: TypeAlias = Mapping[str, Places]
-"""For each entry of the changed model the place that it has in the whole one, by the field with
-their number, such as `nq`."""
+"""For each entry of the variant its place in the whole model, by the field with their number, such
+as `nq`."""
 
 _WIDTHS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
-"""Positions of a joint that has several."""
+"""The number of positions of joints that have several."""
 _STATE = {
     "qpos": "nq",
     "qvel": "nv",
@@ -33,7 +33,7 @@ _STATE = {
     "mocap_pos": "nmocap",
     "mocap_quat": "nmocap",
 }
-"""Parts of a state, and what they are numbered by."""
+"""Parts of a state, with the field of their length."""
 _KEYS = {"key_qpos": "nq", "key_qvel": "nv", "key_act": "na", "key_ctrl": "nu"}
 
 
@@ -41,24 +41,24 @@ class Removal(Struct, frozen=True):
     """What a change takes out of a compiled model, by number."""
 
     bodies: frozenset[int] = frozenset()
-    """With all that hangs on them."""
+    """Their descendants go too."""
     geoms: frozenset[int] = frozenset()
     sensors: frozenset[int] = frozenset()
     actuators: frozenset[int] = frozenset()
 
 
-def index_map(model: Any, gone: Removal) -> IndexMap:
-    """What is left of a model."""
-    bodies = set(gone.bodies)
+def index_map(model: Any, removal: Removal) -> IndexMap:
+    """The places in a model that are left after a removal."""
+    bodies = set(removal.bodies)
     for number in range(1, model.nbody):  # parents come first
         if int(model.body_parentid[number]) in bodies:
             bodies.add(number)
     body = np.setdiff1d(np.arange(model.nbody), [*bodies])
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
-    ctrl = np.setdiff1d(np.arange(model.nu), [*gone.actuators])
-    sensors = np.setdiff1d(np.arange(model.nsensor), [*gone.sensors])
-    geoms = np.setdiff1d(np.arange(model.ngeom), [*gone.geoms])
+    ctrl = np.setdiff1d(np.arange(model.nu), [*removal.actuators])
+    sensors = np.setdiff1d(np.arange(model.nsensor), [*removal.sensors])
+    geoms = np.setdiff1d(np.arange(model.ngeom), [*removal.geoms])
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),
@@ -74,16 +74,16 @@ def index_map(model: Any, gone: Removal) -> IndexMap:
 
 def _ranges(starts: Any, counts: Any) -> Places:
     """Ranges of places one after the other; one that begins before 0 is empty."""
-    found = [
+    places = [
         place
         for start, count in zip(starts, counts, strict=True)
         for place in (range(start, start + count) if start >= 0 else ())
     ]
-    return np.array(found, dtype=np.int64)
+    return np.array(places, dtype=np.int64)
 
 
 def fits(index: IndexMap, whole: Any, model: Any) -> bool:
-    """Whether a changed model has just what should be left of the whole one, in keyframes too."""
+    """Whether a variant has exactly what should be left of the whole model, in keyframes too."""
     if any(getattr(model, size) != len(places) for size, places in index.items()):
         return False
     return model.nkey != whole.nkey or all(
@@ -92,23 +92,23 @@ def fits(index: IndexMap, whole: Any, model: Any) -> bool:
     )
 
 
-def transfer(model: Any, data: Any, index: IndexMap, other: Any, into: Any) -> None:
-    """Bring a state of the whole model into data of the changed one, `other`.
+def transfer(model: Any, data: Any, index: IndexMap, variant: Any, variant_data: Any) -> None:
+    """Bring a state of the whole model into the data of a variant.
 
     Raises:
-        ValueError: a part of it (of a plugin, of a delay) cannot be told apart.
+        ValueError: a part of the state (of a plugin, of a delay) cannot be assigned.
     """
-    same = all(getattr(model, size) == getattr(other, size) for size in (*index, "neq"))
-    if same and mujoco.mj_stateSize(model, STATE) == mujoco.mj_stateSize(other, STATE):
-        mujoco.mj_setState(other, into, full_state(model, data), STATE)
+    is_same_size = all(getattr(model, size) == getattr(variant, size) for size in (*index, "neq"))
+    if is_same_size and mujoco.mj_stateSize(model, STATE) == mujoco.mj_stateSize(variant, STATE):
+        mujoco.mj_setState(variant, variant_data, full_state(model, data), STATE)
         return
-    delays = mujoco.mj_stateSize(other, int(mujoco.mjtState.mjSTATE_HISTORY))
-    if other.npluginstate or delays:
+    delays = mujoco.mj_stateSize(variant, int(mujoco.mjtState.mjSTATE_HISTORY))
+    if variant.npluginstate or delays:
         raise ValueError("its plugins or delays have states that cannot be told apart")
-    if other.neq != model.neq:
+    if variant.neq != model.neq:
         raise ValueError("it has other equalities")
-    into.time = data.time
+    variant_data.time = data.time
     for name, size in _STATE.items():
-        getattr(into, name)[:] = getattr(data, name)[index[size]]
-    into.eq_active[:] = data.eq_active
-    into.userdata[:] = data.userdata
+        getattr(variant_data, name)[:] = getattr(data, name)[index[size]]
+    variant_data.eq_active[:] = data.eq_active
+    variant_data.userdata[:] = data.userdata

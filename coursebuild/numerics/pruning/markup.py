@@ -2,8 +2,8 @@
 
 Entry points: `Markup`, `Element`, `parse_markup(path, data)`, `splice`; `place_of`.
 
-1. The standard library's parser tells at which byte an element begins and ends; attributes are then
-   looked up in its tag. Whatever the file declares, it is read as UTF-8, as MuJoCo does.
+1. The standard library's parser gives the bytes at which an element begins and ends; attributes are
+   then looked up in its tag. Whatever the file declares, it is read as UTF-8, as MuJoCo does.
 2. Nothing is normalised: an edit made by these places leaves all other bytes as they are.
 3. MuJoCo's own parser takes some texts that are no XML. These are refused, with the place.
 """
@@ -49,7 +49,7 @@ class Element(Struct, eq=False):
     document: Markup
     tag: str
     parent: Element | None
-    """Around it, also where it is in a file included there."""
+    """Also where the element comes from a file that is included in the parent."""
     attributes: tuple[Attribute, ...]
     start: int
     head: int
@@ -62,21 +62,21 @@ class Element(Struct, eq=False):
 
     def get(self, name: str) -> str | None:
         """The value of an attribute."""
-        one = self.attribute(name)
-        return None if one is None else one.value
+        attribute = self.attribute(name)
+        return None if attribute is None else attribute.value
 
     def attribute(self, name: str) -> Attribute | None:
         """The attribute of this name."""
-        return next((one for one in self.attributes if one.name == name), None)
+        return next((attribute for attribute in self.attributes if attribute.name == name), None)
 
     def walk(self) -> Iterator[Element]:
-        """It and all below it, in the order in which MuJoCo meets them."""
+        """This element and its descendants, in the order in which MuJoCo meets them."""
         yield self
         for child in self.children:
             yield from child.walk()
 
-    def above(self) -> Iterator[Element]:
-        """The elements that it lies in, from the nearest on."""
+    def ancestors(self) -> Iterator[Element]:
+        """The elements around this one, the nearest first."""
         element = self.parent
         while element is not None:
             yield element
@@ -84,13 +84,13 @@ class Element(Struct, eq=False):
 
 
 class Markup:
-    """A file."""
+    """A file of MJCF and its elements."""
 
     def __init__(self, path: str, data: bytes) -> None:
         self.path = path
         self.data = data
         self.root: Element
-        self.at: Element | None = None
+        self.include: Element | None = None
         """The `include` that pulls it in; `None` for a model's own file."""
         self.included: list[Markup] = []
 
@@ -102,29 +102,29 @@ class Markup:
 
 
 def parse_markup(path: str, data: bytes) -> Markup:
-    """A file's elements; includes are not followed.
+    """Parse a file; includes are not followed.
 
     Raises:
         MarkupError: it is no XML, or declares entities of its own.
     """
     document = Markup(path, data)
-    opened: list[Element] = []
+    stack: list[Element] = []
     parser = expat.ParserCreate("utf-8")
     parser.ordered_attributes = True
 
-    def start(tag: str, given: list[str]) -> None:
+    def start(tag: str, pairs: list[str]) -> None:
         begin = parser.CurrentByteIndex
-        found, at = _attributes(data, begin, given)
-        parent = opened[-1] if opened else None
-        element = Element(document, tag, parent, found, begin, data.index(b">", at) + 1)
+        attributes, at = _attributes(data, begin, pairs)
+        parent = stack[-1] if stack else None
+        element = Element(document, tag, parent, attributes, begin, data.index(b">", at) + 1)
         if parent is None:
             document.root = element
         else:
             parent.children.append(element)
-        opened.append(element)
+        stack.append(element)
 
     def end(_: str) -> None:
-        element = opened.pop()
+        element = stack.pop()
         if data[element.head - 2 : element.head] == b"/>":
             element.tail = element.end = element.head
         else:
@@ -145,24 +145,24 @@ def parse_markup(path: str, data: bytes) -> Markup:
     return document
 
 
-def _attributes(data: bytes, start: int, given: list[str]) -> tuple[tuple[Attribute, ...], int]:
+def _attributes(data: bytes, start: int, pairs: list[str]) -> tuple[tuple[Attribute, ...], int]:
     """The attributes of a start tag, and where the last of them ends."""
     name = _NAME.match(data, start)
     assert name is not None
-    at, found = name.end(), []
-    for key, value in zip(given[::2], given[1::2], strict=True):
+    at, attributes = name.end(), []
+    for key, value in zip(pairs[::2], pairs[1::2], strict=True):
         match = _ATTRIBUTE.search(data, at)
         assert match is not None
         at = match.end()
-        found.append(Attribute(key, value, match.start(), at, (match.start(2) + 1, at - 1)))
-    return tuple(found), at
+        attributes.append(Attribute(key, value, match.start(), at, (match.start(2) + 1, at - 1)))
+    return tuple(attributes), at
 
 
 def splice(include: Element, inner: Markup) -> None:
-    """Put what a file holds in place of the `include` that pulls it in."""
+    """Put the elements of a file in place of the `include` that pulls it in."""
     parent = include.parent
     assert parent is not None
-    inner.at = include
+    inner.include = include
     include.document.included.append(inner)
     for child in inner.root.children:
         child.parent = parent
@@ -171,17 +171,17 @@ def splice(include: Element, inner: Markup) -> None:
 
 
 def place_of(element: Element) -> str:
-    """The way to an element from the root, with names, and numbers where there is none."""
+    """The path of an element from the root, with names, or numbers where they have none."""
     parts: list[str] = []
-    for here in (element, *element.above()):
-        key = "class" if here.tag == "default" else "name"
-        name = here.get("name") or (here.get("class") if here.tag == "default" else None)
-        part = here.tag
+    for node in (element, *element.ancestors()):
+        key = "class" if node.tag == "default" else "name"
+        name = node.get("name") or (node.get("class") if node.tag == "default" else None)
+        part = node.tag
         if name:
             part += f'[@{key}="{name}"]'
-        elif here.parent is not None:
-            alike = [one for one in here.parent.children if one.tag == here.tag]
-            if len(alike) > 1:
-                part += f"[{alike.index(here) + 1}]"
+        elif node.parent is not None:
+            siblings = [child for child in node.parent.children if child.tag == node.tag]
+            if len(siblings) > 1:
+                part += f"[{siblings.index(node) + 1}]"
         parts.append(part)
     return "/".join(reversed(parts))

@@ -1,12 +1,12 @@
-"""A model as its files and as what MuJoCo makes of them.
+"""A model as its files and as what MuJoCo compiles from them.
 
-Entry point: `open_model`; then `ModelText.compiled(edits)`, `ModelText.elements`, `ModelText.ids`.
+Entry point: `open_model`; then `ModelText.compile(edits)`, `ModelText.elements`, `ModelText.ids`.
 
 1. Files that the model includes are found where MuJoCo finds them, and read as markup.
-2. To compile a change, all files are put together to one text. That this is the same model is
-   checked byte by byte on the unchanged one.
-3. Which bodies, geoms, … an element became is found by names: those without one are given one, and
-   the model is compiled once more. An element that is repeated became several.
+2. To compile a change, all files are joined to one text. That this gives the same model is checked
+   byte by byte on the unchanged files.
+3. The bodies, geoms, … of an element are found by name: elements without a name get one, and the
+   model is compiled once more. An element that is repeated becomes several things.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from coursebuild.numerics.pruning.markup import Element, Markup, parse_markup, s
 _DEEPEST = 32
 
 Read = Callable[[str], bytes | None]
-"""The bytes of a file by its path from the course's root; nothing where it is not there."""
+"""A path from the course's root → the bytes of the file; `None` where there is none."""
 Compile = Callable[[bytes], Any]
-"""A text, as if it stood where the model's file stands, to a `mjModel`; ValueError if it cannot."""
+"""A text in place of the model's file → its `mjModel`; ValueError if it does not compile."""
 
 
 class ModelTextError(Exception):
-    """A model that the diet cannot work on; the text says why."""
+    """The diet cannot work on a model; the message says why."""
 
 
 KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
@@ -44,7 +44,7 @@ KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
     "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
     "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
 }
-"""Kinds of things that elements become: MuJoCo's number for them, and where it counts them."""
+"""Kinds of things that elements become: MuJoCo's type, and the field with their number."""
 _IN_BODIES = {"body": "body", "joint": "joint", "freejoint": "joint", "geom": "geom"}
 _IN_BODIES |= {"site": "site"}
 _HOLDERS = frozenset(("worldbody", "body", "frame", "replicate"))
@@ -68,51 +68,51 @@ class ModelText:
         self.elements: tuple[Element, ...] = tuple(main.root.walk())
         """All of them, in the order in which MuJoCo meets them."""
         self._compile = compile
-        self.model: Any = self._checked() if check else self.compiled()
-        self._things = self._named()
+        self.model: Any = self._compile_checked() if check else self.compile()
+        self._things = self._name_things()
 
-    def compiled(self, edits: Iterable[ModelEdit] = ()) -> Any:
+    def compile(self, edits: Iterable[ModelEdit] = ()) -> Any:
         """A `mjModel` of the files with these changes.
 
         Raises:
             ValueError: MuJoCo does not take it, or the changes contradict each other.
         """
-        return self._compile(_whole(self.main, _by_path(edits)))
+        return self._compile(_join_files(self.main, _group_by_path(edits)))
 
     def files(self, edits: Iterable[ModelEdit]) -> dict[str, bytes]:
         """The new bytes of each file that these edits change."""
         data = {document.path: document.data for document in self.documents}
-        return {path: apply_edits(data[path], some) for path, some in _by_path(edits).items()}
+        return {path: apply_edits(data[path], some) for path, some in _group_by_path(edits).items()}
 
     def ids(self, element: Element) -> Thing | None:
-        """What an element becomes; `None` where that is not known."""
+        """The thing that an element becomes; `None` where that is not known."""
         return self._things.get(element)
 
     def things(self, kind: str) -> Iterator[tuple[Element, tuple[int, ...]]]:
-        """Elements of a kind, with the numbers of what they become."""
+        """The elements of a kind, with the numbers of the things that they become."""
         for element, thing in self._things.items():
             if thing.kind == kind:
                 yield element, thing.ids
 
     def ids_of(self, elements: Iterable[Element], kind: str) -> frozenset[int]:
-        """The numbers of one kind that elements become."""
+        """The numbers of the things of one kind that elements become."""
         things = (self.ids(element) for element in elements)
-        return frozenset(i for one in things if one and one.kind == kind for i in one.ids)
+        return frozenset(i for thing in things if thing and thing.kind == kind for i in thing.ids)
 
-    def _checked(self) -> Any:
+    def _compile_checked(self) -> Any:
         model = self._compile(self.main.data)
         if self.main.included:
             try:
-                same = model_bytes(self.compiled()) == model_bytes(model)
+                is_same = model_bytes(self.compile()) == model_bytes(model)
             except ValueError:
-                same = False
-            if not same:
+                is_same = False
+            if not is_same:
                 raise ModelTextError("what it includes cannot be put into one text")
         return model
 
-    def _named(self) -> dict[Element, Thing]:
-        """What each element becomes; nothing where names cannot be given."""
-        wanted: dict[Element, tuple[str, str]] = {}
+    def _name_things(self) -> dict[Element, Thing]:
+        """The thing that each element becomes; empty where names cannot be given."""
+        names_by_element: dict[Element, tuple[str, str]] = {}
         edits: list[ModelEdit] = []
         for number, element in enumerate(self.elements):
             kind = thing_kind(element)
@@ -121,12 +121,12 @@ class ModelText:
             name = element.get("name")
             if not name:
                 name = f"diet_{number}_"
-                while any(name.encode() in one.data for one in self.documents):
+                while any(name.encode() in document.data for document in self.documents):
                     name += "_"
                 edits += set_attributes(element, (("name", name),))
-            wanted[element] = kind, name
+            names_by_element[element] = kind, name
         try:
-            model = self.compiled(edits) if edits else self.model
+            model = self.compile(edits) if edits else self.model
         except ValueError:
             return {}
         if any(getattr(model, size) != getattr(self.model, size) for _, size in KINDS.values()):
@@ -135,7 +135,7 @@ class ModelText:
             kind: [mujoco.mj_id2name(model, code, i) or "" for i in range(getattr(model, size))]
             for kind, (code, size) in KINDS.items()
         }
-        return _assigned(wanted, names)
+        return _assign_things(names_by_element, names)
 
 
 def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -> ModelText:
@@ -145,7 +145,8 @@ def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -
         path: the model's file, POSIX, from the course's root.
         read: gives the bytes of such a file.
         compile: gives the `mjModel` of a text that would stand there.
-        check: whether its files are those that MuJoCo would include, so that this can be checked.
+        check: whether to verify that the joined files give the same model; not possible where
+            MuJoCo would include other files.
 
     Raises:
         MarkupError: one of the files is no XML.
@@ -158,25 +159,25 @@ def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -
     main = parse_markup(path, data)
     if main.root.tag != "mujoco":
         raise ModelTextError(f"its root is <{main.root.tag}>: it is no model of its own")
-    _include(main, posixpath.dirname(path), read, 0)
+    _splice_includes(main, posixpath.dirname(path), read, 0)
     return ModelText(main, compile, check=check)
 
 
-def _include(document: Markup, folder: str, read: Read, depth: int) -> None:
+def _splice_includes(document: Markup, folder: str, read: Read, depth: int) -> None:
     """Splice in the files that a file includes, from its folder or the model's."""
     for element in list(document.root.walk()):
         if element.tag != "include":
             continue
         file = element.get("file") or ""
-        here = posixpath.dirname(document.path)
-        paths = [posixpath.normpath(posixpath.join(base, file)) for base in (folder, here)]
-        path = next((one for one in paths if read(one) is not None), None)
+        own_folder = posixpath.dirname(document.path)
+        paths = [posixpath.normpath(posixpath.join(base, file)) for base in (folder, own_folder)]
+        path = next((candidate for candidate in paths if read(candidate) is not None), None)
         if path is None:
             raise ModelTextError(f"it includes {file}, which is not in the course")
         if depth >= _DEEPEST:
             raise ModelTextError("its includes are nested too deeply")
         inner = parse_markup(path, read(path) or b"")
-        _include(inner, folder, read, depth + 1)
+        _splice_includes(inner, folder, read, depth + 1)
         splice(element, inner)
 
 
@@ -186,23 +187,23 @@ def _with_included(document: Markup) -> Iterator[Markup]:
         yield from _with_included(inner)
 
 
-def _by_path(edits: Iterable[ModelEdit]) -> dict[str, list[ModelEdit]]:
-    found: dict[str, list[ModelEdit]] = {}
+def _group_by_path(edits: Iterable[ModelEdit]) -> dict[str, list[ModelEdit]]:
+    edits_by_path: dict[str, list[ModelEdit]] = {}
     for edit in edits:
-        found.setdefault(edit.path, []).append(edit)
-    return found
+        edits_by_path.setdefault(edit.path, []).append(edit)
+    return edits_by_path
 
 
-def _whole(document: Markup, edits: Mapping[str, Sequence[ModelEdit]]) -> bytes:
-    """A file with edits, and in place of its includes what these hold."""
-    own = list(edits.get(document.path, ()))
+def _join_files(document: Markup, edits: Mapping[str, Sequence[ModelEdit]]) -> bytes:
+    """The bytes of a file with edits, its includes replaced by their content."""
+    file_edits = list(edits.get(document.path, ()))
     for inner in document.included:
-        include = inner.at
+        include = inner.include
         assert include is not None
-        root = parse_markup(inner.path, text := _whole(inner, edits)).root
-        held = text[root.head : root.tail]
-        own.append(ModelEdit(document.path, include.start, include.end, held))
-    return apply_edits(document.data, own)
+        root = parse_markup(inner.path, text := _join_files(inner, edits)).root
+        content = text[root.head : root.tail]
+        file_edits.append(ModelEdit(document.path, include.start, include.end, content))
+    return apply_edits(document.data, file_edits)
 
 
 def model_bytes(model: Any) -> bytes:
@@ -219,34 +220,36 @@ def section_of(element: Element) -> str:
 
 
 def thing_kind(element: Element) -> str | None:
-    """What kind of thing an element becomes; `None` for others, and for templates of things."""
+    """The kind of thing that an element becomes; `None` for others, and for templates of things."""
     section = section_of(element)
     if section in _SECTIONS:
         return section
-    held = element.parent is not None and element.parent.tag in _HOLDERS
-    return _IN_BODIES.get(element.tag) if held else None
+    is_in_holder = element.parent is not None and element.parent.tag in _HOLDERS
+    return _IN_BODIES.get(element.tag) if is_in_holder else None
 
 
-def _assigned(
-    wanted: Mapping[Element, tuple[str, str]], names: Mapping[str, Sequence[str]]
+def _assign_things(
+    names_by_element: Mapping[Element, tuple[str, str]], names: Mapping[str, Sequence[str]]
 ) -> dict[Element, Thing]:
-    """Elements by the names of what they became; nothing for those whose names two may mean."""
-    found: dict[Element, Thing] = {}
-    taken: dict[tuple[str, int], list[Element]] = {}
-    places = {kind: {name: i for i, name in enumerate(all)} for kind, all in names.items()}
-    for element, (kind, name) in wanted.items():
+    """Find the things of elements by their names; elements that may mean the same one get none."""
+    things: dict[Element, Thing] = {}
+    owners: dict[tuple[str, int], list[Element]] = {}
+    places = {kind: {name: i for i, name in enumerate(of_kind)} for kind, of_kind in names.items()}
+    for element, (kind, name) in names_by_element.items():
         ids: tuple[int, ...]
-        if any(one.tag == "replicate" for one in element.above()):
+        if any(node.tag == "replicate" for node in element.ancestors()):
             shape = re.compile(re.escape(name) + r".*\d", re.DOTALL)
-            ids = tuple(i for i, one in enumerate(names[kind]) if shape.fullmatch(one))
+            ids = tuple(
+                i for i, known_name in enumerate(names[kind]) if shape.fullmatch(known_name)
+            )
         else:
             ids = (places[kind][name],) if name in places[kind] else ()
         if ids:
-            found[element] = Thing(kind, ids)
+            things[element] = Thing(kind, ids)
             for number in ids:
-                taken.setdefault((kind, number), []).append(element)
-    for elements in taken.values():
+                owners.setdefault((kind, number), []).append(element)
+    for elements in owners.values():
         if len(elements) > 1:
             for element in elements:
-                found.pop(element, None)
-    return found
+                things.pop(element, None)
+    return things

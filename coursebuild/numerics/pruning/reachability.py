@@ -1,15 +1,15 @@
-"""Where geoms can get, whatever happens: a bound, not an observation.
+"""Which geoms can never touch, whatever happens: a bound, not an observation.
 
-Entry points: `possible_pairs(model)`, `each_pair(model)`, `separate(model, pairs)`; `PREMISES`,
-the fields that the bound rests on.
+Entry points: `possible_pairs(model)`, `iterate_pairs(model)`, `find_separate(model, pairs)`;
+`PREMISES`, the fields that the bound rests on.
 
 1. MuJoCo looks for contact between geoms whose masks allow it, but not within a body, nor between
    bodies that are welded to each other or do not move, between parent and child, or where an
    `exclude` says so; and it does between those of a `pair`. This is repeated here.
-2. Two geoms are seen from the nearest body that carries both. Down from it, a point can be no
-   farther from the anchor of the first joint than the sum of the distances from anchor to anchor,
-   whatever angles the joints take; limits are not relied on, as they are soft. After one joint only
-   it cannot be nearer either.
+2. Two geoms are compared in the frame of the nearest body that carries both. A point below it can
+   be no farther from the anchor of the first joint than the sum of the distances from anchor to
+   anchor, whatever angles the joints take; limits do not count, as they are soft. After a single
+   joint it cannot be nearer either.
 3. A free body, a slide and a mocap body can be anywhere.
 """
 
@@ -38,29 +38,29 @@ PREMISES = frozenset(
     " jnt_pos jnt_axis pair_geom1 pair_geom2 pair_margin pair_gap exclude_signature mesh_vert"
     " hfield_data hfield_size qpos0 qpos_spring disableflags o_margin".split(" ")
 )
-"""Fields of a model: where one of them is changed, geoms may get elsewhere."""
+"""Fields of a model that the bound depends on: where code may change one, it does not hold."""
 
 Pair = tuple[int, int]
 Vector = NDArray[np.float64]
 
 
 def possible_pairs(model: Any) -> frozenset[Pair]:
-    """Pairs of geoms between which MuJoCo would look for contact, were they near each other."""
-    return frozenset(each_pair(model))
+    """The pairs of geoms between which MuJoCo looks for contact when they are near each other."""
+    return frozenset(iterate_pairs(model))
 
 
-def each_pair(model: Any) -> Iterator[Pair]:
-    """The same one after the other, as there may be many; some twice."""
+def iterate_pairs(model: Any) -> Iterator[Pair]:
+    """The same pairs one after the other, as there may be many; some come twice."""
     flags = int(model.opt.disableflags)
     off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     if flags & int(off):
         return
     for first, second in zip(model.pair_geom1, model.pair_geom2, strict=True):
-        yield _ordered(int(first), int(second))
+        yield _sort_pair(int(first), int(second))
     parents = not flags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
-    excluded = {int(one) for one in model.exclude_signature}
+    excluded = {int(weld_a) for weld_a in model.exclude_signature}
     weld = model.body_weldid
-    above = weld[model.body_parentid[weld]]
+    weld_parents = weld[model.body_parentid[weld]]
     moves = [False] * model.nbody
     for number in range(1, model.nbody):
         has_joint = bool(model.body_dofnum[number])
@@ -70,10 +70,15 @@ def each_pair(model: Any) -> Iterator[Pair]:
     for a in range(model.ngeom):
         match = ((kind[a] & affinity[a + 1 :]) | (kind[a + 1 :] & affinity[a])) != 0
         for b in (np.nonzero(match)[0] + a + 1).tolist():
-            one, two = int(weld[body[a]]), int(weld[body[b]])
-            if one == two or not (moves[one] or moves[two]):
+            weld_a, weld_b = int(weld[body[a]]), int(weld[body[b]])
+            if weld_a == weld_b or not (moves[weld_a] or moves[weld_b]):
                 continue
-            if parents and one and two and (above[one] == two or above[two] == one):
+            if (
+                parents
+                and weld_a
+                and weld_b
+                and (weld_parents[weld_a] == weld_b or weld_parents[weld_b] == weld_a)
+            ):
                 continue
             low, high = sorted((int(body[a]), int(body[b])))
             if (low << 16) + high in excluded or (high << 16) + low in excluded:
@@ -81,7 +86,7 @@ def each_pair(model: Any) -> Iterator[Pair]:
             yield a, b
 
 
-def _ordered(a: int, b: int) -> Pair:
+def _sort_pair(a: int, b: int) -> Pair:
     return (a, b) if a < b else (b, a)
 
 
@@ -94,38 +99,38 @@ class Shell(Struct, frozen=True, eq=False):
 
 
 class Reach:
-    """Bounds for a model, worked out in its own state."""
+    """The bounds of a model's geoms, computed in its own state."""
 
     def __init__(self, model: Any) -> None:
         self._model = model
         self._data = data = mujoco.MjData(model)
         data.qpos[:] = model.qpos0
         mujoco.mj_kinematics(model, data)
-        self._above = [self._line(b) for b in range(model.nbody)]
+        self._ancestries = [self._ancestry(b) for b in range(model.nbody)]
         self._shells: dict[Pair, Shell | None] = {}
         self._pair_margin = float(np.max(model.pair_margin, initial=0.0))
 
-    def _line(self, body: int) -> list[int]:
-        """A body and those above it, up to the world."""
-        found = [body]
+    def _ancestry(self, body: int) -> list[int]:
+        """A body and its ancestors, up to the world."""
+        bodies = [body]
         while body:
             body = int(self._model.body_parentid[body])
-            found.append(body)
-        return found
+            bodies.append(body)
+        return bodies
 
-    def separate(self, a: int, b: int) -> bool:
+    def are_separate(self, a: int, b: int) -> bool:
         """Whether two geoms can never touch."""
         model = self._model
-        one, two = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
-        others = set(self._above[two])
-        common = next(body for body in self._above[one] if body in others)
+        body_a, body_b = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
+        ancestors = set(self._ancestries[body_b])
+        common = next(body for body in self._ancestries[body_a] if body in ancestors)
         margin = float(model.geom_margin[a] + model.geom_margin[b]) + self._pair_margin
         gap = margin + _SLACK * (1.0 + margin)
         first, second = self.shell(a, common), self.shell(b, common)
         if first is None or second is None:
             return False
         if _PLANE in (model.geom_type[a], model.geom_type[b]):
-            return self._from_plane(a, b, first, second, gap)
+            return self._stays_off_plane(a, b, first, second, gap)
         if not (self._has_size(a) and self._has_size(b)):
             return False
         distance = float(np.linalg.norm(first.centre - second.centre))
@@ -139,31 +144,31 @@ class Reach:
     def _has_size(self, geom: int) -> bool:
         return float(self._model.geom_rbound[geom]) > 0
 
-    def _from_plane(self, a: int, b: int, first: Shell, second: Shell, gap: float) -> bool:
-        """Whether something stays in front of a plane that does not move against `common`."""
+    def _stays_off_plane(self, a: int, b: int, first: Shell, second: Shell, gap: float) -> bool:
+        """Whether a geom stays in front of a plane that is fixed to the common body."""
         model = self._model
         if model.geom_type[a] == model.geom_type[b]:
             return True  # planes do not touch each other
-        plane, other, place = b, first, second
+        plane, shell, plane_shell = b, first, second
         if model.geom_type[a] == _PLANE:
-            plane, other, place = a, second, first
-        if place.most > 0 or not self._has_size(b if plane == a else a):
+            plane, shell, plane_shell = a, second, first
+        if plane_shell.most > 0 or not self._has_size(b if plane == a else a):
             return False
         if not self._is_fixed(int(model.geom_bodyid[plane])):
             # Its normal is known in the world only; a plane that moves is left out.
             return False
         normal = self._data.geom_xmat[plane].reshape(3, 3)[:, 2]
-        height = float(normal @ (other.centre - self._data.geom_xpos[plane]))
-        return height > other.most + gap + _SLACK * (abs(height) + other.most)
+        height = float(normal @ (shell.centre - self._data.geom_xpos[plane]))
+        return height > shell.most + gap + _SLACK * (abs(height) + shell.most)
 
     def _is_fixed(self, body: int) -> bool:
-        model, above = self._model, self._above[body]
-        return int(model.body_weldid[body]) == 0 and not np.any(model.body_mocapid[above] >= 0)
+        model, ancestors = self._model, self._ancestries[body]
+        return int(model.body_weldid[body]) == 0 and not np.any(model.body_mocapid[ancestors] >= 0)
 
     def shell(self, geom: int, common: int) -> Shell | None:
-        """Where a geom can be, seen from a body that carries it, in world axes of `qpos0`.
+        """The shell in which a geom stays, relative to a body that carries it, in axes of `qpos0`.
 
-        A plane counts as a point. `None`: anywhere.
+        A plane counts as a point. `None`: it can be anywhere.
         """
         if (geom, common) not in self._shells:
             self._shells[geom, common] = self._shell(geom, common)
@@ -172,7 +177,7 @@ class Reach:
     def _shell(self, geom: int, common: int) -> Shell | None:
         model, data = self._model, self._data
         point = np.asarray(data.geom_xpos[geom], dtype=np.float64)
-        line = self._above[int(model.geom_bodyid[geom])]
+        line = self._ancestries[int(model.geom_bodyid[geom])]
         size = 0.0 if model.geom_type[geom] == _PLANE else self._radius(geom)
         anchors: list[Vector] = []
         for body in reversed(line[: line.index(common)]):
@@ -190,7 +195,7 @@ class Reach:
         return Shell(anchors[0], least, sum(legs) + size)
 
     def _radius(self, geom: int) -> float:
-        """About the geom's own place; a mesh or field may lie beside it."""
+        """The radius of a geom about its own position; a mesh or field may lie beside it."""
         model = self._model
         radius, box = float(model.geom_rbound[geom]), model.geom_aabb[geom]
         if model.geom_type[geom] == _HFIELD:
@@ -198,7 +203,7 @@ class Reach:
         return max(radius, float(np.linalg.norm(np.abs(box[:3]) + box[3:])))
 
 
-def separate(model: Any, pairs: Iterable[Pair]) -> frozenset[Pair]:
-    """Those pairs of geoms that can never touch."""
+def find_separate(model: Any, pairs: Iterable[Pair]) -> frozenset[Pair]:
+    """The pairs of geoms, of these, that can never touch."""
     reach = Reach(model)
-    return frozenset(pair for pair in pairs if reach.separate(*pair))
+    return frozenset(pair for pair in pairs if reach.are_separate(*pair))

@@ -1,15 +1,15 @@
 """What code may notice of a model: what cannot be ruled out counts as a use.
 
-Entry points: `read_code(path, text, own)`, `Reader`.
+Entry points: `read_code(path, text, course_modules)`, `Reader`.
 
-1. Nobody's code is understood: it is words. A thing is used where code has its name as a text, a
-   field where its name stands anywhere, and any thing of a kind where code has the word by which
-   one is asked for, unless a complete name follows: `model.sensor("tip")`.
-2. Code that could get at a field without naming it may use everything: by reflection, by a module
+1. Code is not interpreted, only searched for words. A thing counts as used where code has its name
+   as a text, a field where its name stands anywhere, and every thing of a kind where code has the
+   word that asks for one, unless a complete name follows: `model.sensor("tip")`.
+2. Code that could reach a field without naming it may use everything: by reflection, by a module
    that is not known to leave models alone, by a function of MuJoCo's that does not simulate, by
    reading or including the model's file.
-3. Which fields tell a smaller model from the whole one is found by comparing both (`differences`):
-   a reader notices it where it has one of their names.
+3. The fields that tell a smaller model from the whole one are found by comparing both
+   (`differences`): a reader notices it where it has one of their names.
 """
 
 from __future__ import annotations
@@ -116,12 +116,15 @@ class Reader(Struct, frozen=True):
         )
 
 
-def read_code(path: str, text: str, own: Collection[str] = ()) -> Reader:
-    """What a file of Python or JavaScript asks models for; `own` are modules that are read too."""
-    names = frozenset(next(filter(None, found), "") for found in _TEXT.findall(text))
+def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Reader:
+    """What a file of Python or JavaScript asks models for.
+
+    `course_modules`: modules that are readers themselves, so that importing one is harmless.
+    """
+    names = frozenset(next(filter(None, match), "") for match in _TEXT.findall(text))
     rest, filled = _FILLED.subn(r"\1(", _RESET.sub("", text))
     parts = {(VIEWS[view], part) for view, part in _THING.findall(rest) if view in VIEWS}
-    rest = _THING.sub(lambda one: "named" if one[1] in VIEWS else one[0], rest)
+    rest = _THING.sub(lambda match: "named" if match[1] in VIEWS else match[0], rest)
     code = _PROSE[path.endswith(".py")].sub('""', rest)
     words = frozenset(_WORD.findall(rest if filled else code))
     members = frozenset(_MEMBER.findall(code))
@@ -130,12 +133,12 @@ def read_code(path: str, text: str, own: Collection[str] = ()) -> Reader:
     if _INCLUDE.search(text):
         reasons.append("it puts models together from files")
     if path.endswith(".py"):
-        modules = (name for found in _IMPORT.findall(text) for name in _modules(*found))
-        known = _LEAVE_MODELS_ALONE.union(own)
-        reasons += [f"it imports {name}" for name in modules if name not in known]
+        modules = (name for match in _IMPORT.findall(text) for name in _modules(*match))
+        harmless = _LEAVE_MODELS_ALONE.union(course_modules)
+        reasons += [f"it imports {name}" for name in modules if name not in harmless]
         reasons += ["it matches patterns by their place"] if _POSITIONAL.search(text) else []
-    elif found := _SCRIPT.search(code):
-        reasons.append(f"it goes through what there is: `{found[0]}`")
+    elif match := _SCRIPT.search(code):
+        reasons.append(f"it goes through what there is: `{match[0]}`")
     kinds = {VIEWS[word] for word in members if word in VIEWS}
     kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
     reason = next(iter(reasons), "")
@@ -148,5 +151,7 @@ def _may_do_anything(word: str) -> bool:
     return word in _OPAQUE or hidden or (bool(_FUNCTION.match(word)) and word not in _SIMULATION)
 
 
-def _modules(source: str, listed: str) -> list[str]:
-    return [one.split()[0].split(".")[0] for one in (source or listed).split(",") if one.split()]
+def _modules(source: str, imports: str) -> list[str]:
+    return [
+        name.split()[0].split(".")[0] for name in (source or imports).split(",") if name.split()
+    ]

@@ -3,11 +3,11 @@
 Entry point: `survey`.
 
 1. The model runs once in each scenario. From one that is lost nothing is claimed.
-2. *Proved*: of all that no motion is computed of, as much is taken out at once as the compiler lets
-   go, as changes nothing else in the compiled model, and as no code can notice; every scenario must
-   give the same bits.
-3. *The same in what was run*: of the rest as much of each kind as changes no motion in the
-   scenarios; only the time that it saves speaks for it.
+2. *Proved*: what no motion is computed of is taken out at once, as much as the compiler can do
+   without, as changes nothing else in the compiled model, and as no code can notice; every scenario
+   must give the same bits.
+3. *The same in what was run*: of the rest, as much of each kind is taken out as changes no motion
+   in the scenarios; only the time that it saves speaks for it.
 4. Scripts and labs of the course run with what is left: what changes their output is no finding.
    Other settings, with which they compute other digits, are tried in the scenarios alone.
 5. In the end all that `--fix` would change is taken out together; and so is everything found.
@@ -26,16 +26,16 @@ from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import Keep
 from coursebuild.numerics.pruning.candidates import (
     Item,
-    contacts,
     far_bodies,
     idle_contacts,
     message_of,
+    other_settings,
     proof_of,
-    settings,
-    unread,
+    unreachable_contacts,
+    unread_elements,
 )
 from coursebuild.numerics.pruning.compare import TOLERANCE, MotionComparison, WatchedRun, watch
-from coursebuild.numerics.pruning.differences import beyond, difference
+from coursebuild.numerics.pruning.differences import difference, unrelated_fields
 from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.model_text import ModelText
@@ -49,17 +49,17 @@ from coursebuild.numerics.reports.diet import (
     DietScenario,
     Finding,
     ModelPlace,
+    RejectedTrial,
     Saving,
     StaleKeep,
     TextEdit,
-    Tried,
     name_list,
 )
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock
 
 LEAST = 1.05
-"""What only runs speak for must save so much time to be worth a word."""
+"""The speedup from which on a finding that is not proved is worth a word."""
 _OWN_FIELDS = {
     kind: frozenset(fields.split(" "))
     for kind, fields in {
@@ -74,10 +74,10 @@ _OWN_FIELDS = {
         ),
     }.items()
 }
-"""What else of the compiled model is of these kinds alone."""
+"""Other fields of the compiled model that belong to these kinds of findings alone."""
 
 Rerun = Callable[[Mapping[str, bytes]], str]
-"""With files changed so: who then says something else; empty where nobody does."""
+"""New bytes of files → which script or lab then prints something else; empty where none does."""
 
 
 class Order(Struct, frozen=True, eq=False):
@@ -102,13 +102,13 @@ class Order(Struct, frozen=True, eq=False):
     """`None`: nothing is timed."""
     quick: bool
     tell: Callable[[str], None]
-    """Is told what is tried next."""
+    """Gets a line about each stage."""
     rerun: Rerun | None = None
     """`None`: scripts and labs do not run."""
 
 
 class Survey(Struct, frozen=True):
-    """What was found."""
+    """The result of a survey."""
 
     report: DietReport
     text: ModelText
@@ -117,22 +117,22 @@ class Survey(Struct, frozen=True):
 
 
 def survey(order: Order) -> Survey:
-    """Try everything on a model."""
-    seen = [watch(order.text.model, scene) for scene in order.scenes]
+    """Look for everything that a model can be without."""
+    runs = [watch(order.text.model, scene) for scene in order.scenes]
     report = DietReport(
         model=order.model,
         digest=order.digest,
         quick=order.quick,
         machine=order.machine,
-        readers=tuple(dict.fromkeys(one.path.partition(":")[0] for one in order.readers)),
+        readers=tuple(dict.fromkeys(reader.path.partition(":")[0] for reader in order.readers)),
         scenarios=tuple(
             DietScenario(
-                one.scene.name,
-                round(one.scene.scenario.duration / one.scene.timestep),
-                one.judgement.status.value,
-                one.judgement.reasons,
+                run.scene.name,
+                round(run.scene.scenario.duration / run.scene.timestep),
+                run.judgement.status.value,
+                run.judgement.reasons,
             )
-            for one in seen
+            for run in runs
         ),
         findings=(),
         tried=(),
@@ -141,203 +141,222 @@ def survey(order: Order) -> Survey:
         slim_difference=None,
         stale=(),
     )
-    good = tuple(one for one in seen if one.judgement.ok)
-    return _Surveyor(order, good).all(report) if good else Survey(report, order.text)
+    good_runs = tuple(run for run in runs if run.judgement.ok)
+    return _Surveyor(order, good_runs).run(report) if good_runs else Survey(report, order.text)
 
 
-class _Found(Struct, frozen=True, eq=False):
-    """Things that go together."""
+class _PrunedGroup(Struct, frozen=True, eq=False):
+    """Items that are taken out together, with the finding about them."""
 
     items: tuple[Item, ...]
     finding: Finding
 
 
 class _Surveyor:
-    def __init__(self, order: Order, good: tuple[WatchedRun, ...]) -> None:
+    def __init__(self, order: Order, good_runs: tuple[WatchedRun, ...]) -> None:
         self.order = order
-        self.good = good
+        self.good_runs = good_runs
         self.trials = PruningTrials(
-            order.text, [one.scene for one in good], order.clock, quick=order.quick
+            order.text, [run.scene for run in good_runs], order.clock, quick=order.quick
         )
-        self.tried: list[Tried] = []
+        self.rejected: list[RejectedTrial] = []
 
-    def all(self, report: DietReport) -> Survey:
-        """Every candidate, then all of what was found."""
-        proved = self._proved()
-        found = self._believed([*proved, *self._run(proved)])
-        found += self._settings()
+    def run(self, report: DietReport) -> Survey:
+        """Try every candidate, then all findings together."""
+        proved_groups = self._prove()
+        groups = self._confirm([*proved_groups, *self._try_by_running(proved_groups)])
+        groups += self._try_settings()
         self.order.tell("all together")
-        fixable = [item for one in found if one.finding.fixable for item in one.items]
-        whole = self.trials.without(largest_subset(fixable, self._holds)) if fixable else None
-        slim, apart = self._slim([one for one in found if not one.finding.kept])
-        used = {one.finding.kind for one in found}
-        used |= {f"{item.kind} {item.name}" for one in found for item in one.items}
-        stale = {key: one.finding_span for key, one in self.order.keeps.items() if key not in used}
+        fixable = [item for group in groups if group.finding.fixable for item in group.items]
+        fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
+        slim, slim_difference = self._save_most(
+            [group for group in groups if not group.finding.kept]
+        )
+        used_keys = {group.finding.kind for group in groups}
+        used_keys |= {f"{item.kind} {item.name}" for group in groups for item in group.items}
+        stale = {
+            key: keep.finding_span for key, keep in self.order.keeps.items() if key not in used_keys
+        }
         report = replace(
             report,
-            findings=tuple(one.finding for one in found),
-            tried=tuple(self.tried),
-            fixed=None if whole is None else self.trials.saving(whole),
+            findings=tuple(group.finding for group in groups),
+            tried=tuple(self.rejected),
+            fixed=None if fixed is None else self.trials.measure_saving(fixed),
             slim=slim,
-            slim_difference=apart,
+            slim_difference=slim_difference,
             stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
         )
-        return Survey(report, self.order.text, () if whole is None else whole.edits)
+        return Survey(report, self.order.text, () if fixed is None else fixed.edits)
 
-    def _believed(self, found: Sequence[_Found]) -> list[_Found]:
-        """Those without which scripts and labs of the course say the same."""
+    def _confirm(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
+        """The groups without which scripts and labs of the course print the same."""
         self.order.tell("scripts and labs")
-        unkept = [one for one in found if not one.finding.kept]
-        believed = largest_subset(unkept, lambda some: not self._says_otherwise(some))
-        for one in unkept:
-            if one not in believed:
-                who = self._says_otherwise([one])
-                self._note(one.items, one.finding.difference, f"{who} says something else then")
-        return [one for one in found if one.finding.kept or one in believed]
+        unkept = [group for group in groups if not group.finding.kept]
+        confirmed = largest_subset(unkept, lambda groups: not self._find_changed_output(groups))
+        for group in unkept:
+            if group not in confirmed:
+                speaker = self._find_changed_output([group])
+                self._reject(
+                    group.items, group.finding.difference, f"{speaker} says something else then"
+                )
+        return [group for group in groups if group.finding.kept or group in confirmed]
 
-    def _proved(self) -> list[_Found]:
+    def _prove(self) -> list[_PrunedGroup]:
         order = self.order
         order.tell("what nobody needs")
-        items = unread(order.text, [one.scene.scenario for one in self.good])
-        if not any(one.touches(PREMISES) for one in order.readers):
-            items += contacts(order.text)
-        items = [one for one in items if self._unread(one)]
-        wanted = [one for one in items if not self._reason(one)]
-        gone = largest_subset(wanted, self._holds)
-        kept = [one for one in items if self._reason(one) and self._holds([*gone, one])]
-        for one in wanted:
-            if one not in gone:
-                self._note([one], None, "something needs it, or code may")
-        elements = {one.element for one in gone}
-        outer = [one for one in gone if not one.element or elements.isdisjoint(one.element.above())]
-        groups = self._grouped([*outer, *kept])
-        return [self._found(some, reason, PROVED, 0.0) for reason, some in groups]
+        items = unread_elements(order.text, [run.scene.scenario for run in self.good_runs])
+        if not any(reader.touches(PREMISES) for reader in order.readers):
+            items += unreachable_contacts(order.text)
+        items = [item for item in items if self._is_unread(item)]
+        unkept = [item for item in items if not self._keep_reason(item)]
+        removable = largest_subset(unkept, self._is_needless)
+        kept_items = [
+            item
+            for item in items
+            if self._keep_reason(item) and self._is_needless([*removable, item])
+        ]
+        for item in unkept:
+            if item not in removable:
+                self._reject([item], None, "something needs it, or code may")
+        elements = {item.element for item in removable}
+        outer = [
+            item
+            for item in removable
+            if not item.element or elements.isdisjoint(item.element.ancestors())
+        ]
+        groups = self._group_items([*outer, *kept_items])
+        return [self._make_group(similar, reason, PROVED, 0.0) for reason, similar in groups]
 
-    def _unread(self, item: Item) -> bool:
-        names = {item.name} | {one.get("class") or "" for e in item.gone for one in e.walk()}
-        return self._noticing(names - {""}, {item.view} - {""}, ()) is None
+    def _is_unread(self, item: Item) -> bool:
+        names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
+        return self._find_noticing_reader(names - {""}, {item.view} - {""}, ()) is None
 
-    def _noticing(
+    def _find_noticing_reader(
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
     ) -> Reader | None:
-        """The first who may notice that things are gone."""
-        return next((o for o in self.order.readers if o.notices(names, kinds, change)), None)
+        """The first reader that may notice that things are gone."""
+        readers = (reader for reader in self.order.readers if reader.notices(names, kinds, change))
+        return next(readers, None)
 
-    def _holds(self, items: Sequence[Item]) -> bool:
-        """Whether nothing but these would be missing, in any state."""
-        trial = self.trials.without(items)
+    def _is_needless(self, items: Sequence[Item]) -> bool:
+        """Whether the model without these items is otherwise the same, in any state."""
+        trial = self.trials.prune(items)
         if trial is None:
             return False
-        kinds = frozenset(one.view for one in items if one.view)
+        kinds = frozenset(item.view for item in items if item.view)
         change = difference(self.order.text.model, trial.model)
-        own = {field for one in items for field in _OWN_FIELDS.get(one.kind, ())}
-        if beyond(change, kinds) - own:
+        own_fields = {field for item in items for field in _OWN_FIELDS.get(item.kind, ())}
+        if unrelated_fields(change, kinds) - own_fields:
             return False
         if "tree_sleep_policy" in change and self._may_sleep():
             return False
         change |= self.trials.state_difference(trial)
-        if self._noticing((), kinds, change) is not None:
+        if self._find_noticing_reader((), kinds, change) is not None:
             return False
         result = self.trials.compare(trial)
         return result is not None and result.identical
 
     def _may_sleep(self) -> bool:
         asleep = int(self.order.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
-        return bool(asleep or any(one.touches({"enableflags"}) for one in self.order.readers))
+        return bool(asleep or any(reader.touches({"enableflags"}) for reader in self.order.readers))
 
-    def _run(self, proved: Sequence[_Found]) -> list[_Found]:
+    def _try_by_running(self, proved_groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
         text = self.order.text
-        said = {name for one in self.order.readers for name in one.names}
-        groups = [far_bodies(text, said, self.good)]
-        if not any(one.items[0].kind == "contact-off" for one in proved):
-            groups.append(idle_contacts(text, self.good))
-        return self._each(groups)
+        code_names = {name for reader in self.order.readers for name in reader.names}
+        item_groups = [far_bodies(text, code_names, self.good_runs)]
+        if not any(group.items[0].kind == "contact-off" for group in proved_groups):
+            item_groups.append(idle_contacts(text, self.good_runs))
+        return self._try_groups(item_groups)
 
-    def _settings(self) -> list[_Found]:
-        return self._each([[one] for one in settings(self.order.text, self.good)])
+    def _try_settings(self) -> list[_PrunedGroup]:
+        return self._try_groups(
+            [[item] for item in other_settings(self.order.text, self.good_runs)]
+        )
 
-    def _each(self, groups: Iterable[Sequence[Item]]) -> list[_Found]:
-        found: list[_Found] = []
-        for items in groups:
-            for reason, some in self._grouped(items):
-                self.order.tell(some[0].kind)
-                one = self._same(some, reason)
-                found += [] if one is None else [one]
-        return found
+    def _try_groups(self, item_groups: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
+        groups: list[_PrunedGroup] = []
+        for items in item_groups:
+            for reason, similar in self._group_items(items):
+                self.order.tell(similar[0].kind)
+                group = self._try_items(similar, reason)
+                groups += [] if group is None else [group]
+        return groups
 
-    def _same(self, items: Sequence[Item], reason: str) -> _Found | None:
-        """As many of these as change no motion, if that saves time."""
+    def _try_items(self, items: Sequence[Item], reason: str) -> _PrunedGroup | None:
+        """Take out as many of these items as change no motion, if that saves time."""
         results: list[MotionComparison] = []
 
-        def same(some: Sequence[Item]) -> bool:
-            trial = self.trials.without(some)
+        def moves_alike(items: Sequence[Item]) -> bool:
+            trial = self.trials.prune(items)
             result = None if trial is None else self.trials.compare(trial)
             if result is not None:
                 results.append(result)
-            return result is not None and result.difference <= allowed
+            return result is not None and result.difference <= tolerance
 
         # Bodies fall asleep below a speed, which is then the difference.
         sleeps = items[0].kind == "sleep"
-        allowed = float(self.order.text.model.opt.sleep_tolerance) if sleeps else TOLERANCE
-        gone = largest_subset(items, same)
-        if not gone:
-            worst = max((one.difference for one in results), default=math.inf)
-            self._note(items, worst, "it changes the motion")
+        tolerance = float(self.order.text.model.opt.sleep_tolerance) if sleeps else TOLERANCE
+        removable = largest_subset(items, moves_alike)
+        if not removable:
+            worst = max((result.difference for result in results), default=math.inf)
+            self._reject(items, worst, "it changes the motion")
             return None
-        if not same(gone):
+        if not moves_alike(removable):
             return None
-        one = self._found(gone, reason, SAME, results[-1].difference)
-        saving = one.finding.saving
+        group = self._make_group(removable, reason, SAME, results[-1].difference)
+        saving = group.finding.saving
         slow = saving.time is None or not (saving.certain and saving.time >= LEAST)
         if self.order.clock is not None and slow and not reason:
-            self._note(gone, results[-1].difference, "it saves no time")
+            self._reject(removable, results[-1].difference, "it saves no time")
             return None
-        return one
+        return group
 
-    def _reason(self, item: Item) -> str:
-        """Why the author keeps it; empty where nothing says so."""
+    def _keep_reason(self, item: Item) -> str:
+        """Why the author keeps an item; empty where no entry names it."""
         keeps = self.order.keeps
         keep = keeps.get(f"{item.kind} {item.name}") or keeps.get(item.kind)
         return "" if keep is None else keep.reason
 
-    def _grouped(self, items: Iterable[Item]) -> list[tuple[str, list[Item]]]:
-        """Items of one kind that are kept for one reason, or for none."""
+    def _group_items(self, items: Iterable[Item]) -> list[tuple[str, list[Item]]]:
+        """Group items by their kind and the reason to keep them; each group with its reason."""
         groups: dict[tuple[str, str], list[Item]] = {}
         for item in items:
-            groups.setdefault((item.kind, self._reason(item)), []).append(item)
-        return [(reason, some) for (_, reason), some in groups.items()]
+            groups.setdefault((item.kind, self._keep_reason(item)), []).append(item)
+        return [(reason, similar) for (_, reason), similar in groups.items()]
 
-    def _found(self, items: Sequence[Item], reason: str, label: str, apart: float) -> _Found:
-        kind, trial = items[0].kind, self.trials.without(items)
+    def _make_group(
+        self, items: Sequence[Item], reason: str, label: str, gap: float
+    ) -> _PrunedGroup:
+        kind, trial = items[0].kind, self.trials.prune(items)
         change: frozenset[str] = frozenset()
         edits = self.trials.edits(items)
-        saving = Saving(None, None, False, 0, self.trials.bytes_of(edits))
+        saving = Saving(None, None, False, 0, self.trials.count_saved_bytes(edits))
         if trial is not None:  # not where it goes only with what uses it
             timed = not kind.startswith("unused-") or kind == "unused-site"
-            saving = self.trials.saving(trial, timed=timed)
+            saving = self.trials.measure_saving(trial, timed=timed)
             change = difference(self.order.text.model, trial.model)
             change |= self.trials.state_difference(trial)
-        reader = self._noticing((), {items[0].view} - {""}, change)
+        reader = self._find_noticing_reader((), {items[0].view} - {""}, change)
         finding = Finding(
             kind=kind,
             message=message_of(kind, name_list([item.name for item in items]), len(items)),
             places=tuple(_place(item) for item in items if item.element is not None),
             label=label,
-            difference=apart,
-            scenarios=tuple(one.scene.name for one in self.good),
+            difference=gap,
+            scenarios=tuple(run.scene.name for run in self.good_runs),
             proof=proof_of(kind) if label == PROVED else "",
             saving=saving,
-            edits=self._texts(edits),
+            edits=self._text_edits(edits),
             fixable=False,
             unfixed="",
             kept=reason,
             doubt=f"{reader.path} may notice" if reader is not None else "",
         )
-        unfixed = self._unfixed(finding)
-        return _Found(tuple(items), replace(finding, fixable=not unfixed, unfixed=unfixed))
+        unfixed = self._reason_unfixed(finding)
+        return _PrunedGroup(tuple(items), replace(finding, fixable=not unfixed, unfixed=unfixed))
 
-    def _unfixed(self, finding: Finding) -> str:
-        """Why `--fix` does not change it; empty where it does."""
+    def _reason_unfixed(self, finding: Finding) -> str:
+        """Why `--fix` does not act on a finding; empty where it does."""
         if finding.kept:
             return "it is kept"
         if finding.label != PROVED:
@@ -347,48 +366,48 @@ class _Surveyor:
         locked = (self.order.locked.get(edit.path, "") for edit in finding.edits)
         return next(filter(None, locked), "")
 
-    def _note(self, items: Sequence[Item], apart: float | None, why: str) -> None:
-        finite = apart if apart is not None and math.isfinite(apart) else None
+    def _reject(self, items: Sequence[Item], difference: float | None, reason: str) -> None:
+        finite = difference if difference is not None and math.isfinite(difference) else None
         kind, names = items[0].kind, tuple(item.name for item in items)
         message = message_of(kind, name_list([item.name for item in items]), len(items))
-        self.tried.append(Tried(kind, message, names, finite, why))
+        self.rejected.append(RejectedTrial(kind, message, names, finite, reason))
 
-    def _texts(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
+    def _text_edits(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
         by_path = {document.path: document for document in self.order.text.documents}
-        found = []
+        text_edits = []
         for edit in merge_edits(edits):
             document = by_path[edit.path]
             old = document.data[edit.start : edit.end].decode("utf-8", "replace")
             line, column = document.position(edit.start)
             new = edit.new.decode("utf-8", "replace")
-            found.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
-        return tuple(found)
+            text_edits.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
+        return tuple(text_edits)
 
-    def _without(self, found: Sequence[_Found]) -> PrunedModel | None:
-        return self.trials.without([item for one in found for item in one.items])
+    def _prune(self, groups: Sequence[_PrunedGroup]) -> PrunedModel | None:
+        return self.trials.prune([item for group in groups for item in group.items])
 
-    def _says_otherwise(self, found: Sequence[_Found]) -> str:
-        """Who of the course's scripts and labs says something else without all these."""
-        trial, rerun = self._without(found), self.order.rerun
+    def _find_changed_output(self, groups: Sequence[_PrunedGroup]) -> str:
+        """Which script or lab of the course prints something else without these groups."""
+        trial, rerun = self._prune(groups), self.order.rerun
         if trial is None or rerun is None:
             return ""
         return rerun(self.order.text.files(trial.edits))
 
-    def _slim(self, found: Sequence[_Found]) -> tuple[Saving | None, float | None]:
-        """What everything found saves: the most that goes together, or the best alone."""
+    def _save_most(self, groups: Sequence[_PrunedGroup]) -> tuple[Saving | None, float | None]:
+        """The saving and difference of all groups that go together, or of the best one alone."""
 
-        def equal(some: Sequence[_Found]) -> bool:
-            trial = self._without(some)
+        def moves_alike(groups: Sequence[_PrunedGroup]) -> bool:
+            trial = self._prune(groups)
             result = None if trial is None else self.trials.compare(trial)
-            allowed = max([TOLERANCE, *(one.finding.difference for one in some)])
-            return result is not None and result.difference <= allowed
+            tolerance = max([TOLERANCE, *(group.finding.difference for group in groups)])
+            return result is not None and result.difference <= tolerance
 
-        by_time = sorted(found, key=lambda one: -(one.finding.saving.time or 0.0))
-        trial = self._without(largest_subset(by_time, equal)) if found else None
+        by_time = sorted(groups, key=lambda group: -(group.finding.saving.time or 0.0))
+        trial = self._prune(largest_subset(by_time, moves_alike)) if groups else None
         result = None if trial is None else self.trials.compare(trial)
         if trial is None or result is None:
             return None, None
-        slim = self.trials.saving(trial)
+        slim = self.trials.measure_saving(trial)
         best = by_time[0].finding
         if (best.saving.time or 0.0) > (slim.time or 0.0):
             return best.saving, best.difference

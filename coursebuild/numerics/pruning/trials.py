@@ -1,4 +1,4 @@
-"""A model without some things: compiled, compared with the whole one, run and timed beside it.
+"""A model without some things: compiled, compared with the whole model, run and timed beside it.
 
 Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest_subset(items, holds)`.
 """
@@ -21,9 +21,9 @@ from coursebuild.numerics.pruning.edits import (
     ModelEdit,
     drop_attribute,
     drop_numbers,
-    emptied,
+    find_emptied,
     merge_edits,
-    remove,
+    remove_elements,
 )
 from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
 from coursebuild.numerics.pruning.markup import Element
@@ -34,34 +34,34 @@ from coursebuild.numerics.timing import Clock, Timing, scenario_job, time_jobs
 
 _T = TypeVar("_T")
 _KEY_NUMBERS = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
-"""Of each attribute of a keyframe, what it has numbers for; a mocap body never goes."""
+"""For each attribute of a keyframe the field with its length; mocap bodies are never removed."""
 _DRAWS = 2
 """Random states in which two models are compared."""
 
 
 def largest_subset(items: Sequence[_T], holds: Callable[[list[_T]], bool]) -> list[_T]:
-    """Most of the items for which something holds together, by delta debugging.
+    """A largest subset of the items for which something holds, by delta debugging.
 
-    All of them are tried first, then halves, each together with what was found before; again, until
-    no more are found. In the end no single one can be added.
+    All items are tried first, then halves, each together with the subset so far, until it grows no
+    more. In the end no single item can be added.
     """
-    found: list[_T] = []
+    subset: list[_T] = []
 
     def add(some: Sequence[_T]) -> None:
-        if holds([*found, *some]):
-            found.extend(some)
+        if holds([*subset, *some]):
+            subset.extend(some)
         elif len(some) > 1:
             add(some[: len(some) // 2])
             add(some[len(some) // 2 :])
 
     left = list(items)
     while left:
-        before = len(found)
+        before = len(subset)
         add(left)
-        left = [one for one in left if one not in found]
-        if len(found) == before:
+        left = [item for item in left if item not in subset]
+        if len(subset) == before:
             break
-    return found
+    return subset
 
 
 class PrunedModel(Struct, frozen=True, eq=False):
@@ -73,7 +73,7 @@ class PrunedModel(Struct, frozen=True, eq=False):
 
 
 class PruningTrials:
-    """Tries a model without things."""
+    """Tries a model without some things."""
 
     def __init__(
         self, text: ModelText, scenes: Sequence[Scene], clock: Clock | None, *, quick: bool
@@ -83,112 +83,120 @@ class PruningTrials:
         self.clock = clock
         self.quick = quick
 
-    def without(self, items: Iterable[Item]) -> PrunedModel | None:
-        """The model without these; `None` where that is no model, or not the one it should be."""
+    def prune(self, items: Iterable[Item]) -> PrunedModel | None:
+        """The model without these items; `None` if it does not compile, or differs otherwise."""
         text = self.text
         try:
-            edits, gone = _changes(text, list(items))
-            index, model = index_map(text.model, gone), text.compiled(edits)
+            edits, removal = _changes(text, list(items))
+            index, model = index_map(text.model, removal), text.compile(edits)
         except ValueError:
             return None
         without_reset(model)
         return PrunedModel(edits, model, index) if fits(index, text.model, model) else None
 
     def edits(self, items: Iterable[Item]) -> tuple[ModelEdit, ...]:
-        """The changes that take these out."""
+        """The edits that take items out."""
         return _changes(self.text, list(items))[0]
 
-    def bytes_of(self, edits: Iterable[ModelEdit]) -> int:
-        """Bytes that changes take out of the text."""
-        before = {one.path: len(one.data) for one in self.text.documents}
+    def count_saved_bytes(self, edits: Iterable[ModelEdit]) -> int:
+        """The number of bytes by which edits shorten the text."""
+        before = {document.path: len(document.data) for document in self.text.documents}
         files = self.text.files(edits)
         return sum(before[path] - len(data) for path, data in files.items())
 
     def compare(self, trial: PrunedModel) -> MotionComparison | None:
-        """How it does in all scenarios; `None` where that cannot be told."""
+        """Compare it with the whole model in all scenarios; `None` where that is not possible."""
         try:
             return compare(self.text.model, trial.model, trial.index, self.scenes)
         except (ValueError, mujoco.FatalError):
             return None
 
     def state_difference(self, trial: PrunedModel) -> frozenset[str]:
-        """By what code could tell both apart in some states of the whole model."""
+        """The fields by which code could tell both apart in some states of the whole model."""
         whole: Any = self.text.model
-        found: frozenset[str] = frozenset()
+        fields: frozenset[str] = frozenset()
         for state in self._states:
-            data, other = mujoco.MjData(whole), mujoco.MjData(trial.model)
+            data, variant_data = mujoco.MjData(whole), mujoco.MjData(trial.model)
             mujoco.mj_setState(whole, data, state, STATE)
-            transfer(whole, data, trial.index, trial.model, other)
+            transfer(whole, data, trial.index, trial.model, variant_data)
             advance(whole, data)
-            advance(trial.model, other)
-            found |= difference(data, other)
-        return found
+            advance(trial.model, variant_data)
+            fields |= difference(data, variant_data)
+        return fields
 
     @cached_property
     def _states(self) -> list[Any]:
-        """Where the first scenario begins, and states that are drawn from there."""
-        model, scenario, found = self.text.model, self.scenes[0].scenario, []
+        """The initial state of the first scenario, and random states around it."""
+        model, scenario, states = self.text.model, self.scenes[0].scenario, []
         random = np.random.default_rng(0)
         for draw in range(1 + _DRAWS):
             data = initial_data(scenario, model)
             if draw:
                 mujoco.mj_integratePos(model, data.qpos, random.normal(size=model.nv), 0.3)
                 data.qvel[:] += random.normal(size=model.nv)
-            found.append(full_state(model, data))
-        return found
+            states.append(full_state(model, data))
+        return states
 
-    def saving(self, trial: PrunedModel, *, timed: bool = True) -> Saving:
+    def measure_saving(self, trial: PrunedModel, *, timed: bool = True) -> Saving:
         """What a change saves, in time and bytes."""
-        text = self.bytes_of(trial.edits)
+        text = self.count_saved_bytes(trial.edits)
         memory = len(model_bytes(self.text.model)) - len(model_bytes(trial.model))
-        timing = self._timing(trial) if timed else None
+        timing = self._measure_time(trial) if timed else None
         if timing is None:
             return Saving(None, None, False, memory, text)
         ratio = timing.ratio
         return Saving(ratio.value, ratio.half_width / 2, timing.certain, memory, text)
 
-    def _timing(self, trial: PrunedModel) -> Timing | None:
+    def _measure_time(self, trial: PrunedModel) -> Timing | None:
         """Time of the whole model over that of this one, in whole scenarios."""
         if self.clock is None:
             return None
-        whole, index, begins, others = self.text.model, trial.index, [], []
+        whole, index, begins, variant_begins = self.text.model, trial.index, [], []
         try:
             for scene in self.scenes:
-                data, other = initial_data(scene.scenario, whole), mujoco.MjData(trial.model)
-                transfer(whole, data, index, trial.model, other)
+                data, variant_data = initial_data(scene.scenario, whole), mujoco.MjData(trial.model)
+                transfer(whole, data, index, trial.model, variant_data)
                 begins.append((scene.scenario, full_state(whole, data)))
-                others.append((scene.scenario, full_state(trial.model, other)))
+                variant_begins.append((scene.scenario, full_state(trial.model, variant_data)))
         except ValueError:
             return None
         jobs = (
             scenario_job(whole, begins, self.scenes[0].timestep),
-            scenario_job(trial.model, others, self.scenes[0].timestep, index["nu"].tolist()),
+            scenario_job(
+                trial.model, variant_begins, self.scenes[0].timestep, index["nu"].tolist()
+            ),
         )
         with silent():
-            found, own = time_jobs(jobs, 1, self.clock, quick=self.quick)
-        return found if min(found.nanoseconds.low, own.nanoseconds.low) > 0 else None
+            whole_time, pruned_time = time_jobs(jobs, 1, self.clock, quick=self.quick)
+        return (
+            whole_time if min(whole_time.nanoseconds.low, pruned_time.nanoseconds.low) > 0 else None
+        )
 
 
 def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Removal]:
-    """All the edits that items make together, and what they take out of the compiled model."""
-    elements = list(dict.fromkeys(one for item in items for one in item.gone))
-    below = [one for element in elements for one in element.walk()]
-    gone = Removal(*(text.ids_of(below, kind) for kind in ("body", "geom", "sensor", "actuator")))
+    """All edits of items together, and what they remove from the compiled model."""
+    elements = list(dict.fromkeys(element for item in items for element in item.removals))
+    nodes = [node for element in elements for node in element.walk()]
+    removal = Removal(
+        *(text.ids_of(nodes, kind) for kind in ("body", "geom", "sensor", "actuator"))
+    )
     drops = [drop for item in items for drop in item.drops]
     edits = [edit for item in items for edit in item.edits]
-    edits += remove([*elements, *emptied(drops, edits)])
+    edits += remove_elements([*elements, *find_emptied(drops, edits)])
     edits += [drop_attribute(*drop) for drop in drops]
-    edits += _keyframes(text, gone, set(below))
-    return merge_edits(edits), gone
+    edits += _keyframes(text, removal, set(nodes))
+    return merge_edits(edits), removal
 
 
-def _keyframes(text: ModelText, gone: Removal, removed: Collection[Element]) -> Iterator[ModelEdit]:
-    """Keyframes list a number for every coordinate: those of what is gone go too."""
-    if not (gone.bodies or gone.actuators):
+def _keyframes(
+    text: ModelText, removal: Removal, removed_elements: Collection[Element]
+) -> Iterator[ModelEdit]:
+    """Remove the numbers of removed coordinates from keyframes, which list one for each."""
+    if not (removal.bodies or removal.actuators):
         return
-    left = index_map(text.model, gone)
+    left = index_map(text.model, removal)
     for name, size in _KEY_NUMBERS.items():
         lost = set(range(getattr(text.model, size))) - set(left[size].tolist())
         for key in text.elements:
-            if key.tag == "key" and key not in removed:
+            if key.tag == "key" and key not in removed_elements:
                 yield from drop_numbers(key, name, lost)

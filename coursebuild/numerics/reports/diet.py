@@ -103,7 +103,7 @@ class Finding(Record, frozen=True):
         return self.label == PROVED and not self.kept
 
 
-class Tried(Record, frozen=True):
+class RejectedTrial(Record, frozen=True):
     """What could be left out and is no finding: it is needed, or saves no time."""
 
     kind: str
@@ -147,7 +147,7 @@ class DietReport(Record, frozen=True):
     """The files of the course that use the model."""
     scenarios: tuple[DietScenario, ...]
     findings: tuple[Finding, ...]
-    tried: tuple[Tried, ...]
+    tried: tuple[RejectedTrial, ...]
     fixed: Saving | None
     """What all that `--fix` changes saves together; `None` where it changes nothing."""
     slim: Saving | None

@@ -10,10 +10,10 @@ from coursebuild.features.bench.commands.diet.text import diet_text
 from coursebuild.numerics.reports.diet import (
     DietScenario,
     ModelPlace,
+    RejectedTrial,
     Saving,
     StaleKeep,
     TextEdit,
-    Tried,
 )
 from coursebuild.report import Style
 from support.fixture_cases import check_text
@@ -49,9 +49,9 @@ REPORTS = [
         model="tried",
         findings=(MANY,),
         tried=(
-            Tried("cone", "…", ("elliptic",), 1e-3, ""),
-            Tried("solver", "…", ("CG",), None, "it saves no time"),
-            Tried("sleep", "…", ("sleep",), None, "it saves no time"),
+            RejectedTrial("cone", "…", ("elliptic",), 1e-3, ""),
+            RejectedTrial("solver", "…", ("CG",), None, "it saves no time"),
+            RejectedTrial("sleep", "…", ("sleep",), None, "it saves no time"),
         ),
     ),
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, drop_numbers, remove
+from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, drop_numbers, remove_elements
 from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup
 
 
@@ -19,7 +19,7 @@ def after(text: str, *edits: ModelEdit) -> str:
 def without(text: str, *tags: str) -> str:
     found = [one for one in document(text).root.walk() if one.tag in tags]
     assert found
-    return after(text, *remove(found))
+    return after(text, *remove_elements(found))
 
 
 ODD = (

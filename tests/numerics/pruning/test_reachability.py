@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.numerics.pruning.reachability import possible_pairs, separate
+from coursebuild.numerics.pruning.reachability import find_separate, possible_pairs
 
 
 def compiled(body: str, *, option: str = "", rest: str = "", root: str = "") -> mujoco.MjModel:
@@ -60,7 +60,7 @@ def test_what_is_said_to_be_separate_never_touches() -> None:
         plane = '<geom type="plane" size="1 1 1" pos="0 0 -4" euler="10 5 0"/>'
         model = compiled(fixed + plane + tree(random, 2) + tree(random, 3))
         pairs = possible_pairs(model)
-        apart = separate(model, pairs)
+        apart = find_separate(model, pairs)
         assert apart < pairs or not pairs, seed
         flat = set(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).tolist())
         data = mujoco.MjData(model)
@@ -84,21 +84,21 @@ def test_only_bounded_joints_keep_a_body_away() -> None:
         ("<freejoint/>", False),
     ):
         model = compiled(f'<geom size=".1" pos="6 0 0"/><body>{joint}<geom size=".1"/></body>')
-        assert bool(separate(model, possible_pairs(model))) is bounded, joint
+        assert bool(find_separate(model, possible_pairs(model))) is bounded, joint
     mocap = '<body mocap="true" pos="50 0 0"><geom size=".1"/></body>'
     model = compiled(f'{mocap}<body><joint/><geom size=".1" pos=".2 0 0"/></body>')
-    assert len(possible_pairs(model)) == 1 and not separate(model, possible_pairs(model))
+    assert len(possible_pairs(model)) == 1 and not find_separate(model, possible_pairs(model))
 
 
 def test_margins_count() -> None:
     body = '<geom size=".1" pos="2 0 0" margin="{}"/><body><joint/><geom size=".1"/></body>'
     near, far = (compiled(body.format(margin)) for margin in ("0", "1.9"))
-    assert separate(near, possible_pairs(near)) and not separate(far, possible_pairs(far))
+    assert find_separate(near, possible_pairs(near)) and not find_separate(far, possible_pairs(far))
     pair = '<contact><pair geom1="a" geom2="b" margin="1.9"/></contact>'
     named = """<geom name="a" size=".1" pos="2 0 0"/>
         <body><joint/><geom name="b" size=".1"/></body>"""
     paired = compiled(named, rest=pair)
-    assert not separate(paired, possible_pairs(paired))
+    assert not find_separate(paired, possible_pairs(paired))
 
 
 def test_possible_pairs_are_those_that_mujoco_looks_at() -> None:

@@ -169,7 +169,7 @@ def with_card(
     with silent():  # what it warns of, it would write into the working directory
         model = _compiled(root, scene)
         found = scenes(model, scene.declared)
-        touched = {pair for one in found for pair in watch(model, one).touching}
+        touched = {pair for one in found for pair in watch(model, one).touching_pairs}
     files = (root / path for path in parts(root, source.path, source.text))
     card = SceneCard(
         bodies=int(model.nbody) - 1,

@@ -126,7 +126,7 @@ class DietModel:
             return changed.get(path) or self.read(path)
 
         new = open_model(self.path, read, self.compile, check=False).model
-        if model_bytes(new) != model_bytes(survey.text.compiled(survey.edits)):
+        if model_bytes(new) != model_bytes(survey.text.compile(survey.edits)):
             message = f"the changed model `{self.scene.name}` is not the one that was run"
             place = self.scene.model.source.span(0, 0)
             raise CannotError(diagnose("model-error", place, message))
