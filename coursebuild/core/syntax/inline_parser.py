@@ -1,7 +1,7 @@
 """The inline parser: markdown-it's rules, and those for formulas, footnotes, terms, bound numbers.
 
-Entry point: `inline_tokens`. Rules are chosen by the first character of what stands next; tokens
-get their places in the text.
+Entry point: `inline_tokens`. The next character decides which rules are tried; tokens get their
+places in the text.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from coursebuild.core.syntax.math import BACKTICKS, math_inline
 from coursebuild.core.syntax.spans import InlineState, PositionedToken
 
 MAX_NESTING = 20
-"""Brackets inside each other that may still become links and images."""
+"""How deep brackets may nest and still become links and images."""
 MAX_RUN = 200
 """Emphasis marks in a row; a longer run is text."""
 
@@ -49,7 +49,7 @@ def inline_tokens(src: str, env: EnvType, *, html: bool = False) -> list[Positio
 
     In `html` only tags, entities and formulas are read.
     """
-    if src and (_HTML_STOP if html else _STOP).search(src) is None:  # as in most cells and labels
+    if src and (_HTML_STOP if html else _STOP).search(src) is None:  # as most cells and labels are
         return [PositionedToken("text", "", 0, content=src, start=0, end=len(src))]
     parser = _HTML if html else _MARKDOWN
     return cast(list[PositionedToken], parser.inline.parse(src, parser, env, []))
@@ -76,11 +76,11 @@ _BINDING = re.compile(
 )
 
 
-def _like_out(key: str) -> bool:
+def _looks_like_out(key: str) -> bool:
     """Whether the key of an attribute is `out` or `given`, or looks like it."""
     key = key.lower()
-    near = ("ou", "ot", "ut", "otu", "uot", "oput", "oout", "oit", "gien", "gven", "gvien")
-    return key.startswith(("out", "giv")) or key in near
+    misspellings = ("ou", "ot", "ut", "otu", "uot", "oput", "oout", "oit", "gien", "gven", "gvien")
+    return key.startswith(("out", "giv")) or key in misspellings
 
 
 def _code_span(state: StateInline, silent: bool) -> bool:
@@ -92,18 +92,18 @@ def _code_span(state: StateInline, silent: bool) -> bool:
     if not backtick(state, silent):
         return False
     key = _BRACE.match(state.src, state.pos, state.posMax)
-    if key is None or not _like_out(key[1]) or not state.src[start : state.pos].strip("`"):
+    if key is None or not _looks_like_out(key[1]) or not state.src[start : state.pos].strip("`"):
         return True
     end = state.pos
-    found = _BINDING.match(state.src, end, state.posMax)
-    if found:
-        state.pos = found.end()
+    match = _BINDING.match(state.src, end, state.posMax)
+    if match:
+        state.pos = match.end()
     if not silent:
         token = state.tokens[-1]
         token.type = "number_unbound"
-        if found:
-            token.type = "number_given" if found[3] else "number_binding"
-            token.info = found[1] or found[2] or found[4] or ""
+        if match:
+            token.type = "number_given" if match[3] else "number_binding"
+            token.info = match[1] or match[2] or match[4] or ""
         token.map = [start + len(token.markup), end - len(token.markup)]
     return True
 
@@ -112,21 +112,22 @@ _FOOTNOTE = re.compile(r"\[\^([^\s\[\]]+)\]")
 
 
 def _footnote_reference(state: StateInline, silent: bool) -> bool:
-    """`[^label]`; whether the footnote exists is seen later."""
-    found = _FOOTNOTE.match(state.src, state.pos, state.posMax)
-    if found is None:
+    """`[^label]`; whether the footnote exists is checked later."""
+    match = _FOOTNOTE.match(state.src, state.pos, state.posMax)
+    if match is None:
         return False
     if not silent:
         token = state.push("footnote_ref", "", 0)
-        token.content = found[1]
-    state.pos = found.end()
+        token.content = match[1]
+    state.pos = match.end()
     return True
 
 
 def _term(state: StateInline, silent: bool) -> bool:
-    """`[text]{term}`: tokens `term_open` and `term_close`, the braces where `map` says.
+    """`[text]{term}`: tokens `term_open` and `term_close`; `map` of the second has the braces.
 
-    Who passes over it sees brackets, so that a term may stand in a link.
+    In silent mode, which only looks for the end of a link's text, these are mere brackets: so a
+    term may stand in a link.
     """
     if silent:
         return False
@@ -170,7 +171,7 @@ def _html(state: StateInline, silent: bool) -> bool:
 
 
 def _formula(state: StateInline, silent: bool) -> bool:
-    """A formula in a text that is HTML, or a dollar behind a backslash."""
+    """A formula in a text that is HTML, or a dollar after a backslash."""
     assert isinstance(state, InlineState)
     if state.literal:
         return False
@@ -191,7 +192,7 @@ def _line_end(state: StateInline, silent: bool) -> bool:
 
 
 InlineRules = dict[str, tuple[InlineRule, ...]]
-"""By the first character of what they read."""
+"""Rules by the first character of what they read."""
 
 _RULES: InlineRules = {
     "\n": (newline,),
@@ -207,7 +208,7 @@ _RULES: InlineRules = {
     "$": (math_inline,),
 }
 _STOP = re.compile(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
-"""Where text ends; a `!` is nothing without a bracket."""
+"""Characters at which plain text ends; a `!` only before a bracket."""
 _HTML_RULES: InlineRules = {
     "\n": (_line_end,),
     "\\": (_formula,),
@@ -218,7 +219,7 @@ _HTML_RULES: InlineRules = {
 _HTML_STOP = re.compile(r"[\n\\<&$]")
 
 
-class _Inlines(ParserInline):
+class _InlineParser(ParserInline):
     """markdown-it's inline parser with rules of ours."""
 
     def __init__(self, rules: InlineRules, stop: re.Pattern[str]) -> None:
@@ -226,61 +227,61 @@ class _Inlines(ParserInline):
         self.rules = rules
         self.ruler = Ruler()
         self.ruler.push("text", text)
-        self.ruler.push("by character", self.by_character)
+        self.ruler.push("by character", self.apply_rule)
         self.ruler2.disable("fragments_join")
         self.terminator_re = stop
 
-    def by_character(self, state: StateInline, silent: bool) -> bool:
-        """The first rule of the next character that takes it; its tokens get their places."""
-        at, before = state.pos, len(state.tokens)
+    def apply_rule(self, state: StateInline, silent: bool) -> bool:
+        """Try the rules of the next character until one applies; give its tokens their places."""
+        at, token_count = state.pos, len(state.tokens)
         for rule in self.rules.get(state.src[at], ()):
             if rule(state, silent):
-                if len(state.tokens) > before:
-                    _place(state, before, at)
+                if len(state.tokens) > token_count:
+                    _set_places(state, token_count, at)
                 return True
         return False
 
     def parse(self, src: str, md: MarkdownIt, env: EnvType, tokens: list[Token]) -> list[Token]:
         """Add the tokens of a whole text."""
         state = InlineState(src, md, env)
-        if "`" in self.rules and "$" in src:  # else backticks are text, or of no interest
+        if "`" in self.rules and "$" in src:  # only formulas need to know code spans ahead
             state.last_runs = {len(run[0]): run.start() for run in BACKTICKS.finditer(src)}
         self.tokenize(state)
-        if state.delimiters or any(state.tokens_meta):  # there are marks to be paired
+        if state.delimiters or any(state.tokens_meta):  # there are emphasis marks to pair
             for rule in self.ruler2.getRules(""):
                 rule(state)
         tokens.extend(state.tokens)
         return tokens
 
 
-def _place(state: StateInline, before: int, at: int) -> None:
-    """Say how far the tokens reach that a rule made from position `at` on."""
+def _set_places(state: StateInline, first_token: int, start: int) -> None:
+    """Give places to the tokens from the index `first_token` on, whose text begins at `start`."""
     assert isinstance(state, InlineState)
-    tokens, after = state.tokens, state.pos
-    cursor = at
-    for token in tokens[before:]:
+    tokens, end = state.tokens, state.pos
+    cursor = start
+    for token in tokens[first_token:]:
         assert isinstance(token, PositionedToken)
         if token.end >= 0:
             continue
         if token.type in ("link_open", "term_open"):
-            token.start, token.end = at, at + 1
+            token.start, token.end = start, start + 1
         elif token.type != "text":
-            token.end = after
+            token.end = end
         elif tokens[-1].markup == "autolink":
-            token.start, token.end = at + 1, after - 1
+            token.start, token.end = start + 1, end - 1
         else:
             token.start, token.end = cursor, cursor + len(token.content)
             cursor = token.end
-    state.mark = after
+    state.mark = end
 
 
-def _configured(rules: InlineRules, stop: re.Pattern[str]) -> MarkdownIt:
+def _build_parser(rules: InlineRules, stop: re.Pattern[str]) -> MarkdownIt:
     md = MarkdownIt("zero", {"html": True, "maxNesting": MAX_NESTING})
-    md.inline = _Inlines(rules, stop)
+    md.inline = _InlineParser(rules, stop)
     # Links with dangerous schemes stay links, so that they can be reported.
     md.validateLink = lambda url: True  # type: ignore[method-assign]
     return md
 
 
-_MARKDOWN = _configured(_RULES, _STOP)
-_HTML = _configured(_HTML_RULES, _HTML_STOP)
+_MARKDOWN = _build_parser(_RULES, _STOP)
+_HTML = _build_parser(_HTML_RULES, _HTML_STOP)

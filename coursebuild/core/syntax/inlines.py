@@ -3,12 +3,12 @@
 Entry point: `InlineReader.read`. There is one pass over the flat tokens, with a stack of open
 emphasis, strong, strikethrough, links and terms:
 
-1. Texts and soft line ends are gathered; when something else comes, they become `Text`, `SoftBreak`
-   and mentions (`mention`).
-2. An opening token puts a frame on the stack, its closing token makes the node from what was
-   gathered since.
-3. Mistakes are reported on the way: attributes, schemes, images without text, footnotes that are
-   not written, open formulas.
+1. Texts and soft line ends are collected; the next token of another kind turns them into `Text`,
+   `SoftBreak` and links of mentions.
+2. An opening token puts a frame on the stack; its closing token makes a node of the nodes collected
+   since.
+3. Mistakes are reported on the way: wrong attributes and schemes, images without text, unknown
+   footnotes, formulas without end.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
-"""Emphasis inside emphasis; what is deeper loses its marks."""
+"""How deep emphasis may nest; deeper marks are dropped."""
 
 _BRACES = re.compile(r"\{[^}\n]{0,60}\}?")
-_DEFINED = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
+_DEFINITION_HEAD = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
 class _Frame(Struct):
-    """An inline that is open."""
+    """An open inline, and the nodes in it so far."""
 
     token: PositionedToken | None
     nodes: list[Inline] = field(default_factory=list)
@@ -89,28 +89,28 @@ class InlineReader:
         formulas are read, and its elements may be closed in another block.
         """
         tokens = inline_tokens(content.text, {"references": self.references}, html=html)
-        one = _Pass(self, content, mentions)
+        token_reader = _TokenReader(self, content, mentions)
         if html:
-            return one.read(tokens)
+            return token_reader.read(tokens)
         self.balance.enter()
-        inlines = one.read(tokens)
+        inlines = token_reader.read(tokens)
         self.balance.leave()
         return inlines
 
 
-class _Pass:
-    """One pass over the tokens of one content."""
+class _TokenReader:
+    """Reads the tokens of one block's content."""
 
     def __init__(self, reader: InlineReader, content: Excerpt, mentions: bool) -> None:
         self.reader = reader
         self.content = content
         self.stack = [_Frame(None)]
-        self.run: list[TextPiece] = []
+        self.pieces: list[TextPiece] = []
         self.texts: list[tuple[int, str]] = []
-        self.links = 0 if mentions and may_mention(content.text) else 1
-        """Open links, of Markdown and of HTML; one more where mentions are not wanted."""
-        self.code = 0
-        """Open elements of HTML in which every character stands for itself."""
+        self.open_links = 0 if mentions and may_mention(content.text) else 1
+        """How many links and terms are open; one more if mentions are not wanted."""
+        self.open_literals = 0
+        """How many elements of HTML are open in which every character stands for itself."""
 
     def read(self, tokens: Iterable[PositionedToken]) -> tuple[Inline, ...]:
         for token in tokens:
@@ -119,44 +119,44 @@ class _Pass:
                 text = token.content
                 if text:
                     literal = kind == "text" or text == token.markup
-                    self.run.append(TextPiece(text, token.start, token.end, literal))
-                    if literal and not self.code:
+                    self.pieces.append(TextPiece(text, token.start, token.end, literal))
+                    if literal and not self.open_literals:
                         self.texts.append((token.start, text))
             elif kind == "softbreak":
-                self.run.append(TextPiece("\n", token.start, token.end, False))
+                self.pieces.append(TextPiece("\n", token.start, token.end, False))
             elif kind == "math_unclosed":
-                self._unclosed_math(token)
+                self._read_unclosed_math(token)
             elif token.nesting == 1:
                 self._open(token)
             elif token.nesting == -1:
                 self._close(token)
             else:
-                self._leaf(token)
+                self._add_leaf(token)
         self._flush()
-        for unread in unread_markup(self.content, self.texts):
-            self.reader.report(unread)
+        for diagnostic in unread_markup(self.content, self.texts):
+            self.reader.report(diagnostic)
         return tuple(self.stack[0].nodes)
 
     # -- texts
 
     def _flush(self) -> None:
-        run = self.run
-        if not run:
+        pieces = self.pieces
+        if not pieces:
             return
-        self.run = []
+        self.pieces = []
         nodes = self.stack[-1].nodes
-        if not self.links and not self.code:
-            nodes += link_mentions(run, self.content)
+        if not self.open_links and not self.open_literals:
+            nodes += link_mentions(pieces, self.content)
         else:
-            nodes += text_inlines(run, self.content)
+            nodes += text_inlines(pieces, self.content)
 
-    def _unclosed_math(self, token: PositionedToken) -> None:
+    def _read_unclosed_math(self, token: PositionedToken) -> None:
         span = self.content.span(token.start, token.end)
         help = "close it with `$$` in the same paragraph, or write `\\$` for a dollar sign"
         self.reader.report(
             diagnose("math-unclosed", span, "display math is never closed", help=help)
         )
-        self.run.append(TextPiece(token.content, token.start, token.end))
+        self.pieces.append(TextPiece(token.content, token.start, token.end))
 
     # -- containers
 
@@ -166,108 +166,108 @@ class _Pass:
         flat = len(self.stack) > MAX_DEPTH and not is_link and token.type != "term_open"
         self.stack.append(_Frame(token, self.stack[-1].nodes if flat else []))
         self.reader.balance.enter()
-        self.links += is_link or token.type == "term_open"
+        self.open_links += is_link or token.type == "term_open"
 
     def _close(self, token: PositionedToken) -> None:
         self._flush()
         frame = self.stack.pop()
         self.reader.balance.leave()
-        into = self.stack[-1].nodes
-        if frame.nodes is into:
+        siblings = self.stack[-1].nodes
+        if frame.nodes is siblings:
             return
-        opened, children = frame.token, tuple(frame.nodes)
-        assert opened is not None
+        opening, children = frame.token, tuple(frame.nodes)
+        assert opening is not None
         node: Inline | None
         match token.type:
             case "link_close":
-                node = self._link(opened, token, children)
+                node = self._close_link(opening, token, children)
             case "term_close":
-                node = self._term(opened, token, children)
+                node = self._close_term(opening, token, children)
             case "strong_close":
-                node = Strong(self.content.span(opened.start - 1, token.end + 1), children)
+                node = Strong(self.content.span(opening.start - 1, token.end + 1), children)
             case "em_close":
-                node = Emphasis(self.content.span(opened.start, token.end), children)
+                node = Emphasis(self.content.span(opening.start, token.end), children)
             case _:
-                node = Strikethrough(self.content.span(opened.start, token.end), children)
-        self.links -= token.type in ("link_close", "term_close")
-        into.extend(children if node is None else (node,))
+                node = Strikethrough(self.content.span(opening.start, token.end), children)
+        self.open_links -= token.type in ("link_close", "term_close")
+        siblings.extend(children if node is None else (node,))
 
-    def _term(
-        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+    def _close_term(
+        self, opening: PositionedToken, closing: PositionedToken, children: tuple[Inline, ...]
     ) -> Term | None:
-        assert closed.map is not None
-        span = self.content.span(opened.start, closed.end)
+        assert closing.map is not None
+        span = self.content.span(opening.start, closing.end)
         report = self.reader.report
-        given = read_term(self.content.slice(*closed.map), report)
-        if given is None:
+        given_name = read_term(self.content.slice(*closing.map), report)
+        if given_name is None:
             return None
-        name = given or collapse_spaces(plain_text(children))
+        name = given_name or collapse_spaces(plain_text(children))
         if not term_id(name):
             report(diagnose("term-attribute", span, "the term has no letters and no digits"))
             return None
-        return Term(span, children, name, term_id(name), bool(given))
+        return Term(span, children, name, term_id(name), bool(given_name))
 
-    def _link(
-        self, opened: PositionedToken, closed: PositionedToken, children: tuple[Inline, ...]
+    def _close_link(
+        self, opening: PositionedToken, closing: PositionedToken, children: tuple[Inline, ...]
     ) -> Link | None:
-        url = str(opened.attrs["href"])
-        span = self.content.span(opened.start, closed.end)
-        destination = self.content.span(opened.start + 1, closed.end - 1)
-        if opened.markup != "autolink":
-            destination = self._destination(opened.start, closed.start, closed.end)
-        wrong = check_scheme(url, destination)
-        if wrong is not None:
-            self.reader.report(wrong)
+        url = str(opening.attrs["href"])
+        span = self.content.span(opening.start, closing.end)
+        destination = self.content.span(opening.start + 1, closing.end - 1)
+        if opening.markup != "autolink":
+            destination = self._find_destination(opening.start, closing.start, closing.end)
+        diagnostic = check_scheme(url, destination)
+        if diagnostic is not None:
+            self.reader.report(diagnostic)
             return None
-        title = str(opened.attrs.get("title", ""))
+        title = str(opening.attrs.get("title", ""))
         return Link(span, classify(url), destination, title, children)
 
-    def _destination(self, start: int, label_end: int, end: int) -> Span:
-        """Where the destination of a link or image is written: in it, or in a definition."""
+    def _find_destination(self, start: int, label_end: int, end: int) -> Span:
+        """The span of the destination of a link or image: in itself, or in its definition."""
         text = self.content.text
         if end > label_end + 1 and text[label_end + 1] == "(":
             at = label_end + 2
             while text[at] in " \t\n":
                 at += 1
-            return _address(self.content, at) or self.content.span(start, end)
+            return _find_address(self.content, at) or self.content.span(start, end)
         label = text[start + 1 : label_end]
         if end > label_end + 3:
             label = text[label_end + 2 : end - 1]
         definition = self.reader.references.get(normalizeReference(label))
         if definition is None:
             return self.content.span(start, end)
-        place: Excerpt = definition["place"]
-        head = _DEFINED.match(place.text)
-        found = None if head is None else _address(place, head.end())
-        return found or place.span()
+        definition_text: Excerpt = definition["place"]
+        head = _DEFINITION_HEAD.match(definition_text.text)
+        address = None if head is None else _find_address(definition_text, head.end())
+        return address or definition_text.span()
 
     # -- leaves
 
-    def _leaf(self, token: PositionedToken) -> None:
+    def _add_leaf(self, token: PositionedToken) -> None:
         self._flush()
         span = self.content.span(token.start, token.end)
         node: Inline | None = None
         match token.type:
             case "math":
-                node = self._math(token, span)
+                node = self._read_math(token, span)
             case "code_inline":
                 node = CodeSpan(span, token.content)
             case "number_binding" | "number_given" | "number_unbound":
-                node = self._number(token, span)
+                node = self._read_number(token, span)
             case "html_inline":
-                node = self._html(token, span)
+                node = self._read_html(token, span)
             case "image":
-                node = self._image(token, span)
+                node = self._read_image(token, span)
             case "hardbreak":
                 node = HardBreak(span)
             case "footnote_ref":
-                node = self._footnote(token, span)
+                node = self._read_footnote(token, span)
             case _:
                 raise AssertionError(f"no inline for token {token.type}")
         if node is not None:
             self.stack[-1].nodes.append(node)
 
-    def _math(self, token: PositionedToken, span: Span) -> Math:
+    def _read_math(self, token: PositionedToken, span: Span) -> Math:
         assert token.map is not None
         if not token.content.strip():
             self.reader.report(diagnose("math-syntax", span, "the formula is empty"))
@@ -282,7 +282,7 @@ class _Pass:
             self.reader.session.anchors.take(label.id, label.span)
         return Math(span, tex, display, label)
 
-    def _number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
+    def _read_number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
         assert token.map is not None
         if token.type == "number_unbound":
             braces = _BRACES.match(self.content.text, token.end)
@@ -300,24 +300,24 @@ class _Pass:
             return NumberBinding(span, token.content, place, None, collapse_spaces(token.info))
         return NumberBinding(span, token.content, place, token.info or None)
 
-    def _html(self, token: PositionedToken, span: Span) -> RawInline:
+    def _read_html(self, token: PositionedToken, span: Span) -> RawInline:
         html = self.content.slice(token.start, token.end)
         for tag in tags(html.text):
             self.reader.balance.add(tag, html)
             step = 0 if tag.is_complete else -1 if tag.is_end_tag else 1
             if tag.name == "a":
-                self.links = max(0, self.links + step)
+                self.open_links = max(0, self.open_links + step)
             elif tag.name in LITERAL:
-                self.code = max(0, self.code + step)
+                self.open_literals = max(0, self.open_literals + step)
         return RawInline(span, html.text, find_media(html), find_forbidden(html))
 
-    def _image(self, token: PositionedToken, span: Span) -> Image:
+    def _read_image(self, token: PositionedToken, span: Span) -> Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])
         label_end = token.start + 2 + len(token.content)
-        place = self._destination(token.start + 1, label_end, token.end)
-        wrong = check_scheme(url, place, image=True)
-        if wrong is not None:
-            self.reader.report(wrong)
+        place = self._find_destination(token.start + 1, label_end, token.end)
+        diagnostic = check_scheme(url, place, image=True)
+        if diagnostic is not None:
+            self.reader.report(diagnostic)
             url = ""
         if not alt.strip():
             help = "say in the brackets what it shows, for readers who cannot see it"
@@ -325,22 +325,22 @@ class _Pass:
             self.reader.report(diagnose("image-alt", span, message, help=help))
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
 
-    def _footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
+    def _read_footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
         reference = self.reader.session.notes.refer(token.content, span)
         if reference is None:
-            self.run.append(TextPiece(f"[^{token.content}]", token.start, token.end))
+            self.pieces.append(TextPiece(f"[^{token.content}]", token.start, token.end))
         return reference
 
 
-def _address(text: Excerpt, at: int) -> Span | None:
-    """The address of a link that begins at an offset of a text, without angle brackets."""
-    found = parseLinkDestination(text.text, at, len(text.text))
-    angle = text.text.startswith("<", at)
-    return text.span(at + angle, found.pos - angle) if found.ok else None
+def _find_address(text: Excerpt, start: int) -> Span | None:
+    """The address that begins at an offset, without angle brackets; `None` if there is none."""
+    destination = parseLinkDestination(text.text, start, len(text.text))
+    bracket = text.text.startswith("<", start)
+    return text.span(start + bracket, destination.pos - bracket) if destination.ok else None
 
 
 def alt_text(tokens: list[Token]) -> str:
-    """The text of an image's description without marks."""
+    """The plain text of an image's description."""
     parts: list[str] = []
     for token in tokens:
         if token.type == "softbreak" or token.type == "hardbreak":

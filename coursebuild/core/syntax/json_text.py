@@ -4,10 +4,10 @@ Entry points: `parse_json(body, place)`; `to_one_line`, a value without its layo
 
 1. One pass over the text gives the nodes. The grammar is RFC 8259 and nothing more; nesting is
    limited to `MAX_DEPTH`.
-2. A mistake after which the meaning is still clear (a trailing or missing comma, a comment, `True`,
-   a bad escape, a malformed number, a repeated key) is reported and reading goes on, so that all of
-   them show in one run.
-3. After any other mistake the rest cannot be trusted: that one is reported and there is no value.
+2. If the meaning is clear in spite of a mistake (a trailing or missing comma, a comment, `True`, a
+   bad escape, a malformed number, a repeated key), it is reported and reading goes on, so that one
+   run shows all of these.
+3. Any other mistake makes the rest unreliable: it is reported, and there is no value.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from coursebuild.core.syntax.nodes import (
     NumberNode,
     ObjectNode,
     StringNode,
-    escaped_string,
+    build_string,
     odd_character,
     tex_word,
 )
@@ -50,16 +50,16 @@ _ESCAPE = re.compile(
     r"|\\u[0-9A-Fa-f]{4}|\\.|[\x00-\x1f\ud800-\udfff]"
 )
 _ESCAPES = {'"': '"', "\\": "\\", "/": "/", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t"}
-_CURLY = "“”„‟‘’‚‛«»"
-_WORDS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
-_WORDS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null")
+_CURLY_QUOTES = "“”„‟‘’‚‛«»"
+_CONSTANTS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
+_CONSTANTS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null")
 _NOT_FINITE = frozenset(("NaN", "nan", "Infinity", "inf", "Inf"))
 
 
 def parse_json(body: Excerpt, place: Span) -> Parsed[Node | None]:
-    """The value that `body` holds; `place` is what to point at when it holds none. Never raises.
+    """The value in `body`; `place` is what to point at if there is none. Never raises.
 
-    The value can be there along with diagnostics; a caller that finds any must not publish it.
+    There may be a value and diagnostics; a caller that finds any must not publish it.
     """
     if not body.text.strip(" \t\r\n"):
         message = "the block is empty: a JSON object is expected"
@@ -67,14 +67,14 @@ def parse_json(body: Excerpt, place: Span) -> Parsed[Node | None]:
         return Parsed(None, (diagnose("json-syntax", place, message, help=help),))
     reader = _Reader(body)
     try:
-        value = reader.document()
-    except _LostError:
+        value = reader.read_document()
+    except _UnreadableError:
         value = None
     return Parsed(value, tuple(reader.diagnostics))
 
 
 def to_one_line(node: Node) -> Excerpt:
-    """A value on one line, each of its parts as it is written and with its place."""
+    """A value on one line, each of its tokens as written and with its place."""
     text, pieces = "", []
     for token in _TOKEN.finditer(node.body.text, node.start, node.end):
         pieces.append((len(text), node.body.offset(token.start())))
@@ -82,12 +82,12 @@ def to_one_line(node: Node) -> Excerpt:
     return Excerpt(node.body.source, text, tuple(pieces))
 
 
-class _LostError(Exception):
+class _UnreadableError(Exception):
     """The rest of the text cannot be understood; what is wrong has been reported."""
 
 
 class _Reader:
-    """Reads a text from its beginning to its end; `at` is the place of what comes next."""
+    """Reads a text from its beginning to its end; `at` is the offset of the next character."""
 
     def __init__(self, body: Excerpt) -> None:
         self.body = body
@@ -95,9 +95,9 @@ class _Reader:
         self.at = 0
         self.diagnostics: list[Diagnostic] = []
 
-    def document(self) -> Node:
-        value = self.value(0)
-        char = self.next()
+    def read_document(self) -> Node:
+        value = self.read_value(0)
+        char = self.peek()
         if char and char in "]}":
             self.report(self.at, self.at + 1, f"`{char}` closes nothing")
         elif char:
@@ -105,8 +105,8 @@ class _Reader:
             self.report(self.at, self.at + len(line), "text after the end of the JSON value")
         return value
 
-    def next(self) -> str:
-        """The next character that is neither white space nor a mistaken comment or space."""
+    def peek(self) -> str:
+        """Skip white space; return the next character. Comments and odd spaces are reported."""
         while True:
             self.at = at = _SPACE.match(self.text, self.at).end()  # type: ignore[union-attr]  # it matches nothing too
             char = self.text[at : at + 1]
@@ -123,134 +123,140 @@ class _Reader:
 
     # ----------------------------------------------------------------------- objects and arrays
 
-    def value(self, depth: int) -> Node:
-        char, start = self.next(), self.at
+    def read_value(self, depth: int) -> Node:
+        char, start = self.peek(), self.at
         if char == '"':
-            return self.string()
+            return self.read_string()
         if char and char in "{[":
             if depth == MAX_DEPTH:
                 message = f"objects and arrays nest more than {MAX_DEPTH} deep"
                 self.report(start, start + 1, message)
-                raise _LostError
+                raise _UnreadableError
             self.at += 1
-            return self.object(start, depth) if char == "{" else self.array(start, depth)
+            return self.read_object(start, depth) if char == "{" else self.read_array(start, depth)
         scalar = _SCALAR.match(self.text, start)
         if scalar is None:
-            self.expected("a value")
+            self.fail_expecting("a value")
         self.at = scalar.end()
-        return self.scalar(start, scalar[0])
+        return self.read_scalar(start, scalar[0])
 
-    def object(self, start: int, depth: int) -> ObjectNode:
+    def read_object(self, start: int, depth: int) -> ObjectNode:
         members: list[Member] = []
-        known: dict[str, StringNode] = {}
-        done = self.next() == "}"
-        while not done:
-            if self.next() != '"':
-                self.expected("a key in double quotes", opened=start)
-            key = self.string()
-            first = known.setdefault(key.value, key)
+        keys: dict[str, StringNode] = {}
+        is_done = self.peek() == "}"
+        while not is_done:
+            if self.peek() != '"':
+                self.fail_expecting("a key in double quotes", opening=start)
+            key = self.read_string()
+            first = keys.setdefault(key.value, key)
             if first is not key:
                 message = f"`{shorten(key.value)}` is given twice"
                 notes = (Note("the first one is here", first.span),)
                 self.diagnostics.append(diagnose("field-repeated", key.span, message, notes=notes))
-            self.colon(key)
-            members.append(Member(key, self.value(depth + 1)))
-            done = self.separator(start, "}")
+            self.read_colon(key)
+            members.append(Member(key, self.read_value(depth + 1)))
+            is_done = self.read_separator(start, "}")
         self.at += 1
         return ObjectNode(self.body, start, self.at, (start, start + 1), tuple(members))
 
-    def array(self, start: int, depth: int) -> ArrayNode:
+    def read_array(self, start: int, depth: int) -> ArrayNode:
         items: list[Node] = []
-        done = self.next() == "]"
-        while not done:
-            if not self.next():
-                self.unclosed(start)
-            items.append(self.value(depth + 1))
-            done = self.separator(start, "]")
+        is_done = self.peek() == "]"
+        while not is_done:
+            if not self.peek():
+                self.fail_unclosed(start)
+            items.append(self.read_value(depth + 1))
+            is_done = self.read_separator(start, "]")
         self.at += 1
         return ArrayNode(self.body, start, self.at, (start, start + 1), tuple(items))
 
-    def colon(self, key: StringNode) -> None:
-        char = self.next()
+    def read_colon(self, key: StringNode) -> None:
+        char = self.peek()
         if char == "=":
             self.report(self.at, self.at + 1, "`=` where JSON has `:`", "write `:`")
         elif char != ":":
-            self.expected(f"`:` after the key `{shorten(key.value)}`")
+            self.fail_expecting(f"`:` after the key `{shorten(key.value)}`")
         self.at += 1
 
-    def separator(self, opened: int, closer: str) -> bool:
-        """After a value: whether it was the last one; otherwise past the comma."""
+    def read_separator(self, opening: int, closer: str) -> bool:
+        """Read what follows a value, the comma included; whether it was the last value."""
         end = self.at
-        char, comma = self.next(), self.at
+        char, comma = self.peek(), self.at
         if char == ",":
             self.at += 1
-            while self.next() == ",":
+            while self.peek() == ",":
                 message = "two commas with no value between them"
                 self.report(self.at, self.at + 1, message, "remove one")
                 self.at += 1
-            if self.next() == closer:
+            if self.peek() == closer:
                 self.report(comma, comma + 1, f"a comma before `{closer}`", "remove the comma")
         elif char != closer:
             key = _KEY.match(self.text, self.at)
             if not (key if closer == "}" else char and char in '"{[-0123456789'):
-                self.expected(f"`,` or `{closer}`", opened=opened)
+                self.fail_expecting(f"`,` or `{closer}`", opening=opening)
             self.report(end, end, "a comma is missing here", "put `,` between the two values")
-        return self.next() == closer
+        return self.peek() == closer
 
     # ---------------------------------------------------------------------------------- scalars
 
-    def scalar(self, start: int, written: str) -> Node:
+    def read_scalar(self, start: int, text: str) -> Node:
         """A number or word; `ErrorNode` for one that is not JSON."""
         end = self.at
-        if written in ("true", "false"):
-            return BoolNode(self.body, start, end, written == "true")
-        if written == "null":
+        if text in ("true", "false"):
+            return BoolNode(self.body, start, end, text == "true")
+        if text == "null":
             return NullNode(self.body, start, end)
-        number = _NUMBER.fullmatch(written)
+        number = _NUMBER.fullmatch(text)
         if number is not None and (number[1] or number[2]):
-            return NumberNode(self.body, start, end, float(written))
+            return NumberNode(self.body, start, end, float(text))
         if number is not None:
             try:
-                return NumberNode(self.body, start, end, int(written))
-            except ValueError:  # the interpreter converts no more than some thousand digits
+                return NumberNode(self.body, start, end, int(text))
+            except ValueError:  # Python converts no more than some thousand digits
                 message, help = f"a number of {end - start} digits is too long", ""
-        elif written in _WORDS:
-            message, help = f"`{written}` is not JSON", f"write `{_WORDS[written]}`"
-        elif written.lstrip("+-") in _NOT_FINITE:
-            message, help = f"JSON has no `{written}`", "write a finite number"
-        elif written[0] in "+-.0123456789":
-            message, help = f"`{shorten(written)}` is not a number of JSON", _number_help(written)
+        elif text in _CONSTANTS:
+            message, help = f"`{text}` is not JSON", f"write `{_CONSTANTS[text]}`"
+        elif text.lstrip("+-") in _NOT_FINITE:
+            message, help = f"JSON has no `{text}`", "write a finite number"
+        elif text[0] in "+-.0123456789":
+            message, help = f"`{shorten(text)}` is not a number of JSON", _number_help(text)
         else:
             self.at = start
-            self.expected("a value")
+            self.fail_expecting("a value")
         self.report(start, end, message, help)
         return ErrorNode(self.body, start, end)
 
-    def string(self) -> StringNode:
+    def read_string(self) -> StringNode:
         match = _STRING.match(self.text, self.at)
         if match is None:
             line = self.text[self.at :].split("\n", 1)[0].rstrip()
             help = 'close it with `"`; a line end inside a string is written `\\n`'
             message = "the string is not closed on its line"
             self.report(self.at, self.at + len(line), message, help)
-            raise _LostError
+            raise _UnreadableError
         self.at = match.end()
         content = match.span(1)
         escapes = _ESCAPE.finditer(self.text, *content)
-        return escaped_string(
-            self.body, match.span(), content, escapes, self.escape, _double, self.diagnostics
+        return build_string(
+            self.body,
+            match.span(),
+            content,
+            escapes,
+            self.decode_escape,
+            _backslash_help,
+            self.diagnostics,
         )
 
-    def escape(self, match: re.Match[str]) -> str:
-        """What an escape stands for, or a control character; a mistake is reported."""
-        written = match[0]
-        if len(written) == 12:
-            high, low = int(written[2:6], 16), int(written[8:], 16)
+    def decode_escape(self, match: re.Match[str]) -> str:
+        """The character that an escape stands for; a wrong one is reported."""
+        escape = match[0]
+        if len(escape) == 12:
+            high, low = int(escape[2:6], 16), int(escape[8:], 16)
             return chr(0x10000 + ((high - 0xD800) << 10) + low - 0xDC00)
-        if written[0] == "\\" and written[1] in _ESCAPES:
-            return _ESCAPES[written[1]]
-        code = int(written[2:], 16) if len(written) == 6 else ord(written[0])
-        if len(written) == 6 and not 0xD800 <= code < 0xE000:
+        if escape[0] == "\\" and escape[1] in _ESCAPES:
+            return _ESCAPES[escape[1]]
+        code = int(escape[2:], 16) if len(escape) == 6 else ord(escape[0])
+        if len(escape) == 6 and not 0xD800 <= code < 0xE000:
             return chr(code)
         message, help = _escape_mistake(self.text, match, code)
         self.report(match.start(), match.end(), message, help)
@@ -264,57 +270,59 @@ class _Reader:
         span = self.body.span(start, end)
         self.diagnostics.append(diagnose("json-syntax", span, message, help=help, notes=notes))
 
-    def unclosed(self, opened: int) -> NoReturn:
-        self.report(opened, opened + 1, f"`{self.text[opened]}` is never closed")
-        raise _LostError
+    def fail_unclosed(self, opening: int) -> NoReturn:
+        self.report(opening, opening + 1, f"`{self.text[opening]}` is never closed")
+        raise _UnreadableError
 
-    def expected(self, what: str, *, opened: int | None = None) -> NoReturn:
-        """Report what stands here in the place of something else; never returns."""
+    def fail_expecting(self, noun: str, *, opening: int | None = None) -> NoReturn:
+        """Report that something else stands here than `noun`, and give up."""
         text, at = self.text, self.at
         if at >= len(text):
-            if opened is not None:
-                self.unclosed(opened)
+            if opening is not None:
+                self.fail_unclosed(opening)
             last = max(len(text.rstrip()), 1)
-            self.report(last - 1, last, f"the JSON ends where {what} is expected")
-            raise _LostError
-        word = _WORD.match(text, at)
-        found = word[0] if word else text[at]
+            self.report(last - 1, last, f"the JSON ends where {noun} is expected")
+            raise _UnreadableError
+        match = _WORD.match(text, at)
+        word = match[0] if match else text[at]
         notes: tuple[Note, ...] = ()
-        if opened is not None and found in "]}":
-            notes = (Note(f"`{text[opened]}` is opened here", self.body.span(opened, opened + 1)),)
-        name = "a string" if found == '"' else f"`{shorten(found)}`"
-        help = _help(found, what)
-        self.report(at, at + len(found), f"expected {what}, found {name}", help, notes)
-        raise _LostError
+        if opening is not None and word in "]}":
+            notes = (
+                Note(f"`{text[opening]}` is opened here", self.body.span(opening, opening + 1)),
+            )
+        name = "a string" if word == '"' else f"`{shorten(word)}`"
+        help = _expectation_help(word, noun)
+        self.report(at, at + len(word), f"expected {noun}, found {name}", help, notes)
+        raise _UnreadableError
 
 
 def _escape_mistake(text: str, match: re.Match[str], code: int) -> tuple[str, str]:
     """What is wrong with an escape or a character inside a string, and how to mend it."""
-    written = match[0]
+    escape = match[0]
     if 0xD800 <= code < 0xE000:
-        name = f"`{written}`" if len(written) > 1 else f"U+{code:04X}"
+        name = f"`{escape}`" if len(escape) > 1 else f"U+{code:04X}"
         return f"{name} is half of a character", "write the character itself"
-    if written == "\t":
+    if escape == "\t":
         return "a tab inside a string", "write `\\t`, or a space"
-    if len(written) == 1:
+    if len(escape) == 1:
         message = f"the control character U+{code:04X} inside a string"
         return message, f"write `\\u{code:04x}`, or remove it"
     word = tex_word(text, match.start() + 1)
-    if written != "\\u":
-        return f"`{written}` is not an escape of JSON", _double(word)
-    help = _double(word) if len(word) > 1 else "write four hexadecimal digits after `\\u`"
+    if escape != "\\u":
+        return f"`{escape}` is not an escape of JSON", _backslash_help(word)
+    help = _backslash_help(word) if len(word) > 1 else "write four hexadecimal digits after `\\u`"
     return "`\\u` is not followed by four hexadecimal digits", help
 
 
-def _double(command: str) -> str:
+def _backslash_help(command: str) -> str:
     return f"to write a backslash, double it: `\\\\{command}`"
 
 
-def _help(found: str, what: str) -> str:
-    """How to mend what was found in the place of something else; may be empty."""
-    char = found[0]
-    letter = char.isalpha() or char == "_"
-    if char in _CURLY:
+def _expectation_help(text: str, expected: str) -> str:
+    """How to mend a text where something else was expected; may be empty."""
+    char = text[0]
+    is_letter = char.isalpha() or char == "_"
+    if char in _CURLY_QUOTES:
         return 'JSON knows only the straight quote `"`; replace the curly ones of this block'
     if char in "'`":
         return 'JSON strings stand between double quotes: `"…"`'
@@ -322,18 +330,18 @@ def _help(found: str, what: str) -> str:
         return "JSON separates values by `,`"
     if char == "(":
         return "a list stands between `[` and `]`"
-    if what.startswith("`,`") and (char.isalnum() or char == "\\"):
+    if expected.startswith("`,`") and (char.isalnum() or char == "\\"):
         return 'a double quote inside a string is written `\\"`'
-    if what == "a key in double quotes" and letter:
-        return f'write `"{shorten(found)}"`'
-    if what == "a value" and letter:
+    if expected == "a key in double quotes" and is_letter:
+        return f'write `"{shorten(text)}"`'
+    if expected == "a value" and is_letter:
         return "text stands between double quotes"
     return ""
 
 
-def _number_help(written: str) -> str:
-    """How a malformed number is written in JSON, where that is clear."""
-    for read in (lambda: int(written, 0), lambda: int(written), lambda: float(written)):
+def _number_help(text: str) -> str:
+    """How to write a malformed number in JSON, if that is clear."""
+    for read in (lambda: int(text, 0), lambda: int(text), lambda: float(text)):
         try:
             value = read()
         except ValueError:

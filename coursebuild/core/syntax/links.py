@@ -1,10 +1,10 @@
-"""Where links lead: destinations, schemes that a page must not have, and mentions.
+"""Targets of links, schemes that a page must not have, and mentions.
 
 Entry points: `classify`, `check_scheme`, `check_raw_scheme`; `may_mention`, `text_inlines` and
-`link_mentions`, by which "Lesson 2.2" and "Level 18" in prose become links by themselves.
+`link_mentions`, which make links of "Lesson 2.2" and "Level 18" in prose.
 
-Text and soft line ends that follow each other make one run, so that a mention may be broken over
-two lines. Each becomes a `Link`, whose `target_span` is the number; what is around it becomes
+Text and soft line ends that follow each other make one run, as a mention may be broken over two
+lines. A mention becomes a `Link` whose `target_span` is the number; the text around it becomes
 `Text` and `SoftBreak`.
 """
 
@@ -40,7 +40,7 @@ _FORBIDDEN = frozenset({"data", "file", "javascript", "vbscript"})
 _PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
 _BLANK = "".join(map(chr, range(33)))
 _UNSEEN = re.compile("[\t\n\r]")
-"""What browsers take out of an address before they read it; `_BLANK` at its ends."""
+"""Characters that browsers ignore in an address, as they do those of `_BLANK` at its ends."""
 _OURS = ("lesson", "model", "page", "term")
 
 
@@ -63,30 +63,30 @@ def classify(url: str) -> Target:
 
 
 def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | None:
-    """What is wrong with the scheme of a normalised destination, if anything."""
-    found = _SCHEME.match(url.strip())
-    if found is None or found[1] in _OURS:
+    """The diagnostic of a wrong scheme in a normalised destination, if it has one."""
+    match = _SCHEME.match(url.strip())
+    if match is None or match[1] in _OURS:
         return None
-    scheme = found[1].lower()
+    scheme = match[1].lower()
     if scheme in _FORBIDDEN:
         if image and _PICTURE.match(url.strip()):
             return None
         help = "link to an address with `https:`, to a file, or by "
         help += "`lesson:`, `page:`, `model:`, `term:`"
         return diagnose("link-scheme", span, f"`{scheme}:` must not stand in a page", help=help)
-    near = nearest(scheme, _OURS, cutoff=0.75)
-    if near is None:
+    likely = nearest(scheme, _OURS, cutoff=0.75)
+    if likely is None:
         return None
-    message, help = f"no link scheme `{found[1]}:`", f"did you mean `{near}:`?"
+    message, help = f"no link scheme `{match[1]}:`", f"did you mean `{likely}:`?"
     return diagnose("link-scheme", span, message, help=help)
 
 
 def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
-    """What is wrong with the scheme of an address in raw HTML, which is published as it is."""
+    """The same for an address in raw HTML, which is published as it is."""
     url = _UNSEEN.sub("", url.strip(_BLANK))
-    found = _SCHEME.match(url)
-    if found is not None and found[1].lower() in _OURS:
-        message = f"`{found[1]}:` means nothing in raw HTML"
+    match = _SCHEME.match(url)
+    if match is not None and match[1].lower() in _OURS:
+        message = f"`{match[1]}:` means nothing in raw HTML"
         help = f"write the link in Markdown: `[…]({url})`"
         return diagnose("link-scheme", span, message, help=help)
     return check_scheme(url, span, image=True)
@@ -94,11 +94,11 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"
 _LEVEL = r"[0-9]+(?:\.[0-9]+)*(?!\w)"
-_BETWEEN = r"(?:,?\s+(?:and|or|to)\s+|,\s+|\s?[–-]\s?)"
+_CONJUNCTION = r"(?:,?\s+(?:and|or|to)\s+|,\s+|\s?[–-]\s?)"
 _MENTIONS = re.compile(
     r"(?<![\w\\])(?:"
-    rf"(Lesson)(?:\s+{_LESSON}|s\s+{_LESSON}(?:{_BETWEEN}{_LESSON})*)"
-    rf"|Level(?:\s+{_LEVEL}|s\s+{_LEVEL}(?:{_BETWEEN}{_LEVEL})*))"
+    rf"(Lesson)(?:\s+{_LESSON}|s\s+{_LESSON}(?:{_CONJUNCTION}{_LESSON})*)"
+    rf"|Level(?:\s+{_LEVEL}|s\s+{_LEVEL}(?:{_CONJUNCTION}{_LEVEL})*))"
 )
 _NUMBER = re.compile(r"[0-9.]*[0-9]")
 
@@ -120,53 +120,55 @@ def may_mention(text: str) -> bool:
 
 def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts and soft line ends."""
-    out: list[Inline] = []
+    inlines: list[Inline] = []
     for is_line_end, group in groupby(run, key=lambda piece: piece.text == "\n"):
-        items = [*group]
+        pieces = [*group]
         if is_line_end:
-            out += [SoftBreak(content.span(item.start, item.end)) for item in items]
+            inlines += [SoftBreak(content.span(piece.start, piece.end)) for piece in pieces]
         else:
-            span = content.span(items[0].start, items[-1].end)
-            out.append(Text(span, "".join([item.text for item in items])))
-    return out
+            span = content.span(pieces[0].start, pieces[-1].end)
+            inlines.append(Text(span, "".join([piece.text for piece in pieces])))
+    return inlines
 
 
 def link_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
-    joined = "".join([item.text for item in run])
-    starts = [0, *accumulate(len(item.text) for item in run)]
-    out: list[Inline] = []
-    at = 0
-    for mentions in _MENTIONS.finditer(joined):
-        for number in _NUMBER.finditer(joined, *mentions.span()):
-            first = at <= mentions.start()  # whose link begins with the word
-            start = mentions.start() if first else number.start()
-            out += text_inlines(_cut(run, starts, at, start), content)
-            children = text_inlines(_cut(run, starts, start, number.end()), content)
+    text = "".join([piece.text for piece in run])
+    starts = [0, *accumulate(len(piece.text) for piece in run)]
+    inlines: list[Inline] = []
+    position = 0
+    for mentions in _MENTIONS.finditer(text):
+        for number in _NUMBER.finditer(text, *mentions.span()):
+            is_first = position <= mentions.start()  # its link includes the word
+            start = mentions.start() if is_first else number.start()
+            inlines += text_inlines(_slice_pieces(run, starts, position, start), content)
+            children = text_inlines(_slice_pieces(run, starts, start, number.end()), content)
             target = LessonTarget(number[0], None) if mentions[1] else LevelTarget(number[0])
-            digits = _cut(run, starts, *number.span())
+            digits = _slice_pieces(run, starts, *number.span())
             place = content.span(digits[0].start, digits[-1].end)
             span = children[0].span.to(children[-1].span)
-            out.append(Link(span, target, place, "", tuple(children), mention=True))
-            at = number.end()
-    return out + text_inlines(_cut(run, starts, at, len(joined)), content)
+            inlines.append(Link(span, target, place, "", tuple(children), mention=True))
+            position = number.end()
+    return inlines + text_inlines(_slice_pieces(run, starts, position, len(text)), content)
 
 
-def _cut(run: Sequence[TextPiece], starts: list[int], start: int, end: int) -> list[TextPiece]:
-    """The items between two offsets of the joined text.
+def _slice_pieces(
+    run: Sequence[TextPiece], starts: list[int], start: int, end: int
+) -> list[TextPiece]:
+    """The pieces between two offsets of the joined text, in which they begin at `starts`.
 
-    An item that is not literal keeps its whole place.
+    A part of a piece that is not literal gets the place of the whole.
     """
-    out: list[TextPiece] = []
+    pieces: list[TextPiece] = []
     i = bisect_right(starts, start) - 1
     while i < len(run) and starts[i] < end:
-        item = run[i]
-        first, last = max(start - starts[i], 0), min(end - starts[i], len(item.text))
+        piece = run[i]
+        first, last = max(start - starts[i], 0), min(end - starts[i], len(piece.text))
         if last > first:
-            text = item.text[first:last]
-            if item.literal:
-                out.append(TextPiece(text, item.start + first, item.start + last))
+            text = piece.text[first:last]
+            if piece.literal:
+                pieces.append(TextPiece(text, piece.start + first, piece.start + last))
             else:
-                out.append(item._replace(text=text))
+                pieces.append(piece._replace(text=text))
         i += 1
-    return out
+    return pieces

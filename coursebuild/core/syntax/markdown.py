@@ -1,13 +1,13 @@
 """The block parser: markdown-it's rules, and those for footnotes and formulas.
 
-Entry point: `block_tokens`. CommonMark with tables, task lists, footnotes and formulas. Besides
-what markdown-it does:
+Entry point: `block_tokens`. CommonMark with tables, task lists, footnotes and formulas. In addition
+to markdown-it:
 
-1. The first token of a block gets its place, and the rows that its content was cut from.
+1. The first token of a block gets its place, and the rows from which its content was cut.
 2. Link definitions know where they stand.
-3. What is nested deeper than `MAX_NESTING` becomes paragraphs, which say so: nothing is lost, and
-   nothing overflows. The same becomes of what is in containers where these hold far more lines
-   together than the text has: each of them reads its lines again.
+3. Blocks nested deeper than `MAX_NESTING` become paragraphs with a mark, so that nothing is lost
+   and nothing overflows. The same happens in containers that together hold far more lines than the
+   text has, since each of them reads its lines again.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from coursebuild.core.syntax.spans import BlockState, PositionedToken, SourceSli
 from coursebuild.core.text.source import Excerpt
 
 MAX_NESTING = 60
-"""Containers inside each other; a list with its item counts as two."""
+"""How deep containers may nest; a list with its item counts as two."""
 TOO_DEEP = "too deep"
-"""The info of a paragraph that would be something else, did it not nest so deep."""
-_READINGS = 5
+"""The info of a paragraph that would be another block if it were not nested so deep."""
+_MAX_READINGS = 5
 _SPARE_LINES = 10_000
-"""How often containers may read the lines of a text, on average, and how many lines more."""
+"""Containers may read so many times the lines of a text, and so many lines more."""
 
 BlockRule = Callable[[StateBlock, int, int, bool], bool]
 
@@ -49,42 +49,42 @@ def block_tokens(base: Excerpt, references: References) -> list[PositionedToken]
     """
     env: EnvType = {"references": references, "base": base}
     state = BlockState(base.text, _MARKDOWN, env)
-    state.lines_left = _READINGS * state.lineMax + _SPARE_LINES
+    state.lines_left = _MAX_READINGS * state.lineMax + _SPARE_LINES
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
     return cast(list[PositionedToken], state.tokens)
 
 
 def _footnote_definition(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """`[^label]: …`, whose opening token gets a place like any other."""
-    before = len(state.tokens)
+    """The rule for `[^label]: …`; its tokens become positioned ones, as all others are."""
+    token_count = len(state.tokens)
     if not footnote_def(state, start, end, silent):
         return False
     if not silent:
-        for i in (before, -1):
-            plain = state.tokens[i]
-            placed = PositionedToken(plain.type, plain.tag, plain.nesting, level=plain.level)
-            placed.map, placed.content = plain.map, str(plain.meta.get("label", ""))
-            state.tokens[i] = placed
+        for i in (token_count, -1):
+            token = state.tokens[i]
+            positioned = PositionedToken(token.type, token.tag, token.nesting, level=token.level)
+            positioned.map, positioned.content = token.map, str(token.meta.get("label", ""))
+            state.tokens[i] = positioned
     return True
 
 
-def _located_reference(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """A link definition, with which its place is kept."""
-    known: References = state.env["references"]
-    count = len(known)
+def _link_definition(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """The rule for a link definition, which also stores its place."""
+    references: References = state.env["references"]
+    count = len(references)
     if not reference(state, start, end, silent):
         return False
-    if not silent and len(known) > count:
+    if not silent and len(references) > count:
         base: Excerpt = state.env["base"]
         starts = (state.bMarks[line] + state.tShift[line] for line in range(start, state.line))
         ends = state.eMarks[start : state.line]
         rows = [base.slice(at, end + 1) for at, end in zip(starts, ends, strict=True)]
-        known[next(reversed(known))]["place"] = Excerpt.join(rows)
+        references[next(reversed(references))]["place"] = Excerpt.join(rows)
     return True
 
 
 class _BlockParser(ParserBlock):
-    """Counts the lines that containers read."""
+    """markdown-it's block parser, which also counts the lines that containers read."""
 
     def tokenize(self, state: StateBlock, startLine: int, endLine: int) -> None:
         assert isinstance(state, BlockState)
@@ -92,11 +92,11 @@ class _BlockParser(ParserBlock):
         super().tokenize(state, startLine, endLine)
 
 
-def _too_deep(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """A paragraph, where containers nest deeper than anybody writes them."""
+def _deep_paragraph(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """The rule for containers nested deeper than anybody writes: they become a paragraph."""
     assert isinstance(state, BlockState)
-    deep = state.level >= MAX_NESTING or (state.level > 0 and state.lines_left < 0)
-    if silent or not deep:
+    is_deep_paragraph = state.level >= MAX_NESTING or (state.level > 0 and state.lines_left < 0)
+    if silent or not is_deep_paragraph:
         return False
     at = len(state.tokens)
     paragraph(state, start, end, False)
@@ -104,7 +104,7 @@ def _too_deep(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     return True
 
 
-_FIRST = {
+_FIRST_CHARACTERS = {
     "fence": "`~",
     "heading": "#",
     "hr": "*-_",
@@ -115,41 +115,41 @@ _FIRST = {
     "footnote": "[",
     "math": "$",
 }
-"""What blocks begin with, so that most lines ask few rules."""
+"""The first characters of blocks, so that few rules are tried on most lines."""
 
 
-def _placed(rule: BlockRule, first: str | None) -> BlockRule:
-    """A rule, for what begins with one of the characters `first`, whose tokens get their places."""
+def _with_places(rule: BlockRule, first: str | None) -> BlockRule:
+    """Restrict a rule to blocks that begin with a character of `first`; give its tokens places."""
 
     def run(state: StateBlock, start: int, end: int, silent: bool) -> bool:
         begin = state.bMarks[start] + state.tShift[start]
         if first is not None and state.src[begin : begin + 1] not in first:
             return False
         assert isinstance(state, BlockState)
-        before = len(state.tokens)
-        found = rule(state, start, end, silent)
-        if found and len(state.tokens) > before:
-            _place(state, before, begin)
-        return found
+        token_count = len(state.tokens)
+        applies = rule(state, start, end, silent)
+        if applies and len(state.tokens) > token_count:
+            _set_place(state, token_count, begin)
+        return applies
 
     return run
 
 
-def _place(state: BlockState, before: int, begin: int) -> None:
-    """Say where the block with its first token at `before` stands, while the state still knows."""
-    opened = state.tokens[before]
-    assert isinstance(opened, PositionedToken)
+def _set_place(state: BlockState, first_token: int, begin: int) -> None:
+    """Give its place, which the state forgets soon, to the block that begins with `first_token`."""
+    opening = state.tokens[first_token]
+    assert isinstance(opening, PositionedToken)
     last = state.line - 1
-    first = opened.map[0] if opened.map else last
+    first = opening.map[0] if opening.map else last
     while last > first and state.isEmpty(last):
         last -= 1
-    opened.start, opened.end = begin, state.eMarks[last]
-    if opened.type in ("fence", "code_block", "html_block", "paragraph_open"):
-        opened.rows = state.rows
-    elif opened.type == "heading_open":
-        opened.rows = _atx_row(state, begin) if opened.markup[0] == "#" else state.rows
-    elif opened.type == "table_open":
-        for token in state.tokens[before:]:
+    opening.start, opening.end = begin, state.eMarks[last]
+    if opening.type in ("fence", "code_block", "html_block", "paragraph_open"):
+        opening.rows = state.rows
+    elif opening.type == "heading_open":
+        opening.rows = _atx_row(state, begin) if opening.markup[0] == "#" else state.rows
+    elif opening.type == "table_open":
+        for token in state.tokens[first_token:]:
             if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
                 row = token.map[0]
                 token.start = state.bMarks[row] + state.tShift[row]
@@ -157,7 +157,7 @@ def _place(state: BlockState, before: int, begin: int) -> None:
 
 
 def _atx_row(state: BlockState, begin: int) -> list[SourceSlice]:
-    """The row that a `#` heading's content is; its rule trims it by itself."""
+    """The row of a `#` heading's content, which its rule does not cut by `getLines`."""
     content = state.tokens[-2].content
     at = state.skipCharsStr(begin, "#")
     while content and state.src[at] in MD_TRIM_CHARS:
@@ -165,24 +165,24 @@ def _atx_row(state: BlockState, begin: int) -> list[SourceSlice]:
     return [SourceSlice(at, at + len(content))]
 
 
-def _configured() -> MarkdownIt:
+def _build_parser() -> MarkdownIt:
     """The parser: markdown-it's rules and ours, each with the blocks that it may interrupt."""
     md = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
     md.block = _BlockParser()
-    rules = {known.name: (known.fn, known.alt) for known in md.block.ruler.__rules__}
+    rules = {rule.name: (rule.fn, rule.alt) for rule in md.block.ruler.__rules__}
     interrupts = ["paragraph", "reference", "blockquote"]
-    rules["reference"] = (_located_reference, [])
+    rules["reference"] = (_link_definition, [])
     ours: dict[str, tuple[BlockRule, list[str]]] = {
-        "too deep": (_too_deep, []),
+        "too deep": (_deep_paragraph, []),
         "math": (math_block, [*interrupts, "list"]),
         "footnote": (_footnote_definition, interrupts),
     }
     md.block.ruler = Ruler()
     for name, (rule, alt) in (ours | rules).items():
-        md.block.ruler.push(name, _placed(rule, _FIRST.get(name)), {"alt": alt})
+        md.block.ruler.push(name, _with_places(rule, _FIRST_CHARACTERS.get(name)), {"alt": alt})
     # Links with dangerous schemes stay links, so that they can be reported.
     md.validateLink = lambda url: True  # type: ignore[method-assign]
     return md
 
 
-_MARKDOWN = _configured()
+_MARKDOWN = _build_parser()

@@ -29,7 +29,7 @@ _DIGITS = ("0", "1", "2", "3", "4", "5", "6", "7", "8", "9")
 
 
 def _formula_end(state: InlineState, start: int, width: int) -> int | None:
-    """Where the TeX ends that begins behind one or two dollars, if it is a formula."""
+    """The end of the TeX that begins at `start`, after `width` dollars; `None` if it is none."""
     text, limit = state.src, state.posMax
     if start >= limit or (width == 1 and text[start] in _SPACE):
         return None
@@ -56,7 +56,7 @@ def _formula_end(state: InlineState, start: int, width: int) -> int | None:
 def math_inline(state: StateInline, silent: bool) -> bool:
     """The inline rule: a token `math`, or `math_unclosed` for a `$$` without end.
 
-    The TeX stands where `map` says; `meta` says where braces are that belong to the formula.
+    `map` has the offsets of the TeX, `meta` those of the formula's attributes in braces.
     """
     assert isinstance(state, InlineState)
     run = _DOLLARS.match(state.src, state.pos, state.posMax)
@@ -81,26 +81,26 @@ def math_inline(state: StateInline, silent: bool) -> bool:
 
 
 def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) -> bool:
-    """The block rule: a token `math_block`, with `info` "unclosed" where it has no end."""
+    """The block rule: a token `math_block`, with the `info` "unclosed" if it has no end."""
     assert isinstance(state, BlockState)
     begin = state.bMarks[start_line] + state.tShift[start_line]
     run = _DOLLARS.match(state.src, begin, state.eMarks[start_line])
     if run is None or len(run[0]) != 2 or state.is_code_block(start_line):
         return False
-    line, at, closed = start_line, run.end(), False
+    line, start, is_closed = start_line, run.end(), False
     while True:
-        close = _closing(state.src, at, state.eMarks[line])
-        if close is not None:
-            rest = state.src[close + 2 : state.eMarks[line]].strip(" \t")
+        closing = _find_closing(state.src, start, state.eMarks[line])
+        if closing is not None:
+            rest = state.src[closing + 2 : state.eMarks[line]].strip(" \t")
             if rest and not _LABEL.fullmatch(rest):
                 return False
-            closed = True
+            is_closed = True
             line += 1
             break
         line += 1
         if line >= end_line or state.isEmpty(line) or state.sCount[line] < state.blkIndent:
             break
-        at = state.bMarks[line] + state.tShift[line]
+        start = state.bMarks[line] + state.tShift[line]
     if silent:
         return True
     state.line = line
@@ -109,13 +109,13 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
     token.content = state.getLines(start_line, line, state.sCount[start_line], False)
     token.rows = state.rows
     token.map = [start_line, line]
-    token.info = "" if closed else "unclosed"
+    token.info = "" if is_closed else "unclosed"
     return True
 
 
-def _closing(src: str, at: int, end: int) -> int | None:
-    """Where the first `$$` between two offsets stands that no backslash escapes."""
-    if src.find("$$", at, end) < 0:
+def _find_closing(src: str, start: int, end: int) -> int | None:
+    """The offset of the first `$$` between two offsets that no backslash escapes."""
+    if src.find("$$", start, end) < 0:
         return None
-    found = _BLOCK_TEX.match(src, at, end).end()  # type: ignore[union-attr]  # it matches nothing too
-    return found if src.startswith("$$", found, end) else None
+    tex_end = _BLOCK_TEX.match(src, start, end).end()  # type: ignore[union-attr]  # it matches nothing too
+    return tex_end if src.startswith("$$", tex_end, end) else None

@@ -1,10 +1,10 @@
 """Values of JSON and TOML that know where they stand.
 
-Entry points: the union `Node`, `Member`; `escaped_string`, `tex_word`, `odd_character` for those
-who make them. Both languages give the same nodes, so that one decoder serves both.
+Entry points: the union `Node`, `Member`; `build_string`, `tex_word` and `odd_character` for the
+parsers. Both languages give the same nodes, so that one decoder serves both.
 
-A node keeps offsets into the excerpt that was parsed; its `span` in the lesson is worked out when
-it is asked for. Nodes compare by identity: two equal numbers at two places are two nodes.
+A node keeps offsets into the excerpt that was parsed; its `span` in the lesson is worked out on
+demand. Nodes compare by identity: two equal numbers at two places are two nodes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from coursebuild.core.text.source import Excerpt, Span
 
 
 class _PositionedNode(Struct, frozen=True, eq=False):
-    """What every node has: its stretch `[start, end)` of the text that was parsed."""
+    """A node at `[start, end)` of the text that was parsed."""
 
     body: Excerpt
     start: int
@@ -30,17 +30,17 @@ class _PositionedNode(Struct, frozen=True, eq=False):
 
     @property
     def span(self) -> Span:
-        """Where it stands."""
+        """The whole node in the source."""
         return self.body.span(self.start, self.end)
 
     @property
     def mark(self) -> Span:
-        """What to point at in a message: all of a scalar, the opening of an object or array."""
+        """The part to point at in a message: all of a scalar, the opening of a container."""
         return self.span
 
     @property
     def raw(self) -> str:
-        """The value as it is written."""
+        """The value as written."""
         return self.body.text[self.start : self.end]
 
 
@@ -48,11 +48,11 @@ class StringNode(_PositionedNode, frozen=True, eq=False):
     """A string, a key included."""
 
     excerpt: Excerpt
-    """The text that is meant, each character with its place: an escape's is its backslash."""
+    """The text, escapes resolved, each character with its place: of an escape, its backslash."""
 
     @property
     def value(self) -> str:
-        """The text that is meant, escapes resolved."""
+        """The text, escapes resolved."""
         return self.excerpt.text
 
 
@@ -73,19 +73,19 @@ class NullNode(_PositionedNode, frozen=True, eq=False):
 
 
 class DateNode(_PositionedNode, frozen=True, eq=False):
-    """TOML's dates and times. No field takes one; `raw` says what was written."""
+    """A date or time of TOML. No field takes one."""
 
 
 class ErrorNode(_PositionedNode, frozen=True, eq=False):
-    """What stands in the place of a value and was already reported."""
+    """Stands for a value that could not be read and was reported."""
 
 
 class _Container(_PositionedNode, frozen=True, eq=False):
     """A value that holds others."""
 
     opening: tuple[int, int]
-    """The stretch of its bracket, its brace or its `[header]`; a header may stand below a part of
-    the table."""
+    """The offsets of its bracket, brace or `[header]`; a header may stand below a part of the
+    table."""
 
     @property
     def mark(self) -> Span:
@@ -103,7 +103,7 @@ class ObjectNode(_Container, frozen=True, eq=False):
     """A JSON object or a TOML table."""
 
     members: tuple[Member, ...]
-    """As written: a repeated key is in it more than once."""
+    """All members as written, even those with a repeated key."""
 
     def member(self, name: str) -> Member | None:
         """The first member of that name."""
@@ -115,28 +115,28 @@ class ObjectNode(_Container, frozen=True, eq=False):
         return None if member is None else member.value
 
     def place(self, name: str) -> Span:
-        """What to point at for a field: its value, or the opening where it is not given."""
+        """The part to point at for a field: its value, or the opening if it is not given."""
         value = self.get(name)
         return self.mark if value is None else value.mark
 
     def items(self, name: str) -> tuple[Node, ...]:
-        """What is in the array of that name."""
+        """The items of the array of that name; none if there is no such array."""
         value = self.get(name)
         return value.items if isinstance(value, ArrayNode) else ()
 
     def objects(self, name: str) -> tuple[ObjectNode, ...]:
-        """The objects in it."""
+        """The objects in the array of that name."""
         return tuple(item for item in self.items(name) if isinstance(item, ObjectNode))
 
     def object(self, name: str) -> ObjectNode:
-        """The object of that name; an empty one where there is none."""
+        """The object of that name; an empty one if there is none."""
         value = self.get(name)
         if isinstance(value, ObjectNode):
             return value
         return ObjectNode(self.body, self.start, self.end, self.opening, ())
 
     def strings(self, name: str) -> tuple[StringNode, ...]:
-        """The texts in it."""
+        """The strings in the array of that name."""
         return tuple(item for item in self.items(name) if isinstance(item, StringNode))
 
 
@@ -165,70 +165,73 @@ _COMMANDS = frozenset(
 """Commands of TeX that begin with `t` or `n`."""
 
 
-def escaped_string(
+def build_string(
     body: Excerpt,
-    quoted: tuple[int, int],
+    outer: tuple[int, int],
     content: tuple[int, int],
     escapes: Iterable[re.Match[str]],
-    meaning: Callable[[re.Match[str]], str],
+    decode_escape: Callable[[re.Match[str]], str],
     help: Callable[[str], str],
     diagnostics: list[Diagnostic],
 ) -> StringNode:
-    """The string between the offsets `quoted`, whose text without the quotes is `content`.
+    """The node of a string.
 
-    `escapes` are those in it, in order, and `meaning` says what each stands for. An escape that was
-    surely meant for TeX is reported, with what `help` says of the command.
+    `outer` has its offsets with the quotes, `content` without. `escapes` are those in it, in order,
+    and `decode_escape` decodes one. An escape that was surely meant for TeX is reported, with the
+    help that `help` gives for the command.
     """
     parts: list[Excerpt] = []
     controls: list[tuple[int, re.Match[str]]] = []
-    at, (here, end) = 0, content
+    length, (position, end) = 0, content
     for escape in escapes:
-        before = body.slice(here, escape.start())
-        meant = Excerpt(body.source, meaning(escape), ((0, body.offset(escape.start())),))
+        literal = body.slice(position, escape.start())
+        character = Excerpt(body.source, decode_escape(escape), ((0, body.offset(escape.start())),))
         if escape[0] in ("\\t", "\\n", "\\b", "\\f", "\\r"):
-            controls.append((at + len(before.text), escape))
-        parts += (before, meant)
-        at += len(before.text) + len(meant.text)
-        here = escape.end()
-    text = Excerpt.join([*parts, body.slice(here, end)])
-    for start, command in _tex_escapes(text.text, controls):
+            controls.append((length + len(literal.text), escape))
+        parts += (literal, character)
+        length += len(literal.text) + len(character.text)
+        position = escape.end()
+    text = Excerpt.join([*parts, body.slice(position, end)])
+    for start, command in _find_tex_escapes(text.text, controls):
         span = body.span(start, start + 1 + len(command))
         message = f"`\\{command[0]}` of `\\{command}` is read as a control character"
         diagnostics.append(diagnose("field-value", span, message, help=help(command)))
-    return StringNode(body, *quoted, text)
+    return StringNode(body, *outer, text)
 
 
 def tex_word(text: str, at: int) -> str:
-    """The letters that stand from `at` on."""
+    """The letters from the offset `at` on."""
     match = _LETTERS.match(text, at)
     return match[0] if match else ""
 
 
-def _tex_escapes(
+def _find_tex_escapes(
     value: str, escapes: Iterable[tuple[int, re.Match[str]]]
 ) -> Iterator[tuple[int, str]]:
-    r"""Which escapes of a decoded string were meant for TeX.
+    r"""Yield the escapes of a decoded string that were meant for TeX: their offsets and commands.
 
     Both languages read `\t`, `\n`, `\b`, `\f` and `\r` as control characters, so that "$\tau$"
     silently becomes a tab and "au". A backspace, form feed or carriage return before a letter has
     no use in a course's text; a tab or a line end has, so these are reported only before the rest
-    of a known command. `escapes` come with their offset in the value; the result has where they are
-    written, and the command.
+    of a known command. `escapes` come with their offset in the value.
     """
     if "$" not in value:
         return
     dollars = [match.start() for match in _DOLLARS.finditer(value)]
-    for at, escape in escapes:
-        letter, rest = escape[0][1], tex_word(value, at + 1)
-        known = letter + rest in _COMMANDS
-        in_math = bisect_left(dollars, at) % 2 == 1
-        meant = (known and in_math) if letter == "n" else (known or in_math or letter in "bfr")
-        if rest and meant:
+    for offset, escape in escapes:
+        letter, rest = escape[0][1], tex_word(value, offset + 1)
+        is_command = letter + rest in _COMMANDS
+        in_math = bisect_left(dollars, offset) % 2 == 1
+        if letter == "n":
+            is_tex = is_command and in_math
+        else:
+            is_tex = is_command or in_math or letter in "bfr"
+        if rest and is_tex:
             yield escape.start(), letter + rest
 
 
 def odd_character(char: str) -> str:
-    """The name of a character that looks like a space or like nothing, and is no white space."""
+    """The name of a character that looks like a space or like nothing; empty for all others."""
     if not char or char in " \t\n\r":
         return ""
     if unicodedata.category(char) in {"Zs", "Zl", "Zp", "Cf", "Cc"}:

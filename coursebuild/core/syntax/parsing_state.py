@@ -1,7 +1,7 @@
-"""What the readers of one document share: diagnostics, anchors, footnotes, the script above.
+"""The state that the readers of one document share: diagnostics, anchors, footnotes, scripts.
 
-Entry point: `ParsingState`. A document is read once, from its first line to its last; texts inside
-quizzes and labs are read where they stand.
+Entry point: `ParsingState`. A document is read once, from its first line to its last, with the
+texts inside quizzes and labs.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class ParsingState:
-    """One reading of one document."""
+    """The state of the parser of one document."""
 
     def __init__(self, callouts: frozenset[str], lesson: bool) -> None:
         self.callouts = callouts
@@ -36,31 +36,31 @@ class ParsingState:
         self.figures: list[str] = []
         """Names of figures of scripts above that no paragraph has shown yet."""
         self.has_invalid_script = False
-        """Whether the nearest script above has no path that it may have."""
+        """Whether the nearest script above was read as code, because of a mistake."""
         self.closes_indented = False
-        """Whether a fence above was indented, so that what closes it seems to open one."""
+        """Whether a fence above was indented, so that its closing line seems to open a fence."""
         self.level = 1
-        """Level of the heading above."""
+        """The level of the heading above."""
         self.notes = FootnoteList(self.report)
         self.anchors = Anchors(self.report)
 
     def collect_diagnostics(self, read: Callable[[], T]) -> Parsed[T]:
-        """What `read` gives, with the diagnostics that it raised, for the caller to pass on."""
-        before = len(self.diagnostics)
+        """Call `read`; return its value and its diagnostics, for the caller to pass on."""
+        start = len(self.diagnostics)
         value = read()
-        found = tuple(self.diagnostics[before:])
-        del self.diagnostics[before:]
-        return Parsed(value, found)
+        diagnostics = tuple(self.diagnostics[start:])
+        del self.diagnostics[start:]
+        return Parsed(value, diagnostics)
 
 
 class FootnoteText(Struct):
-    """A footnote that is written."""
+    """A footnote as it is written."""
 
     label: str
     label_span: Span
     span: Span
     read: Callable[[], tuple[Block, ...]]
-    """Reads its blocks; done once all else is read, in the order of the numbers."""
+    """Reads its blocks. It is called after all else is read, in the order of the numbers."""
     number: int = 0
     """0 until it is referred to."""
     references: int = 0
@@ -74,46 +74,47 @@ class FootnoteList(Struct):
     """
 
     report: Callable[[Diagnostic], None]
-    written: dict[str, FootnoteText] = field(default_factory=dict)
-    """By label, without case."""
-    referred: list[FootnoteText] = field(default_factory=list)
-    """In the order of their numbers."""
+    by_label: dict[str, FootnoteText] = field(default_factory=dict)
+    """All footnotes by their labels, case-folded."""
+    by_number: list[FootnoteText] = field(default_factory=list)
+    """The footnotes with a reference, in the order of their numbers."""
 
-    def write(self, note: FootnoteText) -> None:
-        """Take note of a footnote's text."""
-        first = self.written.setdefault(note.label.casefold(), note)
+    def add(self, note: FootnoteText) -> None:
+        """Add a footnote, or report that its label is in use."""
+        first = self.by_label.setdefault(note.label.casefold(), note)
         if first is not note:
             message = f"footnote `[^{note.label}]` is written twice"
             notes = [Note("first written here", first.label_span)]
             self.report(diagnose("footnote-repeated", note.label_span, message, notes=notes))
 
     def refer(self, label: str, span: Span) -> FootnoteRef | None:
-        """A reference, or `None` (and a diagnostic) where no such footnote is written."""
-        note = self.written.get(label.casefold())
+        """A reference to a footnote; `None`, with a diagnostic, if there is none of this label."""
+        note = self.by_label.get(label.casefold())
         if note is None:
-            known = [f"[^{note.label}]" for note in islice(self.written.values(), 100)]
+            labels = [f"[^{note.label}]" for note in islice(self.by_label.values(), 100)]
             message = f"footnote `[^{label}]` is not written anywhere"
-            help = did_you_mean(f"[^{label}]", known)
+            help = did_you_mean(f"[^{label}]", labels)
             help = help or f"write it as a paragraph that begins with `[^{label}]:`"
             self.report(diagnose("footnote-undefined", span, message, help=help))
             return None
         if not note.number:
-            self.referred.append(note)
-            note.number = len(self.referred)
+            self.by_number.append(note)
+            note.number = len(self.by_number)
         note.references += 1
         return FootnoteRef(span, label, note.number, note.references)
 
     def finish(self) -> tuple[Footnote, ...]:
-        """Read the footnotes, also those that only footnotes refer to, and warn of the unused."""
-        blocks = [note.read() for note in self.referred]  # which grows while they are read
+        """Read the footnotes, and warn of those without a reference."""
+        # The list grows while it is read, by footnotes to which only footnotes refer.
+        blocks = [note.read() for note in self.by_number]
         footnotes = tuple(
             Footnote(note.span, note.label, note.number, note.references, inner)
-            for note, inner in zip(self.referred, blocks, strict=True)
+            for note, inner in zip(self.by_number, blocks, strict=True)
         )
-        for note in [note for note in self.written.values() if not note.number]:
+        for note in [note for note in self.by_label.values() if not note.number]:
             message = f"footnote `[^{note.label}]` is never referred to"
             self.report(diagnose("footnote-unused", note.label_span, message))
             note.read()
-        self.written.clear()
-        self.referred.clear()  # as their readers refer back to this
+        self.by_label.clear()  # this breaks cycles: the notes' readers refer to this list
+        self.by_number.clear()
         return footnotes

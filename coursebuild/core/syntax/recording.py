@@ -25,14 +25,14 @@ _NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,
 )
-_PRINTS = re.compile(
+_OUTPUT_SENTENCE = re.compile(
     r"(?:.{0,80}[.;:!?]\s+)?[^.;:!?]{0,60}"
     r"\b(?:print(?:s|ed)?|outputs?|writes|gives|yields|returns|results?)\b[^.;!?]{0,60}:\s*",
     re.IGNORECASE | re.DOTALL,
 )
-"""A sentence that leads to what a script prints: "On this machine it prints (abridged):"."""
-_PRINTED = ("text", "", "console", "output", "plain", "plaintext", "txt")
-"""Kinds of blocks that may show what a script prints."""
+"""A sentence before an output, as in "On this machine it prints (abridged):"."""
+_OUTPUT_KINDS = ("text", "", "console", "output", "plain", "plaintext", "txt")
+"""Kinds of blocks that may show an output."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol", "volatile")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
@@ -45,10 +45,10 @@ def is_caption(inlines: tuple[Inline, ...]) -> bool:
 
 
 def check_near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> list[Diagnostic]:
-    """A warning where a block of a kind looks recorded, and is compared with nothing."""
+    """Warn if a paragraph looks like the caption of the block below it, whose kind is `kind`."""
     text = plain_text(inlines)
-    near = kind == "text" and _NEAR_CAPTION.fullmatch(text)
-    if kind not in _PRINTED or not (near or _PRINTS.fullmatch(text)):
+    is_near = kind == "text" and _NEAR_CAPTION.fullmatch(text)
+    if kind not in _OUTPUT_KINDS or not (is_near or _OUTPUT_SENTENCE.fullmatch(text)):
         return []
     message = "this looks like the caption of a recorded output, and nothing is compared"
     help = "a caption begins with the word `Output` and ends with a colon: `Output:`"
@@ -56,7 +56,7 @@ def check_near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> li
 
 
 def diagnose_missing_caption(fence: Span) -> Diagnostic:
-    """A warning where a `text` block stands directly below a script."""
+    """The warning for a `text` block directly below a script."""
     message = "this looks like the output of the script above it, and nothing is compared"
     help = "write a paragraph `Output:` between the two"
     return diagnose("recording-caption", fence.first_line(), message, help=help)
@@ -65,20 +65,20 @@ def diagnose_missing_caption(fence: Span) -> Diagnostic:
 def record_fence(
     caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: ParsingState
 ) -> Recording | None:
-    """The recording whose body may be this fence."""
+    """The recording with a caption and this fence as its body; `None` if the fence is none."""
     if not fence.is_closed or fence.inner is not None:
         return None
     if fence.kind != "text":
         if is_known_kind(fence.kind):
             session.diagnostics += check_missing_body(caption, caption_span)
         else:
-            what = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
-            session.report(diagnose_wrong_body(fence.head, what))
+            subject = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
+            session.report(diagnose_wrong_body(fence.head, subject))
         return None
     keys = fence.keys(values=_VALUES, flags=_FLAGS)
-    wrong = list(keys.diagnostics)
-    comparison = _comparison(keys.value, wrong)
-    session.diagnostics += wrong
+    diagnostics = list(keys.diagnostics)
+    comparison = _read_comparison(keys.value, diagnostics)
+    session.diagnostics += diagnostics
     return Recording(
         caption_span.to(fence.span),
         caption,
@@ -87,16 +87,16 @@ def record_fence(
         fence.body_span,
         fence.prefix,
         comparison,
-        _script(caption_span, session),
-        readable=not wrong,
+        _find_script(caption_span, session),
+        readable=not diagnostics,
     )
 
 
 def record_table(
     caption: tuple[Inline, ...], caption_span: Span, table: Table, session: ParsingState
 ) -> Recording:
-    """The recording whose body is a table."""
-    span, script = caption_span.to(table.span), _script(caption_span, session)
+    """The recording with a caption and a table as its body."""
+    span, script = caption_span.to(table.span), _find_script(caption_span, session)
     if not any(cell.text.text for row in table.rows for cell in row):
         message = "the recorded table has no rows, so that nothing is compared"
         help = "write what the script prints into the rows below the header"
@@ -105,7 +105,7 @@ def record_table(
 
 
 def check_missing_body(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
-    """The mistake of a caption without a body, where it can be nothing but a caption."""
+    """Report a caption without a body, if it can be nothing but a caption."""
     if plain_text(caption).strip() != "Output:":
         return []
     message = "no recorded output follows this line"
@@ -113,9 +113,9 @@ def check_missing_body(caption: tuple[Inline, ...], span: Span) -> list[Diagnost
     return [diagnose("recording-body", span, message, help=help)]
 
 
-def diagnose_wrong_body(span: Span, what: str) -> Diagnostic:
-    """The mistake of a caption that something else follows."""
-    message = f"the recorded output is {what}, not of kind `text`"
+def diagnose_wrong_body(span: Span, subject: str) -> Diagnostic:
+    """The diagnostic of a caption above something that is no body, called `subject`."""
+    message = f"the recorded output is {subject}, not of kind `text`"
     help = (
         "write the output in a fence that begins with ```` ```text ````, "
         "or end the paragraph without a colon"
@@ -123,8 +123,8 @@ def diagnose_wrong_body(span: Span, what: str) -> Diagnostic:
     return diagnose("recording-body", span, message, help=help)
 
 
-def _script(caption_span: Span, session: ParsingState) -> str | None:
-    """The script that a recording belongs to."""
+def _find_script(caption_span: Span, session: ParsingState) -> str | None:
+    """The path of the script above a recording; reports if there is none."""
     if session.script is None and not session.has_invalid_script:
         message = "no script stands above this recorded output"
         help = "it records what the nearest ```` ```python file=examples/….py ```` above it prints"
@@ -132,13 +132,13 @@ def _script(caption_span: Span, session: ParsingState) -> str | None:
     return session.script
 
 
-def _comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | None:
-    """How a `text` fence says that it is compared; `None` where it says nothing."""
-    rtol = _tolerance(keys.get("rtol"), diagnostics)
-    atol = _tolerance(keys.get("atol"), diagnostics)
-    _contradictions(keys, diagnostics)
+def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | None:
+    """The comparison that the keys of a `text` fence ask for; `None` without keys."""
+    rtol = _read_tolerance(keys.get("rtol"), diagnostics)
+    atol = _read_tolerance(keys.get("atol"), diagnostics)
+    _check_contradictions(keys, diagnostics)
     ellipsis = keys.get("ellipsis") is not None
-    volatile = _pattern(keys.get("volatile"), diagnostics)
+    volatile = _read_pattern(keys.get("volatile"), diagnostics)
     if keys.get("volatile") and not volatile:
         return Comparison(Mode.VOLATILE)
     mode = Mode.DIGITS if keys.get("digits") else Mode.EXACT
@@ -161,7 +161,7 @@ def check_stray_keys(fence: Fence, session: ParsingState) -> None:
         session.report(diagnose("recording-keys", span, message, help=help))
 
 
-def _tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:
+def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:
     if word is None or word.value is None:
         return None
     value = Decimal(word.value) if _NUMBER.fullmatch(word.value) else None
@@ -174,8 +174,8 @@ def _tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | No
     return None
 
 
-def _pattern(word: Word | None, diagnostics: list[Diagnostic]) -> str:
-    """The regular expression of what differs from run to run; empty where there is none."""
+def _read_pattern(word: Word | None, diagnostics: list[Diagnostic]) -> str:
+    """The regular expression of what differs from run to run; empty if there is none."""
     if word is None or word.value_text is None:
         return ""
     pattern = word.value_text.text
@@ -189,8 +189,8 @@ def _pattern(word: Word | None, diagnostics: list[Diagnostic]) -> str:
     return ""
 
 
-def _contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
-    """Report the first key that does not go with one before it."""
+def _check_contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
+    """Report the first key that contradicts one before it."""
     words = [w for w in keys.words if w.key != "volatile" or w.value is None]
     for i, second in enumerate(words):
         for first in words[:i]:
@@ -198,25 +198,25 @@ def _contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
             if len(modes) == 2 and ("ellipsis" not in modes or "volatile" in modes):
                 message = f"`{second.key}` contradicts `{first.key}`"
                 notes = [Note(f"`{first.key}` is given here", first.key_span)]
-                wrong = diagnose("recording-keys", second.key_span, message, notes=notes)
-                diagnostics.append(wrong)
+                diagnostic = diagnose("recording-keys", second.key_span, message, notes=notes)
+                diagnostics.append(diagnostic)
                 return
 
 
 def read_figure(
-    children: tuple[Inline, ...], span: Span, drawn: list[str]
+    children: tuple[Inline, ...], span: Span, figure_names: list[str]
 ) -> tuple[tuple[Inline, ...], bool]:
     """The inlines of a paragraph that begins with `Figure:`, and whether it shows an image.
 
-    `drawn` are the names of what scripts above draw and nothing has shown yet. A paragraph without
-    an image shows the next of them, beside the lesson, and says in its words what that shows.
+    `figure_names` has the figures of scripts above that nothing has shown yet. A paragraph without
+    an image shows the first of them, a file beside the lesson, with its text as the alternative.
     """
-    image = next((one for one in children if isinstance(one, Image)), None)
-    if image is None and drawn:
+    image = next((child for child in children if isinstance(child, Image)), None)
+    if image is None and figure_names:
         text = " ".join(plain_text(children).removeprefix(FIGURE).split())
-        image = Image(span, drawn[0], text, "", span)
+        image = Image(span, figure_names[0], text, "", span)
         children = (*children, image)
     name = "" if image is None else posixpath.basename(image.url)
-    if name in drawn:
-        drawn.remove(name)
+    if name in figure_names:
+        figure_names.remove(name)
     return children, image is not None

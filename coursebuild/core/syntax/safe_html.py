@@ -2,8 +2,8 @@
 
 Entry point: `find_forbidden`.
 
-1. HTML may hold text, comments, and the elements and attributes that are named here, in a form that
-   every parser reads alike.
+1. HTML may hold text, comments, and the elements and attributes listed here, in a form that every
+   parser reads alike.
 2. Nothing is removed or rewritten: what is published is the text that was judged.
 """
 
@@ -58,12 +58,12 @@ _STYLES = frozenset(
 """Attributes whose value is CSS, or is read as such."""
 _STYLE = re.compile(r"(?:(?!url|position)[^\\\"'@{}<>]|url\(#[\w-]+\))*+", re.IGNORECASE)
 _ADDRESSES = frozenset("cite href poster src srcset xlink:href".split())
-"""Attributes whose schemes and files are looked at in every course."""
+"""Attributes whose schemes and files are checked in every course."""
 
 _ATTRIBUTE = r"""\s+([A-Za-z][A-Za-z0-9:_-]*)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?"""
 _TAG = re.compile(rf"<([A-Za-z][A-Za-z0-9-]*)((?:{_ATTRIBUTE})*+)\s*/?>")
 _ATTRIBUTES = re.compile(_ATTRIBUTE)
-_PLAIN = re.compile(
+_HARMLESS = re.compile(
     r"[^<]++|<(?![A-Za-z/!?])|</[A-Za-z][A-Za-z0-9-]*\s*>|<!--(?!-?>)(?:(?!--!?>|</title).)*+-->",
     re.DOTALL | re.IGNORECASE,
 )
@@ -72,46 +72,47 @@ _PLAIN = re.compile(
 
 def find_forbidden(html: Excerpt) -> tuple[ForbiddenHtml, ...]:
     """The parts of HTML that a page must not hold."""
-    found = _forbidden(html.text)
-    return tuple(ForbiddenHtml(html.span(start, end), message) for start, end, message in found)
+    parts = _check_html(html.text)
+    return tuple(ForbiddenHtml(html.span(start, end), message) for start, end, message in parts)
 
 
-def _forbidden(html: str) -> Iterator[tuple[int, int, str]]:
+def _check_html(html: str) -> Iterator[tuple[int, int, str]]:
+    """Yield the start, the end and the message of each part that is not allowed."""
     at = 0
     while at < len(html):
-        tag = _TAG.match(html, at)
-        plain = None if tag else _PLAIN.match(html, at)
-        if tag is not None:
-            yield from _in_tag(html, tag)
-        elif plain is None and html.startswith("<!--", at) and "-->" not in html[at:]:
+        if (tag := _TAG.match(html, at)) is not None:
+            yield from _check_tag(html, tag)
+            at = tag.end()
+        elif (harmless := _HARMLESS.match(html, at)) is not None:
+            at = harmless.end()
+        elif html.startswith("<!--", at) and "-->" not in html[at:]:
             return  # an error in every course
-        elif plain is None:
+        else:
             end = html.find(">", at) + 1 or len(html)
             yield at, end, "this is not HTML that every browser reads in the same way"
-        found = tag or plain
-        at = end if found is None else found.end()
+            at = end
 
 
-def _in_tag(html: str, tag: re.Match[str]) -> Iterator[tuple[int, int, str]]:
-    name = tag[1].lower()
-    if name not in _ELEMENTS:
+def _check_tag(html: str, tag: re.Match[str]) -> Iterator[tuple[int, int, str]]:
+    element = tag[1].lower()
+    if element not in _ELEMENTS:
         yield *tag.span(), f"`<{tag[1]}>` must not stand in a page"
         return
     for attribute in _ATTRIBUTES.finditer(html, *tag.span(2)):
-        written, value = attribute[1], unescape((attribute[2] or "").strip("\"'"))
-        what = _wrong(name, written.lower(), value)
-        if what:
-            yield attribute.start(1), attribute.end(), f"{what} must not stand in a page"
+        value = unescape((attribute[2] or "").strip("\"'"))
+        subject = _find_forbidden_part(element, attribute[1].lower(), value)
+        if subject:
+            yield attribute.start(1), attribute.end(), f"{subject} must not stand in a page"
 
 
-def _wrong(element: str, name: str, value: str) -> str:
-    """What is wrong with an attribute, as words; empty where it is allowed."""
-    if "</title" in value.lower():  # outside of a drawing, all that a browser sees in a title
+def _find_forbidden_part(element: str, name: str, value: str) -> str:
+    """The part of an attribute that is forbidden, in words; empty if it is allowed."""
+    if "</title" in value.lower():  # ends a `<title>` of HTML even inside quotes
         return f"`{name}` with the end of a title"
     if name in _ADDRESSES:
         outside = element == "use" and not value.startswith("#")
         return f"`<use>` of another file, `{value}`," if outside else ""
-    if name == "name":  # of a picture, it would hide a property of the document
+    if name == "name":  # on an image it would hide a property of `document`
         return "" if element in ("a", "details") else "the attribute `name`"
     if name in _STYLES:
         return "" if _STYLE.fullmatch(value) else f"`{name}` with such a value"

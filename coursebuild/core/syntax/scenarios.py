@@ -1,14 +1,14 @@
-"""The file beside a model, models/NAME.toml: its scenarios, and findings of the diet to keep.
+"""The file beside a model, models/NAME.toml: its scenarios, and the findings of `diet` to keep.
 
 Entry point: `parse_declarations(source)`.
 
 1. The TOML is read into nodes, and these into the declared tables, from which the JSON Schema for
    editors is made too.
-2. What no type can say is checked on every table whose own fields are right: that names differ,
-   that a duration is a whole number of samples and a sample one of timesteps, that commands are of
-   one length.
-3. When nothing is wrong, the tables become the declarations. What only the compiled model can tell
-   is checked where that is known.
+2. Rules that types cannot express are checked on every table whose own fields are right: names
+   differ, a duration is a whole number of samples and a sample one of timesteps, all commands have
+   the same length.
+3. If nothing is wrong, the tables become the declarations. What depends on the compiled model is
+   checked in `core/checks/compiled`.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.source import Source, Span
 
 MOST_SAMPLES = 100_000
-"""Looks at the state in a scenario."""
+"""The most samples of the state in a scenario."""
 MOST_VALUES, MOST_THREADS = 100, 256
-"""Of a sweep: values of all parameters together, and threads."""
-_SLACK = 1e-9
-"""Relative: decimal fractions are not exact."""
+"""The most values of a sweep, those of all parameters together, and the most threads."""
+_TOLERANCE = 1e-9
+"""A relative tolerance, as decimal fractions are not exact."""
 
 
 class ModelFile(Struct, frozen=True, forbid_unknown_fields=True):
@@ -68,55 +68,57 @@ class ModelFile(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def parse_declarations(source: Source) -> Parsed[Declarations | None]:
-    """What the file declares; no value where it cannot be used. Never raises."""
-    parsed = parse_toml(source, rule="toml-syntax")
-    root = parsed.value
+    """The declarations of the file; no value if they cannot be used. Never raises."""
+    parsed_toml = parse_toml(source, rule="toml-syntax")
+    root = parsed_toml.value
     if root is None:
-        return Parsed(None, sort_diagnostics(parsed.diagnostics))
+        return Parsed(None, sort_diagnostics(parsed_toml.diagnostics))
     decoding = decode(root, ModelFile, "the file", TOML)
-    found = [
-        *parsed.diagnostics,
+    diagnostics = [
+        *parsed_toml.diagnostics,
         *decoding.diagnostics,
         *_check_scenarios(root, decoding),
         *_check_sweeps(root, decoding),
         *_check_names(root, decoding),
     ]
-    if found or decoding.value is None:
-        return Parsed(None, sort_diagnostics(found))
-    return Parsed(_declarations(source, root, decoding.value), ())
+    if diagnostics or decoding.value is None:
+        return Parsed(None, sort_diagnostics(diagnostics))
+    return Parsed(_build_declarations(source, root, decoding.value), ())
 
 
 # ---------------------------------------------------------------------------------------- values
 
 
-def _declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declarations:
+def _build_declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declarations:
     keeps = zip(root.objects("keep"), fields.keep, strict=True)
     return Declarations(
         model=source.path.removeprefix("models/").removesuffix(".toml"),
         source=source,
-        scenarios=tuple(map(_scenario, root.objects("scenario"), fields.scenario)),
+        scenarios=tuple(map(_build_scenario, root.objects("scenario"), fields.scenario)),
         keep=tuple(
             Keep(**asdict(table), finding_span=node.place("finding")) for node, table in keeps
         ),
         bench=fields.bench or BenchTable(),
-        sweeps=tuple(map(_sweep, root.objects("sweep"), fields.sweep)),
+        sweeps=tuple(map(_build_sweep, root.objects("sweep"), fields.sweep)),
     )
 
 
-def _sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
+def _build_sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
     spans = {member.key.value: member.key.mark for member in node.object("vary").members}
-    variations = (_variation(name, given, spans[name]) for name, given in table.vary.items())
+    variations = (
+        _build_variation(name, values, spans[name]) for name, values in table.vary.items()
+    )
     return DeclaredSweep(**asdict(table), variations=tuple(variations))
 
 
-def _variation(name: str, given: tuple[SweepValue, ...] | str, span: Span) -> Variation:
-    if not isinstance(given, str):
-        return Variation(name, given, relative=False, span=span)
-    share = float(given.strip("± %")) / 100
+def _build_variation(name: str, values: tuple[SweepValue, ...] | str, span: Span) -> Variation:
+    if not isinstance(values, str):
+        return Variation(name, values, relative=False, span=span)
+    share = float(values.strip("± %")) / 100
     return Variation(name, (1 - share, 1 + share), relative=True, span=span)
 
 
-def _scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
+def _build_scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
     places = tuple((member.key.value, member.value.mark) for member in node.members)
     return DeclaredScenario(**asdict(table), span=node.mark, places=places)
 
@@ -130,26 +132,26 @@ def _check_names(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Di
         ("sweep", SweepTable, "name", "two sweeps have the name `{}`"),
         ("keep", KeepTable, "finding", "the finding `{}` is kept twice"),
     ):
-        found = decoding.valid_structs(root.objects(kind), table)
-        named = [(getattr(one, field), node.place(field)) for node, one in found]
-        yield from check_unique(named, "field-value", message)
+        structs = decoding.valid_structs(root.objects(kind), table)
+        names = [(getattr(struct, field), node.place(field)) for node, struct in structs]
+        yield from check_unique(names, "field-value", message)
 
 
 def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    known = [
+    names = [
         table.name for _, table in decoding.valid_structs(root.objects("scenario"), ScenarioTable)
     ]
     for node, table in decoding.valid_structs(root.objects("sweep"), SweepTable):
-        if table.scenario is not None and table.scenario not in known:
+        if table.scenario is not None and table.scenario not in names:
             message = f"no scenario is called `{table.scenario}`"
-            help = did_you_mean(table.scenario, known)
+            help = did_you_mean(table.scenario, names)
             yield diagnose("field-value", node.place("scenario"), message, help=help)
-        count = sum(2 if isinstance(one, str) else len(one) for one in table.vary.values())
+        count = sum(2 if isinstance(values, str) else len(values) for values in table.vary.values())
         if count > MOST_VALUES:
             message, help = f"the sweep has {count} values", f"{MOST_VALUES} are the most"
             yield diagnose("field-value", node.place("vary"), message, help=help)
         counts = table.vary.get("threads", ())
-        if not all(one in range(1, MOST_THREADS + 1) for one in counts):
+        if not all(values in range(1, MOST_THREADS + 1) for values in counts):
             message = f"`threads` are whole numbers from 1 to {MOST_THREADS}"
             yield diagnose("field-value", node.object("vary").place("threads"), message)
 
@@ -171,7 +173,7 @@ def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]
             message = f"`{name}` ({length:g} s) is no multiple of `sample` ({sample:g} s)"
             help = "the state is looked at in even steps, and a command changes at such a look"
             yield diagnose("field-value", node.place(name), message, help=help)
-    if duration is not None and duration / sample > MOST_SAMPLES * (1 + _SLACK):
+    if duration is not None and duration / sample > MOST_SAMPLES * (1 + _TOLERANCE):
         message = f"`sample` makes {duration / sample:.3g} looks at the state"
         help = f"{MOST_SAMPLES} are the most: look less often"
         yield diagnose("field-value", node.place("sample"), message, help=help)
@@ -180,7 +182,7 @@ def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]
 def _check_timesteps(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
     spans = [item.mark for item in node.items("timesteps")]
     pairs = list(zip(table.timesteps, spans, strict=True))
-    for (length, name), (step, span) in itertools.product(_lengths(table), pairs):
+    for (length, name), (step, span) in itertools.product(_checked_lengths(table), pairs):
         if not is_multiple(length, step):
             message = f"the timestep {step:g} s does not divide `{name}` ({length:g} s)"
             help = "every timestep must end at the same times, or errors cannot be compared"
@@ -188,12 +190,12 @@ def _check_timesteps(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnos
     yield from check_unique(pairs, "field-value", "the timestep {} s is named twice")
 
 
-def _lengths(table: ScenarioTable) -> Sequence[tuple[float, str]]:
-    """What a timestep must divide: the sample alone says it of the others."""
+def _checked_lengths(table: ScenarioTable) -> Sequence[tuple[float, str]]:
+    """The times that a timestep must divide, with their names; the sample divides the others."""
     if table.sample is not None:
         return ((table.sample, "sample"),)
-    given = ((table.hold, "hold"), (table.duration, "duration"))
-    return [(length, name) for length, name in given if length is not None]
+    lengths = ((table.hold, "hold"), (table.duration, "duration"))
+    return [(length, name) for length, name in lengths if length is not None]
 
 
 def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
@@ -211,9 +213,11 @@ def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnost
             yield diagnose("field-value", item.mark, message, help=help)
     hold, duration = table.hold, table.duration
     if hold is not None and duration is not None and len(table.controls) > 1:
-        used = -(-duration * (1 - _SLACK) // hold)
-        if used < len(table.controls):
-            message = f"only {used:g} of {len(table.controls)} commands come before the end"
+        used_commands = -(-duration * (1 - _TOLERANCE) // hold)
+        if used_commands < len(table.controls):
+            message = (
+                f"only {used_commands:g} of {len(table.controls)} commands come before the end"
+            )
             help = "make `duration` longer, or leave the others out"
             yield diagnose("field-value", node.place("controls"), message, help=help)
 

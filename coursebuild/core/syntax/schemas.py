@@ -1,9 +1,9 @@
 """JSON Schemas of what an author writes in JSON and TOML, for editors.
 
-Entry points: `json_schema(name)`; `schema_roots`, what there are some of.
+Entry points: `json_schema(name)`; `schema_roots`, the schemas that there are.
 
-They are made from the declarations that the decoder checks against, so that an editor and a build
-say the same; what only checks know (an answer that is one of the options) is not in them.
+They are made from the declarations that the decoder uses, so that an editor and a build say the
+same. What later checks find (an answer that is none of the options) is not in them.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ _ROOTS: dict[str, tuple[type[Struct], str]] = {
 
 
 def schema_roots() -> dict[str, tuple[type[Struct], str]]:
-    """What there are schemas of, by name: the declared type, and its title."""
-    return _ROOTS | {name: root for each in features() for name, root in each.schemas.items()}
+    """The declared type and the title of each schema, by name."""
+    return _ROOTS | {name: root for feature in features() for name, root in feature.schemas.items()}
 
 
 def json_schema(name: str) -> bytes:
     """The JSON Schema (draft 2020-12), indented, keys in a fixed order, with a final newline."""
     root, title = schema_roots()[name]
-    made = copy.deepcopy(msgspec.json.schema(root))
-    definitions: dict[str, Any] = made["$defs"]
+    schema = copy.deepcopy(msgspec.json.schema(root))
+    definitions: dict[str, Any] = schema["$defs"]
     if name == "course":
         definitions["Silence"]["required"].append("reason")
     for refine in (feature.refine_schema for feature in features()):
@@ -44,7 +44,7 @@ def json_schema(name: str) -> bytes:
     schema = {
         "$schema": DIALECT,
         "title": title,
-        "$ref": made["$ref"],
+        "$ref": schema["$ref"],
         "$defs": dict(sorted(definitions.items())),
     }
     return msgspec.json.format(msgspec.json.encode(schema), indent=2) + b"\n"

@@ -27,7 +27,7 @@ from coursebuild.core.syntax.nodes import (
     NumberNode,
     ObjectNode,
     StringNode,
-    escaped_string,
+    build_string,
 )
 from coursebuild.core.syntax.toml_mistakes import diagnose_syntax, double_backslash, error_offset
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
@@ -233,7 +233,7 @@ class _Reader:
         if width == 3 and self.text[content[0]] == "\n":  # a line end here is no part of the text
             content = (content[0] + 1, content[1])
         escapes = _ESCAPE.finditer(self.text, *content) if quote == '"' else ()
-        return escaped_string(
+        return build_string(
             self.body, toml_string, content, escapes, _meaning, double_backslash, self.diagnostics
         )
 

@@ -67,7 +67,7 @@ class TextReader:
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
                 read = self._later(i + 1)
-                self.session.notes.write(FootnoteText(label, label_span, self._span(token), read))
+                self.session.notes.add(FootnoteText(label, label_span, self._span(token), read))
         deep = next((token for token in self.tokens if token.info == TOO_DEEP), None)
         if deep is not None:
             message = "quotes, lists or footnotes nest too deep here"
