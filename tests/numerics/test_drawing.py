@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.drawing.marks import apart, markup_text
+from coursebuild.core.drawing.marks import markup_text, separate_labels
 from coursebuild.core.drawing.scales import log_ticks
 
 
@@ -47,6 +47,6 @@ def test_markup_can_hold_any_text(text: str) -> None:
 
 @given(wanted=st.lists(st.floats(0, 100), max_size=6), gap=st.floats(1, 10))
 def test_labels_keep_apart(wanted: list[float], gap: float) -> None:
-    places = apart(sorted(wanted), gap, 0, 100)
+    places = separate_labels(sorted(wanted), gap, 0, 100)
     assert all(b - a >= gap - 1e-9 for a, b in pairwise(places))
     assert all(place <= 100 + 1e-9 for place in places)

@@ -1,5 +1,5 @@
-"""Drawing: the scales of plots, and text that has its place in them.
+"""Drawing: scales of plots, layouts of graphs, and text in both.
 
-`scales`: ticks and what they say. `marks`: text in markup, its width, and labels kept apart.
-`contrast`: whether a colour is told from its ground.
+`scales`: ticks and their texts. `marks`: text in markup, its width, and labels kept apart.
+`layered`: graphs in layers. `contrast`: whether a colour is legible on its background.
 """

@@ -1,7 +1,6 @@
-"""How well colours are told from their ground, by WCAG 2.2.
+"""The contrast of colours with their background, by WCAG 2.2.
 
-Entry points: `contrast`; `legible`, the nearest colour that is told well enough. Colours are
-`#rrggbb`.
+Entry points: `contrast`; `legible`, the nearest colour with enough of it. Colours are `#rrggbb`.
 """
 
 from __future__ import annotations
@@ -9,26 +8,26 @@ from __future__ import annotations
 from collections.abc import Collection
 
 GROUNDS_LIGHT, GROUNDS_DARK = ("#fcfbf8", "#f4f2ec"), ("#17191c", "#1f2226")
-"""What text stands on, `--paper` and `--sheet` of the style sheet."""
+"""The backgrounds of text, `--paper` and `--sheet` of the style sheet."""
 LEAST, ENOUGH = 4.5, 7.0
-"""The contrast that text must have, and better has (success criteria 1.4.3 and 1.4.6)."""
+"""The contrast that text must have, and should have (success criteria 1.4.3 and 1.4.6)."""
 
 
 def contrast(colour: str, grounds: Collection[str]) -> float:
-    """The least contrast with one of the grounds, from 1 to 21."""
-    own = _luminance(colour)
-    pairs = (sorted((own, _luminance(ground))) for ground in grounds)
+    """The least contrast with any of the backgrounds, from 1 to 21."""
+    luminance = _luminance(colour)
+    pairs = (sorted((luminance, _luminance(ground))) for ground in grounds)
     return min((bright + 0.05) / (dim + 0.05) for dim, bright in pairs)
 
 
 def legible(colour: str, grounds: Collection[str], least: float = LEAST) -> str:
-    """The colour, with as much black or white in it as it needs on these grounds."""
+    """The colour, mixed with as little black or white as it needs on these backgrounds."""
     end = 0 if _luminance(next(iter(grounds))) > 0.5 else 255
     mixes = (
         "#" + "".join(f"{round(c + (end - c) * share / 255):02x}" for c in _channels(colour))
         for share in range(256)
     )
-    return next(mixed for mixed in mixes if contrast(mixed, grounds) >= least)
+    return next(mix for mix in mixes if contrast(mix, grounds) >= least)
 
 
 def _channels(colour: str) -> tuple[int, ...]:

@@ -1,18 +1,18 @@
-"""Layouts of directed graphs without cycles, in layers: what comes first stands above.
+"""Layouts of directed acyclic graphs in layers, with predecessors above.
 
-Entry points: `layered(nodes, edges, …)`, `reduced(nodes, edges)`.
+Entry points: `layered_layout(nodes, edges, …)`, `transitive_reduction(nodes, edges)`.
 
 The method is that of Sugiyama, Tagawa and Toda (IEEE Trans. Syst., Man, Cybern. 11(2), 1981):
 
-1. A node stands one layer below the lowest of those that it comes from; one that comes from nothing
-   stands just above the highest of those that it leads to.
-2. An edge that passes layers gets a place in each of them.
+1. A node is one layer below the lowest of its predecessors; one without any is just above the
+   highest of its successors.
+2. An edge that crosses layers gets a place in each of them.
 3. The layers are ordered by the mean place of their neighbours above and below in turn; the order
-   with the fewest crossings counts.
-4. In each layer the places are those next to the means of the neighbours that keep the order and
-   the distances: an isotonic regression, solved by pooling.
+   with the fewest crossings wins.
+4. In each layer, places are as near to the means of the neighbours as order and distances allow: an
+   isotonic regression, solved by pooling.
 
-The same graph gives the same layout: ties go by the order in which the nodes are given.
+The same graph gives the same layout: ties are broken by the order of the nodes.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from msgspec import Struct
 
 Edge: TypeAlias = tuple[str, str]
 _Point: TypeAlias = str | tuple[str, str, int]
-"""A node, or the place of an edge in a layer."""
+"""A node, or an edge where it crosses a layer."""
 
 _SWEEPS = 12
 _PLACINGS = 40
 _BOTH_SIDES = 32
-"""Of the placings, the last, which look at the layers above and below at once."""
+"""The last placings, which use the layers above and below at once."""
 _STRAIGHT = 20.0
-"""How much more an arrow counts between two of which each has no other on that side."""
+"""The weight of an edge that is the only one of both its ends on that side."""
 
 
 class PlacedNode(Struct, frozen=True):
@@ -45,7 +45,7 @@ class PlacedNode(Struct, frozen=True):
 
 
 class PlacedEdge(Struct, frozen=True):
-    """An edge, by the places that it goes through from layer to layer."""
+    """An edge, by its places from layer to layer."""
 
     start: str
     end: str
@@ -53,7 +53,7 @@ class PlacedEdge(Struct, frozen=True):
 
 
 class Layout(Struct, frozen=True):
-    """A graph laid out; its left edge is at 0."""
+    """The layout of a graph; its left edge is at 0."""
 
     nodes: tuple[PlacedNode, ...]
     edges: tuple[PlacedEdge, ...]
@@ -61,201 +61,216 @@ class Layout(Struct, frozen=True):
     layers: int
 
 
-def reduced(nodes: Sequence[str], edges: Iterable[Edge]) -> tuple[Edge, ...]:
-    """The edges but those that say no more than a longer way along others does."""
-    known = set(nodes)
-    after: dict[str, list[str]] = {node: [] for node in nodes}
-    kept = [(a, b) for a, b in dict.fromkeys(edges) if a in known and b in known]
-    for a, b in kept:
-        after[a].append(b)
-    far: dict[str, set[str]] = {}
+def transitive_reduction(nodes: Sequence[str], edges: Iterable[Edge]) -> tuple[Edge, ...]:
+    """The edges without those that a longer path of others implies."""
+    node_set = set(nodes)
+    successors: dict[str, list[str]] = {node: [] for node in nodes}
+    known_edges = [(a, b) for a, b in dict.fromkeys(edges) if a in node_set and b in node_set]
+    for a, b in known_edges:
+        successors[a].append(b)
+    descendants: dict[str, set[str]] = {}
 
-    def beyond(node: str) -> set[str]:
-        waiting = [node]
-        while waiting:
-            at = waiting[-1]
-            missing = [following for following in after[at] if following not in far]
+    def find_descendants(node: str) -> set[str]:
+        stack = [node]
+        while stack:
+            top = stack[-1]
+            missing = [successor for successor in successors[top] if successor not in descendants]
             if missing:
-                waiting += missing
+                stack += missing
                 continue
-            waiting.pop()
-            far[at] = set(after[at]).union(*(far[following] for following in after[at]))
-        return far[node]
+            stack.pop()
+            descendants[top] = set(successors[top]).union(
+                *(descendants[successor] for successor in successors[top])
+            )
+        return descendants[node]
 
-    return tuple((a, b) for a, b in kept if not any(b in beyond(c) for c in after[a] if c != b))
+    return tuple(
+        (a, b)
+        for a, b in known_edges
+        if not any(b in find_descendants(c) for c in successors[a] if c != b)
+    )
 
 
-def layered(
+def layered_layout(
     nodes: Sequence[str], edges: Sequence[Edge], width: float, gap: float, passing: float
 ) -> Layout:
-    """The layout of a graph.
+    """Lay out a graph.
 
     Args:
-        nodes: in the order that ties go by.
-        edges: between these nodes, without a cycle.
-        width: of a node, in the units of the drawing.
-        gap: the least room between two things in a layer.
-        passing: room for an edge that passes a layer.
+        nodes: the nodes, in the order that breaks ties.
+        edges: edges between these nodes, without cycles.
+        width: the width of a node, in the units of the drawing.
+        gap: the least room between neighbours in a layer.
+        passing: the room for an edge that crosses a layer.
     """
-    layer = _layers(nodes, edges)
-    rows: list[list[_Point]] = [[] for _ in range(max(layer.values(), default=-1) + 1)]
+    layers = _assign_layers(nodes, edges)
+    rows: list[list[_Point]] = [[] for _ in range(max(layers.values(), default=-1) + 1)]
     for node in nodes:
-        rows[layer[node]].append(node)
-    ways: list[tuple[Edge, list[_Point]]] = []
+        rows[layers[node]].append(node)
+    routes: list[tuple[Edge, list[_Point]]] = []
     for a, b in edges:
-        between: list[_Point] = [(a, b, level) for level in range(layer[a] + 1, layer[b])]
-        for level, point in enumerate(between, layer[a] + 1):
+        passing_points: list[_Point] = [(a, b, level) for level in range(layers[a] + 1, layers[b])]
+        for level, point in enumerate(passing_points, layers[a] + 1):
             rows[level].append(point)
-        ways.append(((a, b), [a, *between, b]))
-    links = [pair for _, way in ways for pair in pairwise(way)]
-    above = _neighbours(links, upwards=True)
-    below = _neighbours(links, upwards=False)
-    rows = _ordered(rows, above, below)
-    half = {p: (width if isinstance(p, str) else passing) / 2 for row in rows for p in row}
-    x = _placed(rows, above, below, half, gap)
-    left = min((x[point] - half[point] for point in x), default=0.0)
-    right = max((x[point] + half[point] for point in x), default=0.0)
+        routes.append(((a, b), [a, *passing_points, b]))
+    links = [pair for _, route in routes for pair in pairwise(route)]
+    parents = _neighbours(links, upwards=True)
+    children = _neighbours(links, upwards=False)
+    rows = _order_rows(rows, parents, children)
+    half_widths = {p: (width if isinstance(p, str) else passing) / 2 for row in rows for p in row}
+    x = _place_points(rows, parents, children, half_widths, gap)
+    left = min((x[point] - half_widths[point] for point in x), default=0.0)
+    right = max((x[point] + half_widths[point] for point in x), default=0.0)
     return Layout(
-        tuple(PlacedNode(node, x[node] - left, layer[node]) for node in nodes),
-        tuple(PlacedEdge(*edge, tuple(x[p] - left for p in way)) for edge, way in ways),
+        tuple(PlacedNode(node, x[node] - left, layers[node]) for node in nodes),
+        tuple(PlacedEdge(*edge, tuple(x[p] - left for p in route)) for edge, route in routes),
         right - left,
         len(rows),
     )
 
 
-def _layers(nodes: Sequence[str], edges: Sequence[Edge]) -> dict[str, int]:
-    before: dict[str, list[str]] = {node: [] for node in nodes}
-    after: dict[str, list[str]] = {node: [] for node in nodes}
+def _assign_layers(nodes: Sequence[str], edges: Sequence[Edge]) -> dict[str, int]:
+    predecessors: dict[str, list[str]] = {node: [] for node in nodes}
+    successors: dict[str, list[str]] = {node: [] for node in nodes}
     for a, b in edges:
-        before[b].append(a)
-        after[a].append(b)
-    missing = {node: len(before[node]) for node in nodes}
-    ready = [node for node in nodes if not missing[node]]
-    found: dict[str, int] = {}
-    for node in ready:  # which grows meanwhile
-        found[node] = max((found[b] + 1 for b in before[node]), default=0)
-        for following in after[node]:
-            missing[following] -= 1
-            if not missing[following]:
-                ready.append(following)
+        predecessors[b].append(a)
+        successors[a].append(b)
+    unplaced = {node: len(predecessors[node]) for node in nodes}
+    ready = [node for node in nodes if not unplaced[node]]
+    layers: dict[str, int] = {}
+    for node in ready:  # grows in the loop
+        layers[node] = max((layers[b] + 1 for b in predecessors[node]), default=0)
+        for successor in successors[node]:
+            unplaced[successor] -= 1
+            if not unplaced[successor]:
+                ready.append(successor)
     for node in nodes:
-        if not before[node] and after[node]:
-            found[node] = min(found[following] for following in after[node]) - 1
-    return found
+        if not predecessors[node] and successors[node]:
+            layers[node] = min(layers[successor] for successor in successors[node]) - 1
+    return layers
 
 
 def _neighbours(
     links: Sequence[tuple[_Point, _Point]], *, upwards: bool
 ) -> dict[_Point, list[_Point]]:
-    found: dict[_Point, list[_Point]] = {}
+    neighbours: dict[_Point, list[_Point]] = {}
     for a, b in links:
-        found.setdefault(b if upwards else a, []).append(a if upwards else b)
-    return found
+        neighbours.setdefault(b if upwards else a, []).append(a if upwards else b)
+    return neighbours
 
 
-def _ordered(
+def _order_rows(
     rows: list[list[_Point]],
-    above: Mapping[_Point, list[_Point]],
-    below: Mapping[_Point, list[_Point]],
+    parents: Mapping[_Point, list[_Point]],
+    children: Mapping[_Point, list[_Point]],
 ) -> list[list[_Point]]:
-    best, fewest = rows, _crossings(rows, below)
+    best, fewest = rows, _crossings(rows, children)
     for sweep in range(_SWEEPS):
         if not fewest:
             break
         down = sweep % 2 == 0
-        near = above if down else below
+        fixed_neighbours = parents if down else children
         rows = [list(row) for row in rows]
         order = range(1, len(rows)) if down else range(len(rows) - 2, -1, -1)
         for level in order:
-            beside = rows[level - 1] if down else rows[level + 1]
-            place = {point: float(at) for at, point in enumerate(beside)}
+            fixed_row = rows[level - 1] if down else rows[level + 1]
+            places = {point: float(position) for position, point in enumerate(fixed_row)}
             means = {
-                point: _mean([place[other] for other in near.get(point, ())], float(at))
-                for at, point in enumerate(rows[level])
+                point: _mean(
+                    [places[neighbour] for neighbour in fixed_neighbours.get(point, ())],
+                    float(position),
+                )
+                for position, point in enumerate(rows[level])
             }
             rows[level].sort(key=means.__getitem__)
-        crossings = _crossings(rows, below)
+        crossings = _crossings(rows, children)
         if crossings < fewest:
             best, fewest = rows, crossings
     return best
 
 
-def _crossings(rows: Sequence[list[_Point]], below: Mapping[_Point, list[_Point]]) -> int:
+def _crossings(rows: Sequence[list[_Point]], children: Mapping[_Point, list[_Point]]) -> int:
     count = 0
     for upper, lower in pairwise(rows):
-        place = {point: at for at, point in enumerate(lower)}
-        seen: list[int] = []
+        places = {point: position for position, point in enumerate(lower)}
+        ends_so_far: list[int] = []
         for point in upper:
-            ends = sorted(place[other] for other in below.get(point, ()))
-            count += sum(len(seen) - bisect_right(seen, end) for end in ends)
+            ends = sorted(places[neighbour] for neighbour in children.get(point, ()))
+            count += sum(len(ends_so_far) - bisect_right(ends_so_far, end) for end in ends)
             for end in ends:
-                insort(seen, end)
+                insort(ends_so_far, end)
     return count
 
 
-def _placed(
+def _place_points(
     rows: Sequence[list[_Point]],
-    above: Mapping[_Point, list[_Point]],
-    below: Mapping[_Point, list[_Point]],
-    half: Mapping[_Point, float],
+    parents: Mapping[_Point, list[_Point]],
+    children: Mapping[_Point, list[_Point]],
+    half_widths: Mapping[_Point, float],
     gap: float,
 ) -> dict[_Point, float]:
     x: dict[_Point, float] = {}
     steps: list[list[float]] = []
     for row in rows:
-        at, places = 0.0, []
+        position, places = 0.0, []
         for point in row:
-            places.append(at + half[point])
-            at += 2 * half[point] + gap
-        middle = (at - gap) / 2
+            places.append(position + half_widths[point])
+            position += 2 * half_widths[point] + gap
+        middle = (position - gap) / 2
         steps.append(places)
         x |= {point: place - middle for point, place in zip(row, places, strict=True)}
-    pulls = _pulls(above, below), _pulls(below, above)
+    weights = _weigh_neighbours(parents, children), _weigh_neighbours(children, parents)
     for placing in range(_PLACINGS):
         down = placing % 2 == 0
-        sides = pulls if placing >= _PLACINGS - _BOTH_SIDES else pulls[:1] if down else pulls[1:]
+        sides = (
+            weights if placing >= _PLACINGS - _BOTH_SIDES else weights[:1] if down else weights[1:]
+        )
         for level in range(len(rows)) if down else reversed(range(len(rows))):
             row, places = rows[level], steps[level]
             offsets = [
-                _pulled(x, point, sides) - place for point, place in zip(row, places, strict=True)
+                _weighted_mean(x, point, sides) - place
+                for point, place in zip(row, places, strict=True)
             ]
-            fitted = zip(row, places, _rising(offsets), strict=True)
+            fitted = zip(row, places, _isotonic_regression(offsets), strict=True)
             x |= {point: place + offset for point, place, offset in fitted}
     return x
 
 
-def _pulls(
-    near: Mapping[_Point, list[_Point]], far: Mapping[_Point, list[_Point]]
+def _weigh_neighbours(
+    neighbours: Mapping[_Point, list[_Point]], opposite: Mapping[_Point, list[_Point]]
 ) -> dict[_Point, list[tuple[_Point, float]]]:
-    """The neighbours on one side with their weights; `far` has those of the other side."""
+    """The neighbours on one side with their weights; `opposite` are their neighbours back."""
     return {
         point: [
-            (other, _STRAIGHT if len(others) == len(far[other]) == 1 else 1.0) for other in others
+            (neighbour, _STRAIGHT if len(points) == len(opposite[neighbour]) == 1 else 1.0)
+            for neighbour in points
         ]
-        for point, others in near.items()
+        for point, points in neighbours.items()
     }
 
 
-def _pulled(
+def _weighted_mean(
     x: Mapping[_Point, float],
     point: _Point,
     sides: Sequence[Mapping[_Point, list[tuple[_Point, float]]]],
 ) -> float:
-    """Where a point would best be; where it is if it has no neighbours."""
+    """The best place of a point: the mean of its neighbours, or where it is without any."""
     pairs = [pair for side in sides for pair in side.get(point, ())]
     if not pairs:
         return x[point]
-    return sum(weight * x[other] for other, weight in pairs) / sum(weight for _, weight in pairs)
+    return sum(weight * x[neighbour] for neighbour, weight in pairs) / sum(
+        weight for _, weight in pairs
+    )
 
 
-def _rising(values: Sequence[float]) -> list[float]:
-    """The rising sequence that is nearest in the mean square: pools of neighbours that fall."""
+def _isotonic_regression(values: Sequence[float]) -> list[float]:
+    """The nearest rising sequence by least squares, found by pooling falling neighbours."""
     pools: list[tuple[float, int]] = []
     for value in values:
         total, count = value, 1
         while pools and pools[-1][0] * count >= total * pools[-1][1]:
-            more, members = pools.pop()
-            total, count = total + more, count + members
+            pool_total, members = pools.pop()
+            total, count = total + pool_total, count + members
         pools.append((total, count))
     return [total / count for total, count in pools for _ in range(count)]
 

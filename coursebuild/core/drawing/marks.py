@@ -1,6 +1,6 @@
-"""Text in drawings: what markup can hold, how wide it is, and how labels keep apart.
+"""Text in drawings: what markup can hold, how wide it is, and how labels are kept apart.
 
-Entry points: `markup_text`, `text_width`, `shortened`; `apart`.
+Entry points: `markup_text`, `text_width`, `shorten_to_width`; `separate_labels`.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from collections.abc import Sequence
 from html import escape
 
 _REMEMBERED = 1024
-"""Texts: those of a drawing stand in others as well, in several sizes."""
+"""How many texts are remembered: drawings share many, in several sizes."""
 _NO_MARKUP = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
-"""Halves of surrogate pairs among them, which stand for bytes that are no text."""
+"""Includes lone surrogates, which stand for bytes that are not text."""
 _NARROW = frozenset("ijl.,:;'|!()[] ·ft")
 _BROAD = frozenset("mwMW—%@")
 
 
 @functools.lru_cache(maxsize=_REMEMBERED)
 def markup_text(text: str) -> str:
-    """Text for markup; characters that no markup can hold are left out."""
+    """Text escaped for markup, without characters that markup cannot hold."""
     return escape(_NO_MARKUP.sub("", text))
 
 
 @functools.lru_cache(maxsize=_REMEMBERED)
 def text_width(text: str, size: float) -> float:
-    """About how wide a text is in a sans-serif face of this size; rather too much."""
+    """About how wide a text is in a sans-serif face of this size, rather too wide."""
     letters = 0.0
     for char in text:
         if char in _NARROW:
@@ -40,8 +40,8 @@ def text_width(text: str, size: float) -> float:
     return letters * size
 
 
-def shortened(text: str, room: float, size: float) -> str:
-    """A text that fits into so much room, with an ellipsis where some of it is left out."""
+def shorten_to_width(text: str, room: float, size: float) -> str:
+    """A text shortened to a width, with an ellipsis if something is left out."""
     if text_width(text, size) <= room:
         return text
     while text and text_width(f"{text}…", size) > room:
@@ -49,20 +49,20 @@ def shortened(text: str, room: float, size: float) -> str:
     return f"{text}…"
 
 
-def apart(wanted: Sequence[float], gap: float, top: float, bottom: float) -> list[float]:
-    """Places as near to those wanted as may be, in their order, and each `gap` below the last.
+def separate_labels(desired: Sequence[float], gap: float, top: float, bottom: float) -> list[float]:
+    """Places for labels as near as possible to the desired ones, in order, at least `gap` apart.
 
     Args:
-        wanted: rising.
-        gap: from one to the next.
-        top: where the first may be.
-        bottom: where the last may be; what does not fit begins above the top.
+        desired: where the labels belong, rising.
+        gap: the least distance from one label to the next.
+        top: the least place of the first.
+        bottom: the greatest place of the last; if there is too little room, the first go above top.
     """
     places: list[float] = []
-    for y in wanted:
+    for y in desired:
         places.append(max(y, places[-1] + gap) if places else max(y, top))
     most = bottom
-    for i in reversed(range(len(places))):  # those that were pushed out at the bottom go up again
+    for i in reversed(range(len(places))):  # those pushed past the bottom go up again
         most = places[i] = min(places[i], most)
         most -= gap
     return places

@@ -1,6 +1,6 @@
-"""The scales of axes: where the ticks are, and what they say.
+"""The scales of axes: the places of ticks, and their texts.
 
-Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (even); `log_ticks`, `log`
+Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (linear); `log_ticks`, `log`
 (logarithmic); `number_text`.
 """
 
@@ -13,18 +13,18 @@ from itertools import pairwise
 from msgspec import Struct
 
 _LARGEST = 290.0
-"""Powers of ten beyond this are drawn there."""
+"""Greater powers of ten are drawn as this one."""
 
 
 class Scale(Struct, frozen=True):
-    """From values to places on a drawing; what is beyond an end is drawn there."""
+    """A map from values to places on a drawing; values beyond an end are drawn at that end."""
 
     start: float
     end: float
-    """Places; the end may be before the start."""
+    """Places on the drawing; the end may be before the start."""
     low: float
     high: float
-    """The values there; powers of ten where it is logarithmic."""
+    """The values at start and end; exponents of ten on a logarithmic scale."""
     logarithmic: bool = True
 
     def __call__(self, value: float) -> float:
@@ -33,61 +33,61 @@ class Scale(Struct, frozen=True):
         part = (at - self.low) / (self.high - self.low)
         return self.start + min(max(part, 0.0), 1.0) * (self.end - self.start)
 
-    def ticks(self, about: int) -> list[tuple[float, str]]:
-        """Places and texts of the ticks, about so many; no more on a logarithmic scale."""
+    def ticks(self, count: int) -> list[tuple[float, str]]:
+        """Places and texts of about `count` ticks, at most so many on a logarithmic scale."""
         if self.logarithmic:
-            found = log_ticks(self.low, self.high, about)
-            return [(self(10.0**exponent), text) for exponent, text in found]
-        values = ticks(self.low, self.high, about)
+            pairs = log_ticks(self.low, self.high, count)
+            return [(self(10.0**exponent), text) for exponent, text in pairs]
+        values = ticks(self.low, self.high, count)
         return [(self(v), text) for v, text in zip(values, tick_texts(values), strict=True)]
 
 
 def log(value: float) -> float:
-    """The power of ten that a value is, within what can be drawn."""
+    """The decimal logarithm of a value, within what can be drawn."""
     if not value > 0:
         return -_LARGEST
     return min(max(math.log10(value), -_LARGEST), _LARGEST)
 
 
-def ticks(low: float, high: float, about: int = 5) -> list[float]:
-    """Round numbers from `low` to `high`, about so many."""
+def ticks(low: float, high: float, count: int = 5) -> list[float]:
+    """About `count` round numbers from `low` to `high`."""
     span = high - low
     if not (span > 0 and math.isfinite(span)):
         return [low]
-    step = _step(span, about)
+    step = _step(span, count)
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
-    # The product has the rounding error of the step; a tick is the nearest double to what it says.
+    # Rounded, as the product has the rounding error of the step.
     return [float(f"{i * step:.15g}") for i in range(first, last + 1)] or [low]
 
 
-def _step(span: float, about: int) -> float:
+def _step(span: float, count: int) -> float:
     """The distance of the ticks: 1, 2, 2.5 or 5 times a power of ten."""
-    raw = span / about
+    raw = span / count
     power = 10.0 ** math.floor(math.log10(raw))
     return next(power * m for m in (1, 2, 2.5, 5, 10) if power * m >= raw * 0.999)
 
 
 def tick_texts(values: Sequence[float]) -> list[str]:
-    """Ticks as text: with as many digits as tell them apart, and a real minus."""
+    """Ticks as text, with as many digits as they need to differ, and a real minus."""
     step = min((b - a for a, b in pairwise(values)), default=0.0)
     largest = max(abs(value) for value in values)
     if largest == 0:
         return ["0" for _ in values]
-    allowed = 1e-6 * (step or largest)
-    plain = _digits(values, "f", allowed) if largest < 1e15 else None
+    tolerance = 1e-6 * (step or largest)
+    plain = _digits(values, "f", tolerance) if largest < 1e15 else None
     if plain is not None and 1e-4 <= largest < 1e6:
         return plain
-    powers = _digits(values, "e", allowed) or [_readable(f"{v:.3e}") for v in values]
+    powers = _digits(values, "e", tolerance) or [_readable(f"{v:.3e}") for v in values]
     longest = max(map(len, powers))
     return powers if plain is None or max(map(len, plain)) > longest else plain
 
 
-def _digits(values: Sequence[float], form: str, allowed: float) -> list[str] | None:
-    """The values as text with the fewest digits that say them; `None` where none do."""
+def _digits(values: Sequence[float], form: str, tolerance: float) -> list[str] | None:
+    """The values as text with the fewest digits within a tolerance; `None` if 17 are too few."""
     for digits in range(18):
         texts = [f"{value:.{digits}{form}}" for value in values]
-        if all(abs(float(t) - v) <= allowed for t, v in zip(texts, values, strict=True)):
+        if all(abs(float(t) - v) <= tolerance for t, v in zip(texts, values, strict=True)):
             return [_readable(text) for text in texts]
     return None
 
@@ -104,10 +104,10 @@ def _readable(text: str) -> str:
 
 
 def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
-    """Ticks of a logarithmic axis: where, as a power of ten, and what they say.
+    """Ticks of a logarithmic axis: the exponent of each, and its text.
 
-    Powers of ten, with twos and fives between them where there are few, and round numbers where
-    even those are.
+    They are powers of ten; with twos and fives between them if those are few; round numbers if even
+    these are few.
 
     Args:
         low: the exponent at one end.
@@ -115,7 +115,7 @@ def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
         most: how many ticks have room.
     """
     first, last = math.ceil(low - 1e-9), math.floor(high + 1e-9)
-    found = (
+    decade_ticks = (
         [(float(n), _scaled(1, n)) for n in _decades(first, last, most)] if first <= last else []
     )
     if last - first < 2:
@@ -125,19 +125,19 @@ def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
             for m in (1, 2, 5)
             if low - 1e-9 <= n + math.log10(m) <= high + 1e-9
         ]
-        if len(found) < len(finer) <= max(most, 3):
-            found = finer
-    if len(found) >= 2 or high - low > 1:
-        return found
+        if len(decade_ticks) < len(finer) <= max(most, 3):
+            decade_ticks = finer
+    if len(decade_ticks) >= 2 or high - low > 1:
+        return decade_ticks
     values = ticks(10.0**low, 10.0**high, min(most, 5))
     texts = tick_texts(values)
     return [(math.log10(v), text) for v, text in zip(values, texts, strict=True) if v > 0]
 
 
 def _decades(low: int, high: int, most: int) -> list[int]:
-    """Exponents from `low` to `high`, no more than `most`: all, or each second, third or fifth one.
+    """Exponents from `low` to `high`, at most `most`: all, or every second, third, fifth and so on.
 
-    One of them there is always.
+    There is always at least one.
     """
     step = 1
     while high // step - -(-low // step) + 1 > max(most, 1):
@@ -146,18 +146,18 @@ def _decades(low: int, high: int, most: int) -> list[int]:
 
 
 def _wider(step: int) -> int:
-    """The next distance of decades."""
+    """The next greater step between decades."""
     power: int = 10 ** (len(str(step)) - 1)
     return next(power * m for m in (2, 3, 5, 10) if power * m > step)
 
 
 def number_text(value: float) -> str:
-    """A number as a tick would say it, with few digits."""
+    """A number with few digits, written as a tick."""
     return tick_texts([float(f"{value:.2g}")])[0].removeprefix("1·")
 
 
 def _scaled(mantissa: int, exponent: int) -> str:
-    """A small whole number times a power of ten: plain where it is short."""
+    """A small whole number times a power of ten, as text; without the power if that is short."""
     if -3 <= exponent <= 3:
         return f"{mantissa * 10**exponent if exponent >= 0 else mantissa / 10**-exponent:g}"
     power = "10" + str(exponent).translate(_RAISED)

@@ -17,8 +17,8 @@ from itertools import pairwise
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.core.drawing.layered import Layout, layered, reduced
-from coursebuild.core.drawing.marks import markup_text, shortened, text_width
+from coursebuild.core.drawing.layered import Layout, layered_layout, transitive_reduction
+from coursebuild.core.drawing.marks import markup_text, shorten_to_width, text_width
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
@@ -91,7 +91,7 @@ def _graph(
 ) -> Graphed:
     lessons = [library.lessons[id] for id in sorted(shown, key=library.positions.__getitem__)]
     ids = [lesson.id for lesson in lessons]
-    edges = reduced(ids, ((n, one.id) for one in lessons for n in one.prerequisites))
+    edges = transitive_reduction(ids, ((n, one.id) for one in lessons for n in one.prerequisites))
     return Graphed(
         tuple(
             GraphNode(
@@ -121,7 +121,7 @@ def drawings(graph: Graphed, words: Strings) -> tuple[Markup, Markup]:
 @functools.lru_cache(maxsize=256)
 def _layout(count: int, edges: tuple[tuple[str, str], ...]) -> Layout:
     """The layout of a graph whose nodes are called by their numbers: many lessons stand alike."""
-    return layered([str(number) for number in range(count)], edges, 1.0, 0.0, _PASSING)
+    return layered_layout([str(number) for number in range(count)], edges, 1.0, 0.0, _PASSING)
 
 
 def _drawing(graph: Graphed, layout: Layout, words: Strings, look: _Look) -> Markup:
@@ -220,6 +220,6 @@ def _lines(node: GraphNode, box: _Box) -> list[str]:
     while words and text_width(f"{first} {words[0]}".strip(), _SIZE) <= room:
         first = f"{first} {words.pop(0)}".strip()
     if not first:
-        return [shortened(node.title, room, _SIZE)]
+        return [shorten_to_width(node.title, room, _SIZE)]
     rest = " ".join(words)
-    return [first, shortened(rest, room, _SIZE)] if rest else [first]
+    return [first, shorten_to_width(rest, room, _SIZE)] if rest else [first]

@@ -19,7 +19,12 @@ from itertools import pairwise
 
 from msgspec import Struct
 
-from coursebuild.core.drawing.marks import apart, markup_text, shortened, text_width
+from coursebuild.core.drawing.marks import (
+    markup_text,
+    separate_labels,
+    shorten_to_width,
+    text_width,
+)
 from coursebuild.core.drawing.scales import Scale, log, number_text
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.strokes import (
@@ -203,7 +208,7 @@ def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
     lines = [line for line in chart.lines if line.drawn]
     ends = [(_place(line.drawn[-1], x, y), line) for line in lines]
     ends.sort(key=lambda end: end[0][1])
-    places = apart([down for (_, down), _ in ends], _NAME, y.end, y.start)
+    places = separate_labels([down for (_, down), _ in ends], _NAME, y.end, y.start)
     for ((across, down), line), at in zip(ends, places, strict=True):
         paint = colour(line.number)
         lead = f"M{across + 5:.1f} {down:.1f}L{x.end + 6:.1f} {at:.1f}"
@@ -226,7 +231,7 @@ def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[
         lines.append(f"M{at:.1f} {y.start:.1f}v5")
         texts.append(label(at, y.start + 18, text, f'text-anchor="middle" {FINE}'))
     below, beside = titles
-    beside = shortened(beside, y.start - y.end, SIZE)
+    beside = shorten_to_width(beside, y.start - y.end, SIZE)
     texts.append(
         f'<text transform="translate(14 {(y.start + y.end) / 2:.1f}) rotate(-90)" '
         f'text-anchor="middle">{markup_text(beside)}</text>'

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from coursebuild.core.drawing.marks import markup_text, shortened, text_width
+from coursebuild.core.drawing.marks import markup_text, shorten_to_width, text_width
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4")
 _LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#2b6f9e", "#1e1e1c")
@@ -126,7 +126,7 @@ def key(entries: Iterable[Entry], left: float, top: float, width: float) -> tupl
     found: list[str] = []
     x, y = left, top
     for entry in entries:
-        text = shortened(entry.text, width - left - 40, TICK_SIZE)
+        text = shorten_to_width(entry.text, width - left - 40, TICK_SIZE)
         wide = 30 + text_width(text, TICK_SIZE) + 10
         if x > left and x + wide > width:
             x, y = left, y + ROW

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
-from coursebuild.core.drawing.marks import shortened, text_width
+from coursebuild.core.drawing.marks import shorten_to_width, text_width
 from coursebuild.core.drawing.scales import Scale, log
 from coursebuild.numerics.reports.chart import NARROW, WIDE
 from coursebuild.numerics.reports.strokes import (
@@ -99,13 +99,13 @@ def _panel(
     """One figure of all rows, with their names where there is room at the left; where it ends."""
     y = top + 34
     ticks = scale.ticks(max(2, int((scale.end - scale.start) / 56)))
-    title = shortened(FIGURES[figure], scale.end - scale.start + 10, SIZE)
+    title = shorten_to_width(FIGURES[figure], scale.end - scale.start + 10, SIZE)
     parts.append(label(scale.start, top + 14, title))
     groups = [list(rows) for _, rows in groupby(sweep.rows, key=lambda row: row.parameter)]
     drawn: list[str] = []
     for number, rows in enumerate(groups):
         if names:
-            head = shortened(rows[0].parameter, names - 8, TICK_SIZE)
+            head = shorten_to_width(rows[0].parameter, names - 8, TICK_SIZE)
             drawn.append(label(2, y + 4, head, f'{FINE} font-weight="600"'))
         drawn += _group(rows, figure, scale, y + ROW, number, names)
         y += ROW * (len(rows) + 1) + 4

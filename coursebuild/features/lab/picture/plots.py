@@ -15,8 +15,8 @@ from typing import TypeGuard
 
 from msgspec import Struct
 
-from coursebuild.core.drawing.marks import apart
 from coursebuild.core.drawing.marks import markup_text as _text
+from coursebuild.core.drawing.marks import separate_labels
 from coursebuild.core.drawing.scales import Scale
 from coursebuild.features.lab.schema import Plot, TraceFields
 
@@ -211,7 +211,7 @@ def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
 def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
     """Names at the ends of the lines, moved apart where they would overlap."""
     wanted = [y for y, _, _ in sorted(ends)]
-    places = apart(wanted, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
+    places = separate_labels(wanted, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
     return [
         f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.x.end + 6:.1f}" '
         f'y="{place + 3.5:.1f}">{_text(label)}</text>'
