@@ -1,10 +1,10 @@
-"""What takes an author from nothing to a course, and through its changes: commands.
+"""Commands that begin a course and change it.
 
-- `init`: a small complete course, from the files in `course/`
-- `new`: a lesson or a feature, with its entry in the map (`course_map`), a model, a template
-- `rename`: a lesson gets another id, wherever the course names it (`references`)
-- `fmt`: lessons formatted (`format`, with `json_layout` and `text_layout`)
-- `doctor`: what of all that courses need works here
+- `init`: writes a small complete course, from the files in `course/`
+- `new`: adds a lesson or a feature, with its entry in the map (`course_map`), a model, a template
+- `rename`: gives a lesson another id, wherever the course names it (`references`)
+- `fmt`: formats lessons (`format`, with `json_layout` and `text_layout`)
+- `doctor`: checks which of the things that courses need work here
 """
 
 from coursebuild.core.features import Command, Feature

@@ -1,10 +1,10 @@
-"""The course map with a lesson added or renamed, or a feature, and all else as its author wrote it.
+"""Edits of the course map: a lesson is added or renamed, or a feature added.
 
-Entry points: `with_lesson`, `with_lesson_renamed`, `with_feature`.
+Entry points: `with_lesson`, `with_lesson_renamed`, `with_feature`; each returns the new text.
 
-An entry is put in, or cut out and put in, as a whole, with the comments directly above it, and with
-the line ends and the indentation of the map. What comes of it is parsed and refused where it is no
-map, as where all lessons stand in one line.
+An entry is inserted or moved as a whole, with the comments directly above it, and with the line
+ends and the indentation of the map. The rest stays as its author wrote it. The new text is parsed,
+and refused where it is no valid map, as where all lessons are on one line.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _BLANK_LINES = re.compile(r"(?:[ \t]*\r?\n)*")
 
 
 def with_lesson(course: Course, id: str, slug: str, title: str) -> str:
-    """The map with a draft among the lessons of its level.
+    """Return the map with a draft added to its level.
 
     Raises:
         UsageError: the map cannot have it.
@@ -36,41 +36,42 @@ def with_lesson(course: Course, id: str, slug: str, title: str) -> str:
     fields = {"id": id, "slug": slug, "title": title, "status": "draft"}
     rows = (f"{name} = {toml_string(value)}" for name, value in fields.items())
     lines = ["[[level.lesson]]", *rows]
-    return _checked(course, _inserted(course, id, lines), id)
+    return _require_valid(course, _insert(course, id, lines), id)
 
 
 def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[Edit]) -> str:
-    """The map after edits that give a lesson another id.
+    """Return the map after edits that give a lesson another id.
 
-    It stands in the level of that id, and in the order of ids where that was the order before.
+    The lesson moves to the level of that id, and to its place in the order of ids if the lessons
+    of the level were in that order before.
 
     Raises:
         UsageError: the map cannot have it.
     """
     _check_free(course, new)
     text = apply_edits(course.map.text, edits)
-    renamed = parse_course_map(Source(course.map.path, text)).value
-    lesson = None if renamed is None else _lesson(renamed, new)
-    if renamed is None or lesson is None:
-        return _checked(course, text, new)
-    ids = [one.id for one in renamed.lessons if one.level == lesson.level]
-    before = [old.id if id == new else id for id in ids]
-    in_order = ids == sorted(ids, key=id_order) or before != sorted(before, key=id_order)
+    new_course = parse_course_map(Source(course.map.path, text)).value
+    lesson = None if new_course is None else _find_lesson(new_course, new)
+    if new_course is None or lesson is None:
+        return _require_valid(course, text, new)
+    ids = [sibling.id for sibling in new_course.lessons if sibling.level == lesson.level]
+    old_ids = [old.id if id == new else id for id in ids]
+    in_order = ids == sorted(ids, key=id_order) or old_ids != sorted(old_ids, key=id_order)
     if lesson.level != _level_id(new) or not in_order:
-        start, end = _entry(text, lesson)
+        start, end = _entry_range(text, lesson)
         entry = re.split(r"\r?\n", text[start:end])
-        rest = _BLANK_LINES.match(text, end)
-        assert rest is not None
-        left, right = text[:start], text[rest.end() :]
+        blank_lines = _BLANK_LINES.match(text, end)
+        assert blank_lines is not None
+        left, right = text[:start], text[blank_lines.end() :]
         text = left + right if right else left.rstrip() + _line_end(text)
-        without = parse_course_map(Source(course.map.path, text)).value
-        if without is not None:
-            text = _inserted(without, new, entry)
-    return _checked(course, text, new)
+        shortened = parse_course_map(Source(course.map.path, text)).value
+        if shortened is not None:
+            text = _insert(shortened, new, entry)
+    return _require_valid(course, text, new)
 
 
 def with_feature(course: Course, path: str) -> str:
-    """The map with a further file of `features`.
+    """Return the map with a file added to `features`.
 
     Raises:
         UsageError: the map cannot have it.
@@ -90,8 +91,8 @@ def with_feature(course: Course, path: str) -> str:
         end = _end_of_line(source.text, title.end)
         edit = Edit(source.span(end, end), line)
     text = apply_edits(source.text, [edit])
-    changed = parse_course_map(Source(source.path, text)).value
-    if changed is None or path not in [feature.path for feature in changed.features]:
+    new_course = parse_course_map(Source(source.path, text)).value
+    if new_course is None or path not in [feature.path for feature in new_course.features]:
         raise UsageError(
             f"{source.path} cannot have a feature: add `{path}` to `features` yourself"
         )
@@ -108,38 +109,38 @@ def _check_free(course: Course, id: str) -> None:
             raise UsageError(f"there is a lesson {lesson.id} already: {lesson.title}")
 
 
-def _inserted(course: Course, id: str, lines: Sequence[str]) -> str:
-    """The map with the lines of an entry behind the last lesson of the level that is to precede."""
+def _insert(course: Course, id: str, lines: Sequence[str]) -> str:
+    """Return the map with the lines of an entry inserted in its level, in the order of ids."""
     text = course.map.text
     level = next(level for level in course.levels if level.id == _level_id(id))
-    above = [lesson for lesson in level.lessons if id_order(lesson.id) < id_order(id)]
+    preceding = [lesson for lesson in level.lessons if id_order(lesson.id) < id_order(id)]
     line_end = _line_end(text)
-    if above or not level.lessons:
-        last = above[-1].span if above else level.span
-        at, end = _start_of_line(text, last.start), _end_of_line(text, last.end)
-        entry = line_end.join(["", "", *_indented(lines, text[at : last.start])])
+    if preceding or not level.lessons:
+        last = preceding[-1].span if preceding else level.span
+        start, end = _start_of_line(text, last.start), _end_of_line(text, last.end)
+        entry = line_end.join(["", "", *_indent(lines, text[start : last.start])])
         if any(line.strip() for line in text[end:].splitlines()[1:2]):
             entry += line_end
         return text[:end] + entry + text[end:]
     first = level.lessons[0].span.start
-    at, _ = _entry(text, level.lessons[0])
-    entry = line_end.join([*_indented(lines, text[_start_of_line(text, first) : first]), "", ""])
-    return text[:at] + entry + text[at:]
+    start, _ = _entry_range(text, level.lessons[0])
+    entry = line_end.join([*_indent(lines, text[_start_of_line(text, first) : first]), "", ""])
+    return text[:start] + entry + text[start:]
 
 
-def _checked(course: Course, text: str, id: str) -> str:
-    """The text, if it is a map in which nothing is wrong that was not before, with a lesson."""
-    known = {(d.rule, d.message) for d in parse_course_map(course.map).diagnostics}
-    parsed = parse_course_map(Source(course.map.path, text))
-    wrong = [d for d in parsed.diagnostics if (d.rule, d.message) not in known]
-    lesson = None if parsed.value is None else _lesson(parsed.value, id)
-    if wrong or lesson is None or lesson.level != _level_id(id):
-        why = f": {wrong[0].message}" if wrong else ""
-        raise UsageError(f"{course.map.path} cannot have a lesson {id}{why}")
+def _require_valid(course: Course, text: str, id: str) -> str:
+    """Return the text of a map if it has this lesson and no more mistakes than before."""
+    old_mistakes = {(d.rule, d.message) for d in parse_course_map(course.map).diagnostics}
+    new_map = parse_course_map(Source(course.map.path, text))
+    mistakes = [d for d in new_map.diagnostics if (d.rule, d.message) not in old_mistakes]
+    lesson = None if new_map.value is None else _find_lesson(new_map.value, id)
+    if mistakes or lesson is None or lesson.level != _level_id(id):
+        reason = f": {mistakes[0].message}" if mistakes else ""
+        raise UsageError(f"{course.map.path} cannot have a lesson {id}{reason}")
     return text
 
 
-def _lesson(course: Course, id: str) -> Lesson | None:
+def _find_lesson(course: Course, id: str) -> Lesson | None:
     return next((lesson for lesson in course.lessons if lesson.id == id), None)
 
 
@@ -148,32 +149,32 @@ def _level_id(id: str) -> str:
 
 
 def id_order(id: str) -> list[tuple[bool, int, str]]:
-    """Of ids, numbers by their size and before words: 1.9, 1.10, 1.A."""
+    """Return a key that sorts ids, numbers by size and before words: 1.9, 1.10, 1.A."""
     parts = id.split(".")
     return [(not part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts]
 
 
-def _entry(text: str, lesson: Lesson) -> tuple[int, int]:
-    """Where the lines of an entry begin, with the comments directly above it, and end."""
-    above = _COMMENTS_ABOVE.search(text, 0, lesson.span.start)
-    assert above is not None
-    return above.start(), _end_of_line(text, lesson.span.end)
+def _entry_range(text: str, lesson: Lesson) -> tuple[int, int]:
+    """Return where the lines of an entry begin and end, with the comments directly above it."""
+    comments = _COMMENTS_ABOVE.search(text, 0, lesson.span.start)
+    assert comments is not None
+    return comments.start(), _end_of_line(text, lesson.span.end)
 
 
 def _line_end(text: str) -> str:
     return "\r\n" if "\r\n" in text else "\n"
 
 
-def _start_of_line(text: str, at: int) -> int:
-    return text.rfind("\n", 0, at) + 1
+def _start_of_line(text: str, offset: int) -> int:
+    return text.rfind("\n", 0, offset) + 1
 
 
-def _end_of_line(text: str, at: int) -> int:
-    found = _LINE_END.search(text, min(at, len(text)))
-    assert found is not None
-    return found.start()
+def _end_of_line(text: str, offset: int) -> int:
+    line_end = _LINE_END.search(text, min(offset, len(text)))
+    assert line_end is not None
+    return line_end.start()
 
 
-def _indented(lines: Sequence[str], indent: str) -> list[str]:
-    """Lines as far in as the entries around them, if these are."""
+def _indent(lines: Sequence[str], indent: str) -> list[str]:
+    """Indent lines as the entries around them."""
     return [indent + line.removeprefix(indent) for line in lines] if indent.isspace() else [*lines]

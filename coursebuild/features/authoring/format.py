@@ -1,8 +1,9 @@
-"""A lesson or page formatted: another text that means the same.
+"""Formats a lesson or page without changing its meaning.
 
 Entry point: `format_document`.
 
-1. JSON in fences, tables, white space, empty lines, and paragraphs if there is a width give edits.
+1. Edits are collected for JSON in fences, tables, white space, empty lines, and, if there is a
+   width, for paragraphs.
 2. The text with all edits is parsed again. If its meaning has changed, each half of the edits is
    tried by itself, down to single ones, and those that change it are left out.
 """
@@ -27,58 +28,59 @@ from coursebuild.core.syntax.spans import PositionedToken, read_markdown
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import fingerprint
-from coursebuild.features.authoring.json_layout import lay_out
-from coursebuild.features.authoring.text_layout import GAP, align_table, fill, split_words
+from coursebuild.features.authoring.json_layout import layout_json
+from coursebuild.features.authoring.text_layout import GAP, align_table, fill_lines, split_words
 
 WIDTH = 120
-"""Columns of tables, and of JSON whose author left it in one line, where the course says none."""
+"""The width of tables, and of JSON on one line, in a course that sets none."""
 
 
 def format_document(
     source: Source, callouts: frozenset[str], *, lesson: bool, width: int
 ) -> Parsed[str]:
-    """The text of a document, formatted; one with mistakes stays as it is, and they are told.
+    """Format a document; one with mistakes stays as it is, and they are returned.
 
     `width` is that of paragraphs; 0 leaves their lines as they are.
     """
     before = parse_document(source, callouts, lesson=lesson)
-    if wrong := _errors(before):
-        return Parsed(source.text, wrong)
+    if errors := _errors(before):
+        return Parsed(source.text, errors)
     meaning = _meaning(before.value)
 
-    def harmless(edits: Sequence[Edit]) -> bool:
+    def is_harmless(edits: Sequence[Edit]) -> bool:
         text = apply_edits(source.text, edits)
         after = parse_document(Source(source.path, text), callouts, lesson=lesson)
         return not _errors(after) and _meaning(after.value) == meaning
 
-    tried = _Layout(source, width).edits(before.value)
-    edits = sorted((e for e in tried if e.text != e.span.text), key=lambda e: e.span.start)
-    return Parsed(apply_edits(source.text, _choose(edits, [], harmless)))
+    proposals = _Layout(source, width).edits(before.value)
+    edits = sorted((e for e in proposals if e.text != e.span.text), key=lambda e: e.span.start)
+    return Parsed(apply_edits(source.text, _select_harmless(edits, [], is_harmless)))
 
 
-def _errors(parsed: Parsed[model.Document]) -> tuple[Diagnostic, ...]:
-    return tuple(d for d in parsed.diagnostics if d.is_error)
+def _errors(document: Parsed[model.Document]) -> tuple[Diagnostic, ...]:
+    return tuple(d for d in document.diagnostics if d.is_error)
 
 
-def _choose(
-    edits: list[Edit], kept: list[Edit], harmless: Callable[[Sequence[Edit]], bool]
+def _select_harmless(
+    edits: list[Edit], selection: list[Edit], is_harmless: Callable[[Sequence[Edit]], bool]
 ) -> list[Edit]:
-    """The edits that were kept, and as many of the others as are harmless together."""
-    if not edits or harmless(kept + edits):
-        return kept + edits
+    """Return the selection with as many further edits as are harmless together."""
+    if not edits or is_harmless(selection + edits):
+        return selection + edits
     if len(edits) == 1:
-        return kept
+        return selection
     half = len(edits) // 2
-    return _choose(edits[half:], _choose(edits[:half], kept, harmless), harmless)
+    selection = _select_harmless(edits[:half], selection, is_harmless)
+    return _select_harmless(edits[half:], selection, is_harmless)
 
 
 def _meaning(document: model.Document) -> str:
-    """A hash of what a document says, whatever its places and line breaks."""
-    return fingerprint((document.blocks, document.footnotes), _SHOWN)
+    """Return a hash of what a document says, regardless of places and line breaks."""
+    return fingerprint((document.blocks, document.footnotes), _MEANINGS)
 
 
 def _join_text(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Inlines with neighbouring texts joined, and each run of white space as one blank."""
+    """Join neighbouring texts of some inlines, and make each run of white space one blank."""
     out: list[Any] = []
     for value in values:
         if isinstance(value, model.SoftBreak):
@@ -91,7 +93,7 @@ def _join_text(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(out)
 
 
-_SHOWN: dict[type, Callable[[Any], object]] = {
+_MEANINGS: dict[type, Callable[[Any], object]] = {
     Span: lambda span: None,
     Excerpt: lambda excerpt: excerpt.text,
     Source: lambda source: source.path,
@@ -100,11 +102,11 @@ _SHOWN: dict[type, Callable[[Any], object]] = {
 }
 
 _VERBATIM = ("fence", "code_block", "html_block", "math_block")
-_SOLID = (model.CodeSpan, model.Image, model.RawInline)
+_UNBREAKABLE = (model.CodeSpan, model.Image, model.RawInline)
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _DELIMITERS = re.compile(r"[-:|][-:| \t]*$")
 _PARENTS = ("", "blockquote_open", "footnote_reference_open")
-"""Tokens in which blocks are separated by empty lines."""
+"""Containers whose blocks are separated by empty lines; the first is the document itself."""
 
 
 class _Layout:
@@ -115,60 +117,65 @@ class _Layout:
         self.base = read_markdown(source)
         self.tokens = block_tokens(self.base, {})
         self.lines = [source.line_text(n + 1) for n in range(len(source.line_starts))]
-        self.done: set[int] = set()
-        """Lines, from 0, that are verbatim, or in a table, or wrapped."""
+        self.fixed_lines: set[int] = set()
+        """Lines, from 0, that white space is not removed from: verbatim, in a table, or wrapped."""
         for token in self.tokens:
             if token.type in _VERBATIM and token.map:
-                marks = token.type == "fence"
-                self.done.update(range(token.map[0] + marks, token.map[1] - marks))
+                has_marks = token.type == "fence"
+                self.fixed_lines.update(range(token.map[0] + has_marks, token.map[1] - has_marks))
 
     def _line_end(self, line: int) -> str:
-        """How a line ends, counted from 0; the last one as the one above it."""
+        """Return the line end of a line, counted from 0; for the last one that of the one above."""
         start = self.source.line_starts[line] + len(self.lines[line])
-        found = _LINE_END.match(self.source.text, start)
-        return found[0] if found else self._line_end(line - 1) if line else "\n"
+        line_end = _LINE_END.match(self.source.text, start)
+        return line_end[0] if line_end else self._line_end(line - 1) if line else "\n"
 
     def edits(self, document: model.Document) -> Iterator[Edit]:
-        """All of them; none overlap."""
+        """Yield all edits; none overlap."""
         if self.width:
             for block in model.document_blocks(document):
-                if isinstance(block, model.Paragraph) and block.span.line - 1 not in self.done:
+                if (
+                    isinstance(block, model.Paragraph)
+                    and block.span.line - 1 not in self.fixed_lines
+                ):
                     yield from self._wrap(block)
-        for at, token in enumerate(self.tokens):
+        for index, token in enumerate(self.tokens):
             if token.type == "fence":
                 yield from self._lay_out_json(read_fence(token, self.base, nested=False))
             elif token.type == "table_open":
-                yield from self._align_table(at)
-        yield from self._white_space()
-        yield from self._separate()
+                yield from self._align_table(index)
+        yield from self._trim_white_space()
+        yield from self._separate_blocks()
 
     def _wrap(self, paragraph: model.Paragraph) -> Iterator[Edit]:
-        """A paragraph in lines that are as full as can be; not one with forced line breaks."""
+        """Fill the lines of a paragraph, unless it has forced line breaks."""
         span, inlines = paragraph.span, list(model.walk_inlines(paragraph.children))
         if any(isinstance(inline, model.HardBreak) for inline in inlines):
             return
-        solid = [inline.span for inline in inlines if isinstance(inline, _SOLID)]
-        solid += [inline.tex.span() for inline in inlines if isinstance(inline, model.Math)]
-        solid += [inline.text_span for inline in inlines if isinstance(inline, model.NumberBinding)]
+        unbreakable = [inline.span for inline in inlines if isinstance(inline, _UNBREAKABLE)]
+        unbreakable += [inline.tex.span() for inline in inlines if isinstance(inline, model.Math)]
+        unbreakable += [
+            inline.text_span for inline in inlines if isinstance(inline, model.NumberBinding)
+        ]
         prefix = next((gap[1] for gap in GAP.finditer(span.text) if gap[1] is not None), None)
         prefix = line_prefix(span) if prefix is None else prefix
-        lines = fill(split_words(span, solid), self.width, span.column - 1, prefix)
-        self.done.update(range(span.line - 1, span.end_line - 1))
+        lines = fill_lines(split_words(span, unbreakable), self.width, span.column - 1, prefix)
+        self.fixed_lines.update(range(span.line - 1, span.end_line - 1))
         yield Edit(span, (self._line_end(span.line - 1) + prefix).join(lines))
 
     def _lay_out_json(self, fence: Fence) -> Iterator[Edit]:
         if fence.kind not in fence_names():
             return
-        parsed = parse_json(fence.body, fence.head)
-        if parsed.value is not None and not parsed.diagnostics:
-            width = self.width or (sys.maxsize if "\n" in parsed.value.raw else WIDTH)
-            lines = lay_out(parsed.value, width - len(fence.prefix)).split("\n")
+        json = parse_json(fence.body, fence.head)
+        if json.value is not None and not json.diagnostics:
+            width = self.width or (sys.maxsize if "\n" in json.value.raw else WIDTH)
+            lines = layout_json(json.value, width - len(fence.prefix)).split("\n")
             yield whole_lines(fence.body_span, fence.prefix, lines)
 
-    def _align_table(self, at: int) -> Iterator[Edit]:
-        """A table with its columns below each other, if its lines are then not too long."""
+    def _align_table(self, index: int) -> Iterator[Edit]:
+        """Align the columns of a table, unless its lines would become too long."""
         rows: list[PositionedToken] = []
-        for token in self.tokens[at:]:
+        for token in self.tokens[index:]:
             if token.type == "table_close":
                 break
             rows += [token] if token.type == "tr_open" else []
@@ -181,12 +188,12 @@ class _Layout:
         lines = align_table(
             [texts[0], delimiters[0], *texts[1:]], (self.width or WIDTH) - len(prefix)
         )
-        self.done.update(range(second - 1, second + len(rows)))
+        self.fixed_lines.update(range(second - 1, second + len(rows)))
         span = self.base.span(rows[0].start, rows[-1].start + len(texts[-1]))
         yield Edit(span, (self._line_end(second) + prefix).join(lines))
 
-    def _white_space(self) -> Iterator[Edit]:
-        """None at line ends, single empty lines, one line end at the end of the text."""
+    def _trim_white_space(self) -> Iterator[Edit]:
+        """Remove spaces at line ends and repeated empty lines; end the text with a line end."""
         text, starts = self.source.text, self.source.line_starts
         end = len(text.rstrip(" \t\r\n"))
         inner = {
@@ -199,7 +206,7 @@ class _Layout:
         last = self.source.position(end)[0] - 1
         for n in range(last):
             line, bare = self.lines[n], self.lines[n].rstrip(" \t")
-            if n in self.done:
+            if n in self.fixed_lines:
                 empty = None
                 continue
             if bare == empty:
@@ -211,24 +218,26 @@ class _Layout:
         if text[end:] != line_end:
             yield Edit(self.source.span(end), line_end)
 
-    def _separate(self) -> Iterator[Edit]:
-        """An empty line between blocks, except beside HTML, between footnotes and below a title."""
-        around: list[list[str]] = [["", ""]]
+    def _separate_blocks(self) -> Iterator[Edit]:
+        """Separate blocks by empty lines, except near HTML, between footnotes and below titles."""
+        parents: list[list[str]] = [["", ""]]  # the type of each, and of the last block in it
         for token in self.tokens:
             if token.nesting < 0:
-                around.pop()
+                parents.pop()
                 continue
-            parent, above = around[-1]
-            if parent in _PARENTS and above and token.map:
-                together = "html_block" in (above, token.type) or (
-                    above == token.type == "footnote_reference_open"
+            parent, previous = parents[-1]
+            if parent in _PARENTS and previous and token.map:
+                belong_together = "html_block" in (previous, token.type) or (
+                    previous == token.type == "footnote_reference_open"
                 )
                 line = token.map[0]
                 before = self.lines[line - 1].strip(" \t>")
-                if before and not together and not before.startswith("[!"):
-                    at = self.source.line_starts[line]
-                    prefix = self.source.text[at : self.base.offset(token.start)]
-                    yield Edit(self.source.span(at, at), prefix.rstrip() + self._line_end(line - 1))
-            around[-1][1] = token.type
+                if before and not belong_together and not before.startswith("[!"):
+                    start = self.source.line_starts[line]
+                    prefix = self.source.text[start : self.base.offset(token.start)]
+                    yield Edit(
+                        self.source.span(start, start), prefix.rstrip() + self._line_end(line - 1)
+                    )
+            parents[-1][1] = token.type
             if token.nesting > 0:
-                around.append([token.type, ""])
+                parents.append([token.type, ""])

@@ -1,10 +1,10 @@
-"""JSON laid out: only what stands between its values changes.
+"""Lays out JSON: only white space between its values changes.
 
-Entry point: `lay_out`.
+Entry point: `layout_json`.
 
-An object or list that its author broke into lines stays broken where it was, and one in a line
-stays in it where it has room. Members go two columns further in than what they are in; those that
-begin beside the bracket stand below each other behind it.
+An object or list keeps the line breaks of its author; one on a single line stays there where it
+fits. Members are indented by two columns more than their parent; those that begin on the line of
+the bracket are aligned after it.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import ArrayNode, Member, Node, ObjectNode
 
 
-def lay_out(node: Node, width: int, column: int = 0, indent: int = 0) -> str:
-    """A value that begins at a column, in an object or list whose members are indented so far."""
+def layout_json(node: Node, width: int, column: int = 0, indent: int = 0) -> str:
+    """Return the text of a value that begins at a column, inside a parent with this indent."""
     line = to_one_line(node).text
     parts = _parts(node)
     if not parts or ("\n" not in node.raw and column + len(line) <= width):
         return line
-    breaks = _breaks(node, parts)
+    breaks = _count_breaks(node, parts)
     inner = indent + 2 if breaks[0] else column + 1 if any(breaks) else indent
     text, at = line[0], column + 1
     for part, lines in zip(parts, breaks, strict=False):
@@ -31,7 +31,7 @@ def lay_out(node: Node, width: int, column: int = 0, indent: int = 0) -> str:
             text, at = text + " ", at + 1
         key = f"{part.key.raw}: " if isinstance(part, Member) else ""
         value = part.value if isinstance(part, Member) else part
-        text += key + lay_out(value, width, at + len(key), inner)
+        text += key + layout_json(value, width, at + len(key), inner)
         text += "" if part is parts[-1] else ","
         at = len(text) - text.rfind("\n") - 1 if "\n" in text else column + len(text)
     if breaks[-1]:
@@ -45,8 +45,8 @@ def _parts(node: Node) -> tuple[Member | Node, ...]:
     return node.items if isinstance(node, ArrayNode) else ()
 
 
-def _breaks(node: Node, parts: tuple[Member | Node, ...]) -> list[int]:
-    """Line ends before each part and before the closing bracket; one where all stood in a line."""
+def _count_breaks(node: Node, parts: tuple[Member | Node, ...]) -> list[int]:
+    """Count the line ends before each part and the closing bracket; 1 each for a single line."""
     if "\n" not in node.raw:
         return [1] * (len(parts) + 1)
     places = [

@@ -1,7 +1,7 @@
-"""Where a course names a lesson.
+"""The places where a course names a lesson.
 
-Entry points: `references`, the edits that give it another id; `doubtful_places`, where something
-may mean it that is no link: in code, in a comment, in a range such as "Lessons 1.3 to 1.5".
+Entry points: `rename_references`, the edits that give it another id; `doubtful_places`, which may
+mean the lesson but are no links: in code, in a comment, in a range such as "Lessons 1.3 to 1.5".
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _NUMBER = r"(?>[0-9]+(?:\.[0-9]+)+)"
 _RANGE = re.compile(rf"(?i)\blessons\s+({_NUMBER})\s?(?:–|-|to\b)\s?({_NUMBER})")
 
 
-def references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
-    """The edits of the map, and of all links and mentions, each once."""
-    found = {(one.span.path, one.span.start): one for one in _map_edits(course, lesson, new)}
+def rename_references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
+    """Return the edits of the map, and of all links and mentions, each once."""
+    edits = {(e.span.path, e.span.start): e for e in _map_edits(course, lesson, new)}
     name = re.compile(rf"(?<![\w.]){re.escape(lesson.id)}(?!\w|\.\w)")
     for document in course.documents:
         for inline in document_inlines(document):
@@ -41,11 +41,11 @@ def references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
             target = resolve(inline.target, course, document.source.path)
             if isinstance(target, LessonTarget) and target.id == lesson.id:
                 span = inline.target_span
-                written = span.text.partition("#")[0]
-                for match in list(name.finditer(written))[-1:]:
+                address = span.text.partition("#")[0]
+                for match in list(name.finditer(address))[-1:]:
                     place = Excerpt.of_span(span).span(*match.span())
-                    found[place.path, place.start] = Edit(place, new)
-    return list(found.values())
+                    edits[place.path, place.start] = Edit(place, new)
+    return list(edits.values())
 
 
 def _map_edits(course: Course, lesson: Lesson, new: str) -> Iterator[Edit]:
@@ -55,57 +55,57 @@ def _map_edits(course: Course, lesson: Lesson, new: str) -> Iterator[Edit]:
             id = node.get("id")
             if isinstance(id, StringNode) and id.value == lesson.id:
                 yield Edit(id.span, toml_string(new))
-    for other in course.lessons:
-        named = zip(other.prerequisites, other.prerequisite_spans, strict=True)
-        yield from (Edit(span, toml_string(new)) for name, span in named if name == lesson.id)
-    for path in _silenced(root):
+    for dependent in course.lessons:
+        ids = zip(dependent.prerequisites, dependent.prerequisite_spans, strict=True)
+        yield from (Edit(span, toml_string(new)) for id, span in ids if id == lesson.id)
+    for path in _silenced_paths(root):
         if path.value == lesson.path:
             yield Edit(path.span, toml_string(replace(lesson, id=new).path))
 
 
 def doubtful_places(
-    course: Course, lesson: Lesson, new: str, edits: Iterable[Edit], others: Iterable[Source]
+    course: Course, lesson: Lesson, new: str, edits: Iterable[Edit], code: Iterable[Source]
 ) -> list[Span]:
-    """Places that may mean the lesson, and are none of the edits.
+    """Return the places that may mean the lesson, and are not among the edits.
 
-    `others` are further texts of the project, such as its features.
+    `code` are further texts of the project, such as its features.
     """
-    known = [edit.span for edit in edits]
+    edited_spans = [edit.span for edit in edits]
     id = re.escape(lesson.id)
     names = re.compile(
         rf"lesson:({id})(?!\w|\.\w)|(?<![\w.])({id})-{lesson.slug}(?![\w-])"
         rf"|(?i:\blessons?)\s(?:{_NUMBER}|[\s,–-]|and\b|or\b|to\b)*?(?<![\w.])({id})(?!\w|\.\w)"
     )
-    found = []
-    for source in (*course.sources, *others):
+    places = []
+    for source in (*course.sources, *code):
         for match in names.finditer(source.text):
             place = source.span(*match.span(match.lastindex or 0))
-            if not any(span.contains(place) for span in known):
-                found.append(place)
-        found += [
+            if not any(span.contains(place) for span in edited_spans):
+                places.append(place)
+        places += [
             source.span(*match.span())
             for match in _RANGE.finditer(source.text)
             if id_order(match[1]) <= id_order(lesson.id) <= id_order(match[2])
         ]
-    return [*found, *_globs(course, lesson, new)]
+    return [*places, *_outdated_globs(course, lesson, new)]
 
 
-def _globs(course: Course, lesson: Lesson, new: str) -> Iterator[Span]:
-    """Patterns of the map that fit the file as it is called, and not as it will be."""
-    renamed = replace(lesson, id=new).path
-    for path in _silenced(_map(course)):
-        fits = [fnmatchcase(name, path.value) for name in (lesson.path, renamed)]
+def _outdated_globs(course: Course, lesson: Lesson, new: str) -> Iterator[Span]:
+    """Yield the patterns of the map that match the lesson's old path, and not the new one."""
+    new_path = replace(lesson, id=new).path
+    for path in _silenced_paths(_map(course)):
+        fits = [fnmatchcase(name, path.value) for name in (lesson.path, new_path)]
         if path.value != lesson.path and fits == [True, False]:
             yield path.span
 
 
-def _silenced(root: ObjectNode) -> Iterator[StringNode]:
-    """The files in which warnings are silenced."""
+def _silenced_paths(root: ObjectNode) -> Iterator[StringNode]:
+    """Yield the paths and patterns of the map's entries that silence warnings."""
     paths = (silence.get("path") for silence in root.objects("silence"))
     return (path for path in paths if isinstance(path, StringNode))
 
 
 def _map(course: Course) -> ObjectNode:
     root = parse_toml(course.map).value
-    assert root is not None  # a course was made of it
+    assert root is not None  # the course was read from it
     return root

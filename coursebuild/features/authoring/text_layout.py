@@ -12,29 +12,29 @@ from coursebuild.core.text.cells import cells
 from coursebuild.core.text.source import Span
 
 GAP = re.compile(r"[ \t]*(?:\r\n|\r|\n)([ \t>]*)|[ \t]+")
-"""White space between words; group 1 is what precedes the next line in a quote or list."""
+"""White space between words; group 1 is the prefix of the next line in a quote or list."""
 _OPENING = re.compile(r"[-+*#=_|]+$|>|\d+[.)]$|`{3}|~{3}|\$\$")
-"""Words that would begin another block at the beginning of a line."""
+"""Words that would begin another block if they began a line."""
 _PIPE = re.compile(r"(?<!\\)\|")
 
 
-def split_words(span: Span, solid: Sequence[Span]) -> list[str]:
-    """The words of a text; what is in a solid part stays together."""
-    found, at = [""], 0
+def split_words(span: Span, unbreakable: Sequence[Span]) -> list[str]:
+    """Split a text into words, except within unbreakable parts."""
+    words, word_start = [""], 0
     for gap in GAP.finditer(span.text):
         place = span.start + gap.start()
-        found[-1] += span.text[at : gap.start()]
-        at = gap.end()
-        if any(part.start < place < part.end for part in solid):
-            found[-1] += gap[0] if gap[1] is None else " "
+        words[-1] += span.text[word_start : gap.start()]
+        word_start = gap.end()
+        if any(part.start < place < part.end for part in unbreakable):
+            words[-1] += gap[0] if gap[1] is None else " "
         else:
-            found.append("")
-    found[-1] += span.text[at:]
-    return found
+            words.append("")
+    words[-1] += span.text[word_start:]
+    return words
 
 
-def fill(words: Sequence[str], width: int, column: int, prefix: str) -> list[str]:
-    """Lines of words, of which the first begins at a column and the others with a prefix."""
+def fill_lines(words: Sequence[str], width: int, column: int, prefix: str) -> list[str]:
+    """Fill lines with words; the first line begins at a column, the others with a prefix."""
     lines = [words[0]]
     column += cells(words[0])
     for word in words[1:]:
@@ -48,33 +48,37 @@ def fill(words: Sequence[str], width: int, column: int, prefix: str) -> list[str
 
 
 def align_table(rows: Sequence[str], width: int) -> list[str]:
-    """The rows of a table, the delimiters second; its columns aligned where they have room."""
+    """Align the columns of a table where it is not too wide; the second row are the delimiters."""
     table = [[cell.strip(" \t") for cell in _PIPE.split(row)] for row in rows]
     table = [row[not row[0] : len(row) - (not row[-1])] for row in table]
     marks = table.pop(1)
     if any(len(row) > len(marks) for row in table):
         return list(rows)
     table = [row + [""] * (len(marks) - len(row)) for row in table]
-    least = [3 + mark.count(":") for mark in marks]
+    min_widths = [3 + mark.count(":") for mark in marks]
     widths = [max(cells(cell) for cell in column) for column in zip(*table, strict=True)]
-    widths = [max(pair) for pair in zip(widths, least, strict=True)]
+    widths = [max(pair) for pair in zip(widths, min_widths, strict=True)]
     fits = sum(widths) + 3 * len(widths) + 1 <= width
     table = [
-        [_padded(*cell) if fits else cell[0] for cell in zip(row, widths, marks, strict=True)]
+        [_pad(*cell) if fits else cell[0] for cell in zip(row, widths, marks, strict=True)]
         for row in table
     ]
     table.insert(
-        1, [_delimiter(*mark) for mark in zip(marks, widths if fits else least, strict=True)]
+        1,
+        [
+            _write_delimiter(*mark)
+            for mark in zip(marks, widths if fits else min_widths, strict=True)
+        ],
     )
     return ["|" + "".join(f" {cell} |" if cell else " |" for cell in row) for row in table]
 
 
-def _padded(cell: str, width: int, mark: str) -> str:
+def _pad(cell: str, width: int, mark: str) -> str:
     room = width - cells(cell)
     left = 0 if not mark.endswith(":") else room // 2 if mark.startswith(":") else room
     return " " * left + cell + " " * (room - left)
 
 
-def _delimiter(mark: str, width: int) -> str:
+def _write_delimiter(mark: str, width: int) -> str:
     left, right = mark.startswith(":"), mark.endswith(":")
     return ":" * left + "-" * (width - left - right) + ":" * right

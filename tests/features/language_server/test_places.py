@@ -40,7 +40,7 @@ def test_files_of_the_course_are_known_by_any_name(tmp_path: Path) -> None:
     (root / "content").mkdir(parents=True)
     link.symlink_to(root)
     places = Places(root)
-    written = f"{link.as_uri()}/content/x.md"
-    assert places.path(written) == "content/x.md"
-    assert places.uri("content/x.md") == written  # as the editor writes it
+    uri = f"{link.as_uri()}/content/x.md"
+    assert places.path(uri) == "content/x.md"
+    assert places.uri("content/x.md") == uri  # as the editor writes it
     assert places.path((tmp_path / "x.md").as_uri()) == places.path("untitled:Untitled-1") == ""

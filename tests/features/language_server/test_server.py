@@ -1,4 +1,4 @@
-"""What an editor is told and offered: one server, asked over pipes by pygls' client."""
+"""The answers of the language server: one server, asked over pipes by pygls' client."""
 
 from __future__ import annotations
 
@@ -87,12 +87,12 @@ def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[E
 @pytest.fixture(autouse=True)
 def unchanged(editor: Editor) -> Iterator[None]:
     """Each test finds the course as it was, and the server has written into none of its files."""
-    known = {path: editor.folder.text(path) for path in (ONE, TWO, MAP)}
+    texts = {path: editor.folder.text(path) for path in (ONE, TWO, MAP)}
     yield
-    for path, text in known.items():
+    for path, text in texts.items():
         editor.write(path, text)
         editor.save(path)
-    for path in known:
+    for path in texts:
         editor.until(path)
 
 
@@ -101,12 +101,16 @@ def unchanged(editor: Editor) -> Iterator[None]:
 
 def test_mistakes_are_told_as_they_are_typed_and_nothing_is_saved(editor: Editor) -> None:
     editor.write(TWO, LINKS.replace("\n", "\r\n") + "\r\n🙂 𝄞 Lesson 9.9 is not there.\r\n")
-    (told,) = editor.until(TWO, "link-lesson")
+    (mistake,) = editor.until(TWO, "link-lesson")
     place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
-    assert told.range == types.Range(place, types.Position(5, 16))
-    assert told.severity == types.DiagnosticSeverity.Error
-    assert told.message.startswith("lesson 9.9 is mentioned, and the course map does not have it")
-    assert told.code_description and told.code_description.href.endswith("rules.md#link-lesson")
+    assert mistake.range == types.Range(place, types.Position(5, 16))
+    assert mistake.severity == types.DiagnosticSeverity.Error
+    assert mistake.message.startswith(
+        "lesson 9.9 is mentioned, and the course map does not have it"
+    )
+    assert mistake.code_description and mistake.code_description.href.endswith(
+        "rules.md#link-lesson"
+    )
     editor.write(TWO, LINKS)
     editor.until(TWO)
     assert editor.folder.text(TWO) == LINKS
@@ -114,8 +118,8 @@ def test_mistakes_are_told_as_they_are_typed_and_nothing_is_saved(editor: Editor
 
 def test_a_mistake_says_where_else_it_is(editor: Editor) -> None:
     editor.write(TWO, LINKS + "\nA [moment of inertia]{term} again.\n")
-    (told,) = editor.until(TWO, "term-repeated")
-    (note,) = told.related_information or ()
+    (diagnostic,) = editor.until(TWO, "term-repeated")
+    (note,) = diagnostic.related_information or ()
     assert (editor.places.path(note.location.uri), note.location.range.start.line) == (ONE, 2)
 
 
@@ -124,9 +128,9 @@ def test_what_a_script_printed_is_compared_as_one_types(editor: Editor) -> None:
     typed = FALL.replace("at 1.000 m\n```", "at 1.700 m\n```").replace("`1.000`", "`1.3`")
     typed = f"New lines above.\n\n{typed}"
     editor.write(ONE, typed)
-    drift, bound = editor.until(ONE, "output-drift", "binding-mismatch")
+    drift, binding = editor.until(ONE, "output-drift", "binding-mismatch")
     assert "this run printed 1.000" in drift.message
-    assert (drift.range.start.line, bound.range.start.line) == (22, 25)
+    assert (drift.range.start.line, binding.range.start.line) == (22, 25)
 
 
 def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
@@ -136,8 +140,8 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     editor.save(ONE)
     editor.until(ONE, "output-drift")
     editor.write(ONE, "A line more.\n\n" + typed)
-    (told,) = editor.until(ONE, "output-drift")
-    assert told.range.start.line == 20
+    (diagnostic,) = editor.until(ONE, "output-drift")
+    assert diagnostic.range.start.line == 20
     accept = "Accept what `examples/fall.py` prints"
     # offered once the script has run a second time
     action = editor.eventually(lambda: editor.actions(ONE, "at 1.|000 m").get(accept))
@@ -152,16 +156,16 @@ def test_what_running_found_follows_its_lines(editor: Editor) -> None:
     typed = FALL.replace("print(", "print(1 / 0, ")
     editor.write(ONE, typed)
     editor.save(ONE)
-    (told,) = editor.until(ONE, "script-failed")
+    (diagnostic,) = editor.until(ONE, "script-failed")
     editor.write(ONE, "A line more.\n\n" + typed)
-    editor.until(ONE, "script-failed", line=told.range.start.line + 2)
+    editor.until(ONE, "script-failed", line=diagnostic.range.start.line + 2)
 
 
 def test_a_map_that_is_being_written_is_told_and_the_rest_stays(editor: Editor) -> None:
     text = editor.texts[MAP]
     editor.write(MAP, text + "\n[[silence]]\nrule = \n")
-    (told,) = editor.until(MAP, "map-syntax")
-    assert told.range.start.line == text.count("\n") + 2
+    (diagnostic,) = editor.until(MAP, "map-syntax")
+    assert diagnostic.range.start.line == text.count("\n") + 2
     assert editor.hover_text(TWO, "lesson:1.|1#fall").startswith("**Lesson 1.1: ")
 
 
@@ -183,9 +187,9 @@ def test_a_text_that_is_too_long_is_not_read(editor: Editor) -> None:
     text = "$x$ *a* {out} " * 20_000
     editor.write(ONE, text)
     editor.until(ONE, "text-long")
-    asked = editor.named(ONE), types.FormattingOptions(4, True)
-    assert not editor.request("formatting", types.DocumentFormattingParams(*asked))
-    assert not editor.request("folding_range", types.FoldingRangeParams(asked[0]))
+    params = editor.named(ONE), types.FormattingOptions(4, True)
+    assert not editor.request("formatting", types.DocumentFormattingParams(*params))
+    assert not editor.request("folding_range", types.FoldingRangeParams(params[0]))
     assert not editor.actions(ONE, text[:3] + "|" + text[3:])
     editor.write(ONE, FALL)
     editor.until(ONE)
@@ -231,9 +235,10 @@ HOVERS = [
 def test_what_something_is(editor: Editor) -> None:
     for path in (ONE, TWO, MAP):
         editor.until(path)
-    shown = [(path, needle, editor.hover_text(path, needle)) for path, needle, _ in HOVERS]
-    wanted = [said for *_, said in HOVERS]
-    assert [one for one, said in zip(shown, wanted, strict=True) if said not in one[-1]] == []
+    texts = [(path, needle, editor.hover_text(path, needle)) for path, needle, _ in HOVERS]
+    assert [
+        hover for hover, (*_, part) in zip(texts, HOVERS, strict=True) if part not in hover[-1]
+    ] == []
 
 
 DEFINITIONS = [
@@ -251,15 +256,15 @@ DEFINITIONS = [
 
 
 def test_where_something_is_said(editor: Editor) -> None:
-    found = [(path, needle, editor.defined_at(path, needle)) for path, needle, _ in DEFINITIONS]
-    assert found == DEFINITIONS
+    places = [(path, needle, editor.defined_at(path, needle)) for path, needle, _ in DEFINITIONS]
+    assert places == DEFINITIONS
 
 
 # --- what may be written
 
 
 @pytest.mark.parametrize(
-    ("path", "written", "label", "new"),
+    ("path", "typed", "label", "new"),
     [
         (TWO, "[x](lesson:|", "1.1", "1.1"),
         (TWO, "As Lesson 1|", "1.2", "1.2"),
@@ -279,12 +284,12 @@ def test_where_something_is_said(editor: Editor) -> None:
         (MAP, "\n[[level.lesson]]\nstatus = |", "draft", '"draft"'),
     ],
 )
-def test_what_may_be_written(editor: Editor, path: str, written: str, label: str, new: str) -> None:
-    editor.write(path, editor.texts[path] + "\n" + written.replace("|", "", 1))
-    item = editor.proposals(path, written)[label]
+def test_what_may_be_written(editor: Editor, path: str, typed: str, label: str, new: str) -> None:
+    editor.write(path, editor.texts[path] + "\n" + typed.replace("|", "", 1))
+    item = editor.proposals(path, typed)[label]
     assert isinstance(item.text_edit, types.TextEdit)
     (text,) = editor.edited({editor.places.uri(path): [item.text_edit]}).values()
-    before, after = written.split("|", 1)
+    before, after = typed.split("|", 1)
     stem = re.split(r'[\s:#=.!`("\[{]', before)[-1]
     start = before.removesuffix('"' + stem) if new.startswith('"') else before.removesuffix(stem)
     assert text.endswith(start + new + after.removeprefix('"'))
@@ -299,8 +304,8 @@ def test_keys_that_are_given_and_those_of_other_questions_are_not_proposed(edito
 
 
 def test_a_number_that_was_printed_can_be_bound(editor: Editor) -> None:
-    said = "It fell for 0.002 s, not 5 s, to `1.000` m."
-    text = FALL.replace("> [!warning]", f"{said}\n\n> [!warning]")
+    sentence = "It fell for 0.002 s, not 5 s, to `1.000` m."
+    text = FALL.replace("> [!warning]", f"{sentence}\n\n> [!warning]")
     editor.write(ONE, text)
     (bind,) = editor.actions(ONE, "for 0.0|02 s, not").values()
     assert bind.title == "Bind `0.002` to what `examples/fall.py` prints"
@@ -324,12 +329,12 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
 
 def test_a_lesson_gets_another_id_everywhere(editor: Editor) -> None:
     place = editor.named(TWO), editor.place(TWO, "lesson:1.|1#fall")
-    found = editor.request("prepare_rename", types.PrepareRenameParams(*place))
-    assert found.range.end.character - found.range.start.character == len("1.1")
-    assert found.placeholder == "1.1"
-    done = editor.request("rename", types.RenameParams(*place, new_name="1.5"))
-    *edits, moved = done.document_changes
-    assert editor.places.path(moved.new_uri) == "content/lessons/1.5-one.md"
+    name = editor.request("prepare_rename", types.PrepareRenameParams(*place))
+    assert name.range.end.character - name.range.start.character == len("1.1")
+    assert name.placeholder == "1.1"
+    rename_edit = editor.request("rename", types.RenameParams(*place, new_name="1.5"))
+    *edits, file_rename = rename_edit.document_changes
+    assert editor.places.path(file_rename.new_uri) == "content/lessons/1.5-one.md"
     new = editor.edited({edit.text_document.uri: edit.edits for edit in edits})
     assert new[TWO] == LINKS.replace("1.1", "1.5")
     assert 'id = "1.5"' in new[MAP]
@@ -340,10 +345,10 @@ def test_a_lesson_gets_another_id_everywhere(editor: Editor) -> None:
     assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None
 
 
-def renamed(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
+def rename(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
     place = editor.named(path), editor.place(path, needle)
-    done = editor.request("rename", types.RenameParams(*place, new_name=name))
-    return {} if done is None else editor.edited(done.changes)
+    edit = editor.request("rename", types.RenameParams(*place, new_name=name))
+    return {} if edit is None else editor.edited(edit.changes)
 
 
 def test_a_term_and_a_label_get_another_name_everywhere(editor: Editor) -> None:
@@ -351,47 +356,47 @@ def test_a_term_and_a_label_get_another_name_everywhere(editor: Editor) -> None:
     text += "[r]: lesson:1.1#eq:energy\n"
     editor.write(TWO, text)
     for path, needle in ((ONE, "{#eq:en|ergy}"), (TWO, "lesson:1.1#eq:en|ergy)")):
-        new = renamed(editor, path, needle, "eq:E-1")
-        known = {ONE: FALL, TWO: text}
-        assert new == {one: t.replace("eq:energy", "eq:E-1") for one, t in known.items()}
+        new = rename(editor, path, needle, "eq:E-1")
+        texts = {ONE: FALL, TWO: text}
+        assert new == {p: t.replace("eq:energy", "eq:E-1") for p, t in texts.items()}
     for path, needle in ((ONE, "[mom|ent of inertia]"), (TWO, "term:mom|ent-of-inertia),")):
-        new = renamed(editor, path, needle, "Rotational inertia")
+        new = rename(editor, path, needle, "Rotational inertia")
         assert new == {
             ONE: FALL.replace("]{term}", ']{term="Rotational inertia"}'),
             TWO: text.replace("term:moment-of-inertia", "term:rotational-inertia"),
         }
-    assert renamed(editor, TWO, "lesson:1.1#fa|ll)", "x") == {}  # it follows from the heading
-    headed = text.replace("## Links", "## Links {#all .further}").replace("(#links)", "(#all)")
-    editor.write(TWO, headed)
-    assert renamed(editor, TWO, "{#a|ll", "both")[TWO] == headed.replace("#all", "#both")
-    for needle, name, why in (
+    assert rename(editor, TWO, "lesson:1.1#fa|ll)", "x") == {}  # it follows from the heading
+    labelled = text.replace("## Links", "## Links {#all .further}").replace("(#links)", "(#all)")
+    editor.write(TWO, labelled)
+    assert rename(editor, TWO, "{#a|ll", "both")[TWO] == labelled.replace("#all", "#both")
+    for needle, name, reason in (
         ("term:mom|ent-of-inertia),", "{}", "a term has letters or digits"),
         ("lesson:1.1#eq:en|ergy)", "energy", "a label is `eq:`"),
         ("lesson:1.1#eq:en|ergy)", "eq:", "a label is `eq:`"),
         ("{#a|ll", "a b", "a label is letters"),
     ):
-        with pytest.raises(JsonRpcException, match=why):
-            renamed(editor, TWO, needle, name)
+        with pytest.raises(JsonRpcException, match=reason):
+            rename(editor, TWO, needle, name)
 
 
 def test_headings_and_what_can_be_folded(editor: Editor) -> None:
     editor.write(TWO, "## A\n\n### B `c`\n\n> [!tip]\n> Fold\n\n## D\n\n```text\nx\n```\n")
-    named = editor.named(TWO)
-    symbols = editor.request("document_symbol", types.DocumentSymbolParams(named))
+    document = editor.named(TWO)
+    symbols = editor.request("document_symbol", types.DocumentSymbolParams(document))
     assert [(s.name, [i.name for i in s.children]) for s in symbols] == [("A", ["B c"]), ("D", [])]
-    folds = editor.request("folding_range", types.FoldingRangeParams(named))
-    lines = sorted((one.start_line, one.end_line) for one in folds)
+    folds = editor.request("folding_range", types.FoldingRangeParams(document))
+    lines = sorted((fold.start_line, fold.end_line) for fold in folds)
     assert lines == [(0, 5), (2, 5), (4, 5), (7, 11), (9, 11)]
 
 
 def test_a_text_is_formatted(editor: Editor) -> None:
-    asked = editor.named(TWO), types.FormattingOptions(4, True)
+    params = editor.named(TWO), types.FormattingOptions(4, True)
     editor.write(TWO, "## A\n\n| a | b |\n|-|-|\n| 100 | 2 |\n")
-    (edit,) = editor.request("formatting", types.DocumentFormattingParams(*asked))
+    (edit,) = editor.request("formatting", types.DocumentFormattingParams(*params))
     new = "## A\n\n| a   | b   |\n| --- | --- |\n| 100 | 2   |\n"
     assert editor.edited({editor.places.uri(TWO): [edit]}) == {TWO: new}
     editor.write(TWO, new)
-    assert not editor.request("formatting", types.DocumentFormattingParams(*asked))
+    assert not editor.request("formatting", types.DocumentFormattingParams(*params))
 
 
 # --- the command
@@ -410,5 +415,5 @@ def test_without_pygls_the_command_says_what_to_install(tmp_path: Path, stores: 
     folder.fill(["## One\n"], stores)
     code = "import sys; sys.modules['pygls'] = None; from coursebuild.cli import main; main()"
     process = folder.start("lsp", code=code, stderr=subprocess.PIPE)
-    said = b"coursebuild: the language server needs pygls: `pip install 'coursebuild[lsp]'`\n"
-    assert (process.communicate()[1], process.returncode) == (said, 2)
+    message = b"coursebuild: the language server needs pygls: `pip install 'coursebuild[lsp]'`\n"
+    assert (process.communicate()[1], process.returncode) == (message, 2)

@@ -1,6 +1,6 @@
-"""The commands by which a course is begun and changed, each in a module of its name.
+"""The commands that begin and change a course, each in a module of its name.
 
-Entry point: `apply_changes`, what those do that change one.
+Entry point: `apply_changes`, for the commands that change one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from coursebuild.pipeline.progress import Progress
 
 
 def apply_changes(root: Path, changes: Sequence[FileChange]) -> int:
-    """Make all changes and say which; gives the exit status.
+    """Make all changes, report them, and return the exit status.
 
     Raises:
         UsageError: a new file is there already.
@@ -26,8 +26,8 @@ def apply_changes(root: Path, changes: Sequence[FileChange]) -> int:
         if change.old is None and (file.exists() or file.is_symlink()):
             raise UsageError(f"there is a file {change.path} already")
     change_files(root, changes, Progress().say)
-    said = []
+    lines = []
     for change in changes:
-        what = "wrote" if change.old is None else "removed" if change.new is None else "changed"
-        said.append(f"{what} {change.path}\n")
-    return write("".join(said), CLEAN)
+        verb = "wrote" if change.old is None else "removed" if change.new is None else "changed"
+        lines.append(f"{verb} {change.path}\n")
+    return write("".join(lines), CLEAN)

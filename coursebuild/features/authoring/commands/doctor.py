@@ -1,6 +1,6 @@
 """`coursebuild doctor`: say what works on this machine, and how to mend what does not.
 
-What can end a process, as a driver of a graphics card can, is tried in one of its own.
+What can kill a process, as a driver of a graphics card can, is tried in a process of its own.
 """
 
 from __future__ import annotations
@@ -46,37 +46,39 @@ _BACKENDS = ("egl", "osmesa")
 
 
 class Probe(Struct, frozen=True):
-    """Whether something works."""
+    """Whether something works, and what to do if not."""
 
-    what: str
+    text: str
     ok: bool
     cure: str = ""
-    needed: bool = True
+    is_required: bool = True
     """Whether every course needs it."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said: nothing."""
+    """Declare no arguments."""
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Try each, and print a line at once."""
+    """Make each probe, and print its line at once."""
     folder = Path(arguments.root or find_course_root(".") or ".").resolve()
     if not folder.is_dir():
         raise UsageError(f"there is no folder {arguments.root}")
     style, status = style_of(sys.stdout), CLEAN
-    for find in (_python, _mujoco, _lab_engine, _fonts, _folder, _locks, _disk, _rendering):
-        for found in find(folder):
-            write(_line(found, style), CLEAN)
-            if found.needed and not found.ok:
+    for make_probes in (_python, _mujoco, _lab_engine, _fonts, _folder, _locks, _disk, _rendering):
+        for probe in make_probes(folder):
+            write(_format_line(probe, style), CLEAN)
+            if probe.is_required and not probe.ok:
                 status = WRONG
     return status
 
 
-def _line(found: Probe, style: Style) -> str:
-    word, colour = ("ok", GREEN) if found.ok else ("broken", RED) if found.needed else ("-", YELLOW)
-    line = f"{style.paint(f'{word:<8}', colour)} {visible(found.what)}\n"
-    return line if found.ok else f"{line}         help: {visible(found.cure)}\n"
+def _format_line(probe: Probe, style: Style) -> str:
+    word, colour = ("broken", RED) if probe.is_required else ("-", YELLOW)
+    if probe.ok:
+        word, colour = "ok", GREEN
+    line = f"{style.paint(f'{word:<8}', colour)} {visible(probe.text)}\n"
+    return line if probe.ok else f"{line}         help: {visible(probe.cure)}\n"
 
 
 def _python(_: Path) -> Iterator[Probe]:
@@ -85,9 +87,11 @@ def _python(_: Path) -> Iterator[Probe]:
 
 def _mujoco(_: Path) -> Iterator[Probe]:
     try:
-        wrong = _fails(_STEP)
-        what = f"MuJoCo {engine_version()}" + (f": {wrong}" if wrong else "")
-        yield Probe(what, not wrong, "install coursebuild again, into an environment of its own")
+        error_line = _try_code(_STEP)
+        text = f"MuJoCo {engine_version()}" + (f": {error_line}" if error_line else "")
+        yield Probe(
+            text, not error_line, "install coursebuild again, into an environment of its own"
+        )
     except EffectError as error:
         yield Probe(error.message, False, error.help)
 
@@ -108,8 +112,8 @@ def _fonts(_: Path) -> Iterator[Probe]:
     except EffectError as error:
         yield Probe(error.message, False, error.help)
         return
-    what = f"{len(fonts)} fonts and {len(templates)} templates of pages"
-    yield Probe(what, bool(fonts and templates), "install coursebuild again")
+    text = f"{len(fonts)} fonts and {len(templates)} templates of pages"
+    yield Probe(text, bool(fonts and templates), "install coursebuild again")
 
 
 def _folder(folder: Path) -> Iterator[Probe]:
@@ -122,28 +126,30 @@ def _locks(folder: Path) -> Iterator[Probe]:
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
             ok = try_lock(file.fileno()) is not None
-    except OSError:  # said already
+    except OSError:  # `_folder` reports it
         return
-    what = "locks, by which two commands on one course wait for each other"
+    text = "locks, by which two commands on one course wait for each other"
     cure = "use a disk of this machine, or run one command at a time"
-    yield Probe(what if ok else f"no {what}", ok, cure, needed=False)
+    yield Probe(text if ok else f"no {text}", ok, cure, is_required=False)
 
 
 def _disk(folder: Path) -> Iterator[Probe]:
     free = shutil.disk_usage(folder).free
     cure = "make room, or let .coursebuild take less: `--cache-size 200M`"
-    yield Probe(f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure, needed=False)
+    yield Probe(
+        f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure, is_required=False
+    )
 
 
 def _rendering(_: Path) -> Iterator[Probe]:
-    """Scripts can draw with `mujoco.Renderer`; pictures of labs need nothing of it."""
-    chosen = os.environ.get("MUJOCO_GL")
-    wrong = _fails(_DRAW)
-    if not wrong:
-        by = f" (MUJOCO_GL={chosen})" if chosen else ""
-        yield Probe(f"offscreen rendering{by}, for scripts that use `mujoco.Renderer`", True)
+    """Probe drawing with `mujoco.Renderer`, which only scripts use: pictures of labs do not."""
+    backend = os.environ.get("MUJOCO_GL")
+    error_line = _try_code(_DRAW)
+    if not error_line:
+        suffix = f" (MUJOCO_GL={backend})" if backend else ""
+        yield Probe(f"offscreen rendering{suffix}, for scripts that use `mujoco.Renderer`", True)
         return
-    works = next((name for name in _BACKENDS if not _fails(_DRAW, MUJOCO_GL=name)), "")
+    works = next((name for name in _BACKENDS if not _try_code(_DRAW, MUJOCO_GL=name)), "")
     cure = (
         f"set the environment variable MUJOCO_GL={works}"
         if works
@@ -152,13 +158,13 @@ def _rendering(_: Path) -> Iterator[Probe]:
             "`apt install libosmesa6`, and set MUJOCO_GL=osmesa"
         )
     )
-    yield Probe(f"no offscreen rendering: {wrong}", False, cure, needed=False)
+    yield Probe(f"no offscreen rendering: {error_line}", False, cure, is_required=False)
 
 
-def _fails(code: str, **environment: str) -> str:
-    """The last line of what goes wrong when code runs in a process of its own; empty if nothing."""
+def _try_code(code: str, **environment: str) -> str:
+    """Run code in a process of its own; return the last line of its error, empty if it succeeds."""
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", code],
             env=os.environ | environment,
             capture_output=True,
@@ -166,7 +172,7 @@ def _fails(code: str, **environment: str) -> str:
         )
     except subprocess.TimeoutExpired:
         return f"it takes longer than {_SECONDS} s"
-    lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
-    if done.returncode == 0:
+    lines = process.stderr.decode("utf-8", "replace").strip().splitlines()
+    if process.returncode == 0:
         return ""
-    return lines[-1] if lines else f"the process ended with status {done.returncode}"
+    return lines[-1] if lines else f"the process ended with status {process.returncode}"

@@ -28,7 +28,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments of the command."""
     add_lessons(parser)
     parser.add_argument("--check", action="store_true", help="only say which files would change")
     parser.add_argument("--diff", action="store_true", help="only show what would change")
@@ -38,30 +38,30 @@ def run(arguments: argparse.Namespace) -> int:
     """Format the files, all or none of them; those with mistakes stay as they are."""
     root = options_of(arguments).root
     course, status = load_course(root), CLEAN
-    changed: dict[Source, str] = {}
-    for source, new in _formatted(course, select(course, tuple(arguments.lessons), root)):
+    new_texts: dict[Source, str] = {}
+    for source, new in _format_documents(course, select(course, tuple(arguments.lessons), root)):
         mistakes = [f"{location(d.span)}: {d.message}" for d in new.diagnostics]
         if read_bytes(root, source.path) != source.text.encode():
             mistakes = [f"{source.path} is not UTF-8"]
         if mistakes:
-            what = f"{source.path} has mistakes, and is left as it is"
-            status = fail(WRONG, what, f"mend this first: {mistakes[0]}")
+            message = f"{source.path} has mistakes, and is left as it is"
+            status = fail(WRONG, message, f"mend this first: {mistakes[0]}")
         elif new.value != source.text:
-            changed[source] = new.value
+            new_texts[source] = new.value
     if arguments.diff:
-        said = [changed_text("would format", source, new) for source, new in changed.items()]
+        lines = [changed_text("would format", source, new) for source, new in new_texts.items()]
     elif arguments.check:
-        said = [f"would format {source.path}" for source in changed]
+        lines = [f"would format {source.path}" for source in new_texts]
     else:
-        changes = [FileChange(s.path, s.text.encode(), new.encode()) for s, new in changed.items()]
+        changes = [FileChange(s.path, s.text.encode(), t.encode()) for s, t in new_texts.items()]
         return max(status, apply_changes(root, changes))
-    return write("".join(f"{line}\n" for line in said), WRONG if said else status)
+    return write("".join(f"{line}\n" for line in lines), WRONG if lines else status)
 
 
-def _formatted(course: Course, chosen: Selection) -> Iterator[tuple[Source, Parsed[str]]]:
+def _format_documents(course: Course, selection: Selection) -> Iterator[tuple[Source, Parsed[str]]]:
     callouts = frozenset(kind.name for kind in course.callouts)
-    parts: tuple[Owner, ...] = (*chosen.lessons, *chosen.pages)
-    for part in parts:
-        if part.document is not None:
-            source, lesson = part.document.source, isinstance(part, Lesson)
+    owners: tuple[Owner, ...] = (*selection.lessons, *selection.pages)
+    for owner in owners:
+        if owner.document is not None:
+            source, lesson = owner.document.source, isinstance(owner, Lesson)
             yield source, format_document(source, callouts, lesson=lesson, width=course.width)

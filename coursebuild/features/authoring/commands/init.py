@@ -22,52 +22,52 @@ examples:
 """
 
 _COURSE = Path(__file__).parents[1] / "course"
-_HIDDEN = {
+_RENAMED = {
     "gitignore": ".gitignore",
     "settings.json": ".vscode/settings.json",
     "extensions.json": ".vscode/extensions.json",
     "course.yml": ".github/workflows/course.yml",
     "weekly.yml": ".github/workflows/weekly.yml",
 }
-"""Files that would mean something where they lie here, by their places in a course."""
+"""Paths in a new course, for files that tools would read if they had these names here."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments of the command."""
     parser.add_argument("folder", nargs="?", default=".", metavar="DIR", help="default: this one")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the files, unless one is there."""
-    named = os.path.join(arguments.root or "", arguments.folder)  # noqa: PTH118  # as it was written
-    root = Path(named).resolve()
+    """Write the files, unless one of them exists."""
+    folder = os.path.join(arguments.root or "", arguments.folder)  # noqa: PTH118  # as the user wrote it
+    root = Path(folder).resolve()
     check_path(root)
     undo_changes(root)
-    files = _files()
-    taken = [path for path in files if (root / path).exists() or (root / path).is_symlink()]
-    if taken:
-        message = f"{named} has {', '.join(taken)} already, so nothing was written"
+    files = _read_files()
+    existing = [path for path in files if (root / path).exists() or (root / path).is_symlink()]
+    if existing:
+        message = f"{folder} has {', '.join(existing)} already, so nothing was written"
         return fail(USAGE, message, "name another folder, as in `coursebuild init my-course`")
     try:
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EffectError(f"{named} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{folder} cannot be made: {reason(error)}") from None
     change_files(root, [FileChange(path, None, data) for path, data in files.items()])
-    where = "" if root == Path.cwd() else f" -C {shlex.quote(named)}"
+    option = "" if root == Path.cwd() else f" -C {shlex.quote(folder)}"
     return write(
-        f"wrote {plural(len(files), 'file')} to {named}\n\n"
-        f"  coursebuild{where} serve    look at the course, and write\n"
-        f"  coursebuild{where} build    verify it, and write the site to public/\n",
+        f"wrote {plural(len(files), 'file')} to {folder}\n\n"
+        f"  coursebuild{option} serve    look at the course, and write\n"
+        f"  coursebuild{option} build    verify it, and write the site to public/\n",
         CLEAN,
     )
 
 
-def _files() -> dict[str, bytes]:
-    """All files of the course, by path."""
-    found = {".vscode/course.schema.json": json_schema("course")}
+def _read_files() -> dict[str, bytes]:
+    """Return all files of the course, by path."""
+    files = {".vscode/course.schema.json": json_schema("course")}
     for file in sorted(_COURSE.rglob("*")):
         if file.is_file() and "__pycache__" not in file.parts:
             path = file.relative_to(_COURSE).as_posix()
             data = file.read_bytes().replace(b"VERSION", __version__.encode())
-            found[_HIDDEN.get(path, path)] = data
-    return found
+            files[_RENAMED.get(path, path)] = data
+    return files

@@ -1,4 +1,4 @@
-"""`coursebuild new`: add a lesson, a model, a template or a feature of one's own."""
+"""`coursebuild new`: add a lesson, a model, a template or a feature."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _NAME = re.compile(r"\w[\w-]*(?:/\w[\w-]*)*", re.ASCII)
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments of the command."""
     kinds = parser.add_subparsers(metavar="KIND", required=True, prog=parser.prog)
     lesson = kinds.add_parser("lesson", help="a draft, and its entry in the course map")
     lesson.add_argument("id", metavar="ID", help="its level's id, a dot, its own part, as in 1.4")
@@ -82,9 +82,9 @@ def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     if any("\ud800" <= char <= "\udfff" for char in title):
         raise UsageError("the title is not UTF-8")
     slug = arguments.slug or slug_of(title)
-    changed = with_lesson(course, id, slug, title)
+    new_map = with_lesson(course, id, slug, title)
     return [
-        FileChange(course.map.path, course.map.text.encode(), changed.encode()),
+        FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
         FileChange(f"content/lessons/{id}-{slug}.md", None, _LESSON.encode()),
     ]
 
@@ -110,15 +110,16 @@ def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     if name in {*CORE_FENCES, *fence_names(), *(feature.name for feature in features())}:
         raise UsageError(f"there is a feature or a fence `{name}` already")
     path = f"features/{name}.py"
-    made = {path: "feature.txt", f"tests/test_{name}.py": "test.txt"}
+    templates = {path: "feature.txt", f"tests/test_{name}.py": "test.txt"}
+    new_map = with_feature(course, path)
     return [
-        FileChange(course.map.path, course.map.text.encode(), with_feature(course, path).encode()),
-        *(FileChange(where, None, _code(file, arguments)) for where, file in made.items()),
+        FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
+        *(FileChange(p, None, _render_code(file, arguments)) for p, file in templates.items()),
     ]
 
 
-def _code(file: str, arguments: argparse.Namespace) -> bytes:
-    """A file of `feature/`, which is a template, for a feature of another name."""
+def _render_code(file: str, arguments: argparse.Namespace) -> bytes:
+    """Render a template of `feature/` for a feature of this name."""
     template = (_FEATURE / file).read_text(encoding="utf-8")
     jinja = Environment(trim_blocks=True, keep_trailing_newline=True)
     text = jinja.from_string(template).render(script=arguments.script)

@@ -20,7 +20,7 @@ from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import with_lesson_renamed
-from coursebuild.features.authoring.references import doubtful_places, references
+from coursebuild.features.authoring.references import doubtful_places, rename_references
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import documents_by_name
 from coursebuild.report.terminal import visible
@@ -35,7 +35,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments of the command."""
     parser.add_argument("old", metavar="LESSON", help="id, slug or file of the lesson")
     parser.add_argument("new", metavar="ID", help="the id that it gets")
     parser.add_argument(
@@ -44,45 +44,46 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Change the map, the lesson's file, and all that leads to it."""
+    """Change the map, the lesson's file, and all references to it."""
     root = options_of(arguments).root
     course, new = load_course(root), arguments.new
     lesson = documents_by_name(course).get(arguments.old)
     if not isinstance(lesson, Lesson):
         raise UsageError(f"no lesson is called `{arguments.old}`")
-    edits = references(course, lesson, new)
-    changes = _changes(root, course, lesson, new, edits)
-    doubtful = doubtful_places(course, lesson, new, edits, _code(root))
+    edits = rename_references(course, lesson, new)
+    changes = _list_changes(root, course, lesson, new, edits)
+    doubtful = doubtful_places(course, lesson, new, edits, _read_code(root))
     if doubtful and not arguments.leave:
         return _refuse(doubtful, lesson)
     return apply_changes(root, changes)
 
 
-def _changes(
+def _list_changes(
     root: Path, course: Course, lesson: Lesson, new: str, edits: Sequence[Edit]
 ) -> list[FileChange]:
-    """What becomes of the map, of the lesson's file, and of those that lead to it."""
+    """Return the changes of the map, of the lesson's file, and of the files that refer to it."""
     by_source: dict[Source, list[Edit]] = {}
     for edit in edits:
         by_source.setdefault(edit.span.source, []).append(edit)
-    changed = with_lesson_renamed(course, lesson, new, by_source.pop(course.map))
-    found = [FileChange(course.map.path, course.map.text.encode(), changed.encode())]
-    for source, its in by_source.items():
-        text = apply_edits(source.text, its)
-        found.append(FileChange(source.path, source.text.encode(), text.encode()))
+    new_map = with_lesson_renamed(course, lesson, new, by_source.pop(course.map))
+    changes = [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
+    for source, source_edits in by_source.items():
+        text = apply_edits(source.text, source_edits)
+        changes.append(FileChange(source.path, source.text.encode(), text.encode()))
     if lesson.document is None:
-        return found
+        return changes
     data = read_bytes(root, lesson.path)
-    own = next((c for c in found if c.path == lesson.path), FileChange(lesson.path, data, data))
+    unchanged = FileChange(lesson.path, data, data)
+    lesson_change = next((c for c in changes if c.path == lesson.path), unchanged)
     return [
-        *(change for change in found if change is not own),
-        FileChange(replace(lesson, id=new).path, None, own.new),
-        FileChange(lesson.path, own.old, None),
+        *(change for change in changes if change is not lesson_change),
+        FileChange(replace(lesson, id=new).path, None, lesson_change.new),
+        FileChange(lesson.path, lesson_change.old, None),
     ]
 
 
-def _code(root: Path) -> tuple[Source, ...]:
-    """Code of the project, which may speak of lessons."""
+def _read_code(root: Path) -> tuple[Source, ...]:
+    """Read the code of the project, which can mention lessons."""
     files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
     code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
     return read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value

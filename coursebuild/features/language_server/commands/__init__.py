@@ -1,9 +1,9 @@
-"""The language server, on the course in memory that the preview uses as well.
+"""The language server, which keeps the course in memory as the preview does.
 
-- `lsp`: the command: threads, and what ends with what
-- `server`: what a client may ask; `texts`: of which; `places`: its positions and offsets
-- `diagnosis`: what is wrong, in the texts as they are
-- `lookup`: what something in a text stands for; `engine`: the same of a field of MuJoCo
-- `completion`; `fields`: the keys of JSON and TOML that are known at a place
+- `lsp`: the command and its threads
+- `server`: the requests of a client; `texts`: the texts they are about; `places`: positions in them
+- `diagnosis`: the diagnostics of the texts as they are
+- `lookup`: what a name or a formula stands for; `engine`: the same for names of MuJoCo
+- `completion`: proposals; `fields`: the fields that JSON and TOML can have at a place
 - `actions`: edits that are offered; `renaming`; `outline`: headings, folding, formatting
 """

@@ -1,7 +1,7 @@
-"""What may be written at a place.
+"""Proposals for what to write at a place.
 
-Entry point: `completions`. What there is comes from where checks look it up: the course, anchors,
-the declarations of fields, the catalogue of rules, the engine.
+Entry point: `completions`. They come from where the checks look things up: the course, anchors, the
+declarations of fields, the catalogue of rules, the engine.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from coursebuild.features.language_server.commands.fields import (
     FieldPlace,
     fence_at,
     field_place,
-    known_values,
+    possible_values,
 )
 from coursebuild.features.language_server.commands.texts import OpenTexts
 
 _NAME = r"[A-Za-z_]\w*"
-_PLACES = (
+_SUBJECTS = (
     ("lesson", Kind.Reference, r"(?:\blesson:|\bLessons? )(?P<word>[\w.]*)$"),
     ("page", Kind.Reference, r"\bpage:(?P<word>[\w-]*)$"),
     ("model", Kind.File, r"\bmodel:(?P<word>[\w/-]*)$"),
@@ -44,94 +44,103 @@ _PLACES = (
     ),
     ("member", Kind.Field, rf"(?<![\w.])(?P<path>{_NAME}(?:\.{_NAME})*)\.(?P<word>\w*)$"),
 )
-"""What may be written behind what; `word` is written of it already."""
+"""What can be proposed, its icon, and a pattern of the text before the cursor, whose group
+`word` is the part of the name that is there already.
+"""
 
 
 def completions(
-    texts: OpenTexts, source: Source, asked: types.CompletionParams
+    texts: OpenTexts, source: Source, params: types.CompletionParams
 ) -> list[types.CompletionItem]:
-    """What may be written; the client leaves out what does not fit."""
-    offset = texts.places.offset(source, asked.position)
-    here = source.span(offset, offset)
-    line = source.text[source.line_starts[here.line - 1] : offset]
-    for what, kind, pattern in _PLACES:
-        found = re.search(pattern, line)
-        names = {} if found is None else _names(texts, here, what, found)
-        if found is not None and names:
-            return _items(texts, source.span(offset - len(found["word"]), offset), kind, names)
+    """Return all proposals for a place; the client leaves out those that do not fit."""
+    offset = texts.places.offset(source, params.position)
+    cursor = source.span(offset, offset)
+    line = source.text[source.line_starts[cursor.line - 1] : offset]
+    for subject, kind, pattern in _SUBJECTS:
+        prefix = re.search(pattern, line)
+        names = {} if prefix is None else _find_names(texts, cursor, subject, prefix)
+        if prefix is not None and names:
+            span = source.span(offset - len(prefix["word"]), offset)
+            return _make_items(texts, span, kind, names)
     place = field_place(source, offset)
     if place is None:
         return []
     kind = Kind.Value if place.key else Kind.Property
-    return _items(texts, place.span, kind, _fields(texts.library, place))
+    return _make_items(texts, place.span, kind, _find_field_names(texts.library, place))
 
 
-def _items(
+def _make_items(
     texts: OpenTexts, span: Span, kind: Kind, names: Mapping[str, str]
 ) -> list[types.CompletionItem]:
-    """What may be written in the place of a span, and what it is, in a line."""
-    there = texts.places.range(span)
+    """Return proposals to replace a span by a name; each name has its description."""
+    replaced_range = texts.places.range(span)
     return [
         types.CompletionItem(
             name.strip('"'),
             kind=kind,
             detail=detail,
             filter_text=name,
-            text_edit=types.TextEdit(there, name),
+            text_edit=types.TextEdit(replaced_range, name),
         )
         for name, detail in names.items()
     ]
 
 
-def _names(texts: OpenTexts, here: Span, what: str, found: re.Match[str]) -> Mapping[str, str]:
+def _find_names(
+    texts: OpenTexts, cursor: Span, subject: str, prefix: re.Match[str]
+) -> Mapping[str, str]:
+    """Return the names of all things of a kind, each with a description."""
     library = texts.library
-    match what:
+    match subject:
         case "lesson":
-            return {one.id: one.title for one in library.lessons.values()}
+            return {lesson.id: lesson.title for lesson in library.lessons.values()}
         case "page":
-            return {one.id: one.title for one in library.pages.values()}
+            return {page.id: page.title for page in library.pages.values()}
         case "model":
-            return {one.name: one.description for one in library.course.models}
+            return {model.name: model.description for model in library.course.models}
         case "term":
-            return {id: f"of {one.id}: {one.title}" for id, one in library.terms.items()}
+            return {id: f"of {owner.id}: {owner.title}" for id, owner in library.terms.items()}
         case "script":
             scripts = library.scripts.items()
-            return {path: f"of {one.id}: {one.title}" for path, (_, one) in scripts}
+            return {path: f"of {owner.id}: {owner.title}" for path, (_, owner) in scripts}
         case "callout":
             return {name: library.callout(name).promise for name in library.callouts}
         case "fence":
-            outside = fence_at(here.source, here.start) is None
-            return dict.fromkeys((*CORE_FENCES, *fence_names()), "") if outside else {}
+            is_outside = fence_at(cursor.source, cursor.start) is None
+            return dict.fromkeys((*CORE_FENCES, *fence_names()), "") if is_outside else {}
         case "anchor":
-            return _anchors(texts, here.source, found)
+            return _find_anchors(texts, cursor.source, prefix)
         case _:
-            _, code = fence_at(here.source, here.start) or ("", here)
-            known = members(tuple(found["path"].split(".")), code.text)
-            return {name: one.doc for name, one in known.items()}
+            _, code = fence_at(cursor.source, cursor.start) or ("", cursor)
+            declarations = members(tuple(prefix["path"].split(".")), code.text)
+            return {name: declaration.doc for name, declaration in declarations.items()}
 
 
-def _anchors(texts: OpenTexts, source: Source, found: re.Match[str]) -> Mapping[str, str]:
-    """Those of the lesson or page that is named before, or of this one."""
-    library, id = texts.library, found["id"]
+def _find_anchors(texts: OpenTexts, source: Source, prefix: re.Match[str]) -> Mapping[str, str]:
+    """Return the anchors of the lesson or page that the link names, or else of this one."""
+    library, id = texts.library, prefix["id"]
     if id is not None:
-        owner = library.lessons.get(id) if found["kind"] == "lesson" else library.pages.get(id)
+        owner = library.lessons.get(id) if prefix["kind"] == "lesson" else library.pages.get(id)
         source = texts.source("" if owner is None else owner.path)
     document = texts.document(source)
-    known = {} if document is None else anchors(document)
-    return {name: place.first_line().text.lstrip("# ") for name, place in known.items()}
+    places = {} if document is None else anchors(document)
+    return {name: place.first_line().text.lstrip("# ") for name, place in places.items()}
 
 
-def _fields(library: Library, place: FieldPlace) -> Mapping[str, str]:
-    """Keys of JSON or TOML that are not given yet, or the values that are known of one."""
+def _find_field_names(library: Library, place: FieldPlace) -> Mapping[str, str]:
+    """Return the keys that are not in the object yet, or the possible values of a key."""
     quote = "" if place.span.path.endswith(".toml") else '"'
     match place.key:
         case "":
-            missing = {n: one for n, one in place.fields.items() if n not in place.given}
-            return {f"{quote}{n}{quote}": field_description(f.type) for n, f in missing.items()}
+            missing = {n: field for n, field in place.fields.items() if n not in place.keys}
+            return {
+                f"{quote}{name}{quote}": field_description(field.type)
+                for name, field in missing.items()
+            }
         case "rule":
             warnings = (rule for rule in RULES.values() if rule.severity == "warning")
-            return {f'"{one.name}"': one.summary for one in warnings}
+            return {f'"{rule.name}"': rule.summary for rule in warnings}
         case "prerequisites":
-            return {f'"{one.id}"': one.title for one in library.lessons.values()}
+            return {f'"{lesson.id}"': lesson.title for lesson in library.lessons.values()}
         case _:
-            return dict.fromkeys(known_values(place.field.type) if place.field else (), "")
+            return dict.fromkeys(possible_values(place.field.type) if place.field else (), "")

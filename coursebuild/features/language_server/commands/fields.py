@@ -1,9 +1,9 @@
-"""What the JSON of a fence or a TOML file may say at a place, also while it is being written.
+"""The fields that JSON in a fence or a TOML file can have at a place, also while it is edited.
 
-Entry points: `field_place`; `fence_at`, the fence around a place; `known_values`, of a type.
+Entry points: `field_place`; `fence_at`, the fence around a place; `possible_values` of a type.
 
-It follows the declarations that the decoder checks against (`schema_roots`). Of the text only
-brackets, keys and scalars are looked at, so that it may be wrong anywhere.
+The fields come from the declarations that the decoder checks against (`schema_roots`). Only
+brackets, keys and scalars of the text are read, so that mistakes anywhere do no harm.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from coursebuild.core.text.source import Source, Span
 
 _FENCE = re.compile(
     r"^[ \t>]*(?P<marks>`{3,}+|~{3,}+)[ \t]*(?P<kind>[\w-]*).*\n(?P<body>[\s\S]*?)"
-    # One that was never closed ends where the next one begins.
+    # An unclosed fence ends where the next one begins.
     r"(?:(?=^[ \t>]*(?P=marks)[ \t]*\w)|^[ \t>]*(?P=marks).*|\Z)",
     re.MULTILINE,
 )
@@ -33,38 +33,38 @@ _TOML = re.compile(
 
 
 class FieldPlace(Struct, frozen=True):
-    """Where a key or a value stands, or may stand."""
+    """The place of a key or a value, or one where it can be inserted."""
 
     span: Span
-    """What is written of it, quotes included."""
+    """What is there of it, with quotes."""
     fields: Mapping[str, inspect.Field]
-    """Those that the object around it may have, by name."""
-    given: frozenset[str]
-    """The keys that it has."""
+    """The fields that the enclosing object can have, by name."""
+    keys: frozenset[str]
+    """The keys that the enclosing object has."""
     key: str = ""
-    """Of which a value stands here; empty where a key does."""
+    """The key whose value this is; empty where this is a key."""
 
     @property
     def text(self) -> str:
-        """What is written, without quotes."""
+        """The key or value without quotes."""
         return self.span.text.strip('"')
 
     @property
     def field(self) -> inspect.Field | None:
-        """That of the key or the value."""
+        """The field of the key or the value."""
         return self.fields.get(self.key or self.text)
 
 
 class _Object(Struct):
-    """An object or table, as far as it was read."""
+    """An object or table, as far as it has been read."""
 
     key: str = ""
-    """Whose value comes next."""
+    """The key whose value comes next."""
     members: dict[str, str] = {}
-    """Its scalars as they are written, and nothing for all else."""
+    """The text of each scalar, by key; empty for other values."""
 
     def read(self, token: str) -> None:
-        """Read on, outside of the values that are objects or arrays."""
+        """Read the next token that is not part of a nested object or array."""
         if token[-1] in ",\n":
             self.key = ""
         elif self.key and token not in ":=":
@@ -75,7 +75,7 @@ class _Object(Struct):
 
 
 def field_place(source: Source, offset: int) -> FieldPlace | None:
-    """The place of a key or a value at an offset, where it is known which there can be."""
+    """Return the place of a key or a value at an offset, where its declaration is known."""
     if source.path == MAP:
         kind, body = "course", source.span()
     elif source.path.startswith("models/") and source.path.endswith(".toml"):
@@ -84,97 +84,99 @@ def field_place(source: Source, offset: int) -> FieldPlace | None:
         kind, body = fence_at(source, offset) or ("", source.span(0, 0))
     if kind not in (roots := schema_roots()):
         return None
-    span, around = _surroundings(body, offset)
-    return _place(span, around, roots[kind][0]) if around else None
+    span, objects = _find_token(body, offset)
+    return _place_of_token(span, objects, roots[kind][0]) if objects else None
 
 
 def fence_at(source: Source, offset: int) -> tuple[str, Span] | None:
-    """The kind of the fence in which an offset lies, and the text between its marks."""
+    """Return the kind of the fence around an offset, and the text between its marks."""
     for fence in _FENCE.finditer(source.text):
         if fence.start("body") <= offset <= fence.end("body"):
             return fence["kind"], source.span(*fence.span("body"))
     return None
 
 
-def _surroundings(body: Span, offset: int) -> tuple[Span, list[tuple[_Object, str]]]:
-    """What is written at an offset, and the objects around it, each with the key that leads on.
+def _find_token(body: Span, offset: int) -> tuple[Span, list[tuple[_Object, str]]]:
+    """Return the token at an offset, and the objects around it, each with the key that leads there.
 
-    All of the body is read: an object may have further keys behind the offset.
+    All of the body is read, since an object can have further keys after the offset.
     """
     is_toml = body.path.endswith(".toml")
     stack: list[_Object | None] = [_Object()] if is_toml else []  # `None` is an array
-    here: tuple[Span, list[tuple[_Object, str]]] | None = None
-    for found in (_TOML if is_toml else _JSON).finditer(body.text + "\n}"):
-        token, start, end = found[0], body.start + found.start(), body.start + found.end()
+    position: tuple[Span, list[tuple[_Object, str]]] | None = None
+    for match in (_TOML if is_toml else _JSON).finditer(body.text + "\n}"):
+        token, start, end = match[0], body.start + match.start(), body.start + match.end()
         is_scalar = token[-1] not in "\n{}[]:,="
-        if here is None and (end > offset or (end == offset and is_scalar)):
-            touched = (start, end) if is_scalar and start <= offset else (offset, offset)
-            objects = [(one, one.key) for one in stack if one is not None]
-            here = Span(body.source, *touched), objects if found.lastgroup is None else []
-        if found.lastgroup is not None:
-            stack = [*map(_Object, found["header"].split(".")), _Object()]
+        if position is None and (end > offset or (end == offset and is_scalar)):
+            bounds = (start, end) if is_scalar and start <= offset else (offset, offset)
+            objects = [(object, object.key) for object in stack if object is not None]
+            position = Span(body.source, *bounds), objects if match.lastgroup is None else []
+        if match.lastgroup is not None:
+            stack = [*map(_Object, match["header"].split(".")), _Object()]
         elif token in "{[":
             stack.append(_Object() if token == "{" else None)
         elif token in "}]":
             del stack[-1:]
         elif stack and stack[-1] is not None:
             stack[-1].read(token)
-    assert here is not None  # the bracket at the end is behind every offset
-    return here
+    assert position is not None  # the bracket added at the end is after every offset
+    return position
 
 
-# --- what is declared
+# --- declarations
 
 
-def _place(span: Span, around: list[tuple[_Object, str]], root: type[Struct]) -> FieldPlace:
-    declared = inspect.type_info(root)
-    for object, key in around[:-1]:
-        inner = _fields(declared, object.members).get(key)
-        declared = _mapped(declared) if inner is None else inner.type
-    innermost, key = around[-1]
-    given = frozenset(innermost.members) - {span.text.strip('"')}
-    return FieldPlace(span, _fields(declared, innermost.members), given, key)
+def _place_of_token(
+    span: Span, objects: list[tuple[_Object, str]], root: type[Struct]
+) -> FieldPlace:
+    declared_type = inspect.type_info(root)
+    for object, key in objects[:-1]:
+        field = _fields(declared_type, object.members).get(key)
+        declared_type = _mapping_value(declared_type) if field is None else field.type
+    innermost, key = objects[-1]
+    keys = frozenset(innermost.members) - {span.text.strip('"')}
+    return FieldPlace(span, _fields(declared_type, innermost.members), keys, key)
 
 
-def _fields(declared: inspect.Type, members: Mapping[str, str]) -> dict[str, inspect.Field]:
-    """The fields of a struct; of a union's those that its tag leaves, and the tag."""
-    structs = [one for one in _parts(declared) if isinstance(one, inspect.StructType)]
-    tag = next((one.tag_field for one in structs if one.tag_field), "")
-    chosen = [one for one in structs if tag and one.tag == members.get(tag)] or structs
-    found = {field.name: field for one in chosen for field in one.fields}
+def _fields(declared_type: inspect.Type, members: Mapping[str, str]) -> dict[str, inspect.Field]:
+    """Return the fields of a struct; of a union, the tag and the fields that its value admits."""
+    structs = [t for t in _alternatives(declared_type) if isinstance(t, inspect.StructType)]
+    tag = next((struct.tag_field for struct in structs if struct.tag_field), "")
+    with_tag = [struct for struct in structs if tag and struct.tag == members.get(tag)]
+    fields = {field.name: field for struct in with_tag or structs for field in struct.fields}
     if tag:
-        kinds = inspect.LiteralType(tuple(str(one.tag) for one in structs))
-        found[tag] = inspect.Field(tag, tag, kinds)
-    return found
+        kinds = inspect.LiteralType(tuple(str(struct.tag) for struct in structs))
+        fields[tag] = inspect.Field(tag, tag, kinds)
+    return fields
 
 
-def _mapped(declared: inspect.Type) -> inspect.Type:
-    """What a mapping has under every name."""
-    values = (one.value_type for one in _parts(declared) if isinstance(one, inspect.DictType))
-    return next(values, inspect.AnyType())
+def _mapping_value(declared_type: inspect.Type) -> inspect.Type:
+    """Return the type of a mapping's values."""
+    mappings = (t for t in _alternatives(declared_type) if isinstance(t, inspect.DictType))
+    return next((mapping.value_type for mapping in mappings), inspect.AnyType())
 
 
-def _parts(declared: inspect.Type) -> Iterator[inspect.Type]:
-    """The types of a union, and those of the items of an array."""
-    match declared:
+def _alternatives(declared_type: inspect.Type) -> Iterator[inspect.Type]:
+    """Yield the types of a union, and of the items of an array."""
+    match declared_type:
         case inspect.Metadata():
-            yield from _parts(declared.type)
+            yield from _alternatives(declared_type.type)
         case inspect.UnionType():
-            yield from chain.from_iterable(map(_parts, declared.types))
+            yield from chain.from_iterable(map(_alternatives, declared_type.types))
         case inspect.VarTupleType():
-            yield from _parts(declared.item_type)
+            yield from _alternatives(declared_type.item_type)
         case inspect.TupleType():
-            yield from chain.from_iterable(map(_parts, declared.item_types))
+            yield from chain.from_iterable(map(_alternatives, declared_type.item_types))
         case _:
-            yield declared
+            yield declared_type
 
 
-def known_values(declared: inspect.Type) -> tuple[str, ...]:
-    """The values that a field may have, as they are written, where they can be listed."""
-    found: list[str] = []
-    for one in _parts(declared):
-        if isinstance(one, inspect.LiteralType):
-            found += (f'"{value}"' for value in one.values)
-        elif isinstance(one, inspect.BoolType):
-            found += ("true", "false")
-    return tuple(found)
+def possible_values(declared_type: inspect.Type) -> tuple[str, ...]:
+    """Return the possible values of a field as text, where they can be listed."""
+    values: list[str] = []
+    for alternative in _alternatives(declared_type):
+        if isinstance(alternative, inspect.LiteralType):
+            values += (f'"{value}"' for value in alternative.values)
+        elif isinstance(alternative, inspect.BoolType):
+            values += ("true", "false")
+    return tuple(values)

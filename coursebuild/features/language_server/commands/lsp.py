@@ -1,9 +1,9 @@
-"""`coursebuild lsp`: a language server on standard input and output, until its client goes.
+"""`coursebuild lsp`: a language server on standard input and output.
 
-1. The course is read before anything is answered, and then followed as the preview does it: a
-   thread takes saves (`preview.saves`), the main thread runs scripts and labs (`preview.rebuild`).
-2. A thread answers the client, one reads what is typed, one publishes diagnostics.
-3. Authors' files are only read: it is the client that edits them.
+1. The course is read before anything is answered, and then followed as in the preview: a thread
+   handles saves (`preview.saves`), the main thread runs scripts and labs (`preview.rebuild`).
+2. A thread answers the client, another reads what is typed, another publishes diagnostics.
+3. Authors' files are only read: the client edits them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments of the command."""
     add_cache(parser)
     parser.add_argument(
         "--stdio", action="store_true", help="as many editors say; it does so anyway"
@@ -45,7 +45,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until the client goes."""
+    """Serve until the client disconnects."""
     if find_spec("pygls") is None:
         raise UsageError("the language server needs pygls: `pip install 'coursebuild[lsp]'`")
     from coursebuild.features.language_server.commands.server import Server
@@ -59,12 +59,12 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         session.start(quiet)
         watcher.start()
-        _begin(lambda: follow(session, watcher, quiet))
-        _begin(server.take_typing)
-        _begin(server.publish)
+        _start_thread(lambda: follow(session, watcher, quiet))
+        _start_thread(server.read_edits)
+        _start_thread(server.publish)
         threading.Thread(target=_answer, args=(server, stdin, stdout), daemon=True).start()
-        _persist(rebuild.follow)
-    except KeyboardInterrupt:  # as `_answer` ends this
+        _repeat(rebuild.follow)
+    except KeyboardInterrupt:  # raised when `_answer` ends
         return CLEAN
     finally:
         watcher.stop()
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _take_streams() -> tuple[BinaryIO, BinaryIO]:
-    """The streams of the client, which nothing else in this process reads or writes from now on."""
+    """Return the client's streams, and keep all else in this process from using them."""
     streams = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(2, 1)
@@ -82,19 +82,19 @@ def _take_streams() -> tuple[BinaryIO, BinaryIO]:
 
 
 def _answer(server: Server, stdin: BinaryIO, stdout: BinaryIO) -> None:
-    """Answer the client until it goes, and end whatever the main thread does."""
+    """Answer the client until it disconnects, then interrupt the main thread."""
     server.client.start_io(stdin, stdout)
     main = threading.main_thread().ident
     assert main is not None
     signal.pthread_kill(main, signal.SIGTERM)
 
 
-def _begin(work: Callable[[], None]) -> None:
-    threading.Thread(target=_persist, args=(work,), daemon=True).start()
+def _start_thread(work: Callable[[], None]) -> None:
+    threading.Thread(target=_repeat, args=(work,), daemon=True).start()
 
 
-def _persist(work: Callable[[], None]) -> NoReturn:
-    """Do lasting work; after a bug, which the editor's log shows, it goes on."""
+def _repeat(work: Callable[[], None]) -> NoReturn:
+    """Repeat some work forever; an exception only goes to the editor's log."""
     while True:
         try:
             work()

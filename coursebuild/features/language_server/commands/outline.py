@@ -1,4 +1,4 @@
-"""The headings of a text, what can be folded in it, and how it is formatted.
+"""The headings of a text, its foldable ranges, and its formatting.
 
 Entry points: `headings`, as a tree; `folds`; `layout`.
 """
@@ -23,41 +23,41 @@ from coursebuild.features.language_server.commands.texts import OpenTexts
 
 
 def headings(
-    texts: OpenTexts, source: Source, asked: types.DocumentSymbolParams
+    texts: OpenTexts, source: Source, params: types.DocumentSymbolParams
 ) -> list[types.DocumentSymbol]:
-    """The headings, those of lower levels in those above them."""
+    """Return the headings as a tree."""
     places, document = texts.places, texts.document(source)
-    found: list[types.DocumentSymbol] = []
-    around: list[tuple[int, list[types.DocumentSymbol]]] = [(0, found)]
+    roots: list[types.DocumentSymbol] = []
+    open_levels: list[tuple[int, list[types.DocumentSymbol]]] = [(0, roots)]
     for heading, section in _sections(document) if document else ():
-        while around[-1][0] >= heading.level:
-            around.pop()
-        inner: list[types.DocumentSymbol] = []
+        while open_levels[-1][0] >= heading.level:
+            open_levels.pop()
+        children: list[types.DocumentSymbol] = []
         symbol = types.DocumentSymbol(
-            " ".join(plain_text(heading.children).split()) or "…",  # a name is never empty
+            " ".join(plain_text(heading.children).split()) or "…",  # clients refuse an empty name
             types.SymbolKind.String,
             places.range(section),
             places.range(heading.span),
-            children=inner,
+            children=children,
         )
-        around[-1][1].append(symbol)
-        around.append((heading.level, inner))
-    return found
+        open_levels[-1][1].append(symbol)
+        open_levels.append((heading.level, children))
+    return roots
 
 
 def _sections(document: Document) -> Iterator[tuple[Heading, Span]]:
-    """Each heading, and all that stands under it."""
-    found = [block for block in document.blocks if isinstance(block, Heading)]
-    for at, one in enumerate(found, 1):
-        below = (other.span.start for other in found[at:] if other.level <= one.level)
-        end = next(below, len(document.source.text))
-        yield one, document.source.span(one.span.start, end)
+    """Yield each heading with the span of its section."""
+    headings = [block for block in document.blocks if isinstance(block, Heading)]
+    for index, heading in enumerate(headings, 1):
+        ends = (later.span.start for later in headings[index:] if later.level <= heading.level)
+        end = next(ends, len(document.source.text))
+        yield heading, document.source.span(heading.span.start, end)
 
 
 def folds(
-    texts: OpenTexts, source: Source, asked: types.FoldingRangeParams
+    texts: OpenTexts, source: Source, params: types.FoldingRangeParams
 ) -> list[types.FoldingRange]:
-    """Sections, and all blocks of several lines but paragraphs."""
+    """Return the sections, and all blocks of several lines except paragraphs."""
     document = texts.document(source)
     if document is None:
         return []
@@ -68,13 +68,13 @@ def folds(
 
 
 def layout(
-    texts: OpenTexts, source: Source, asked: types.DocumentFormattingParams
+    texts: OpenTexts, source: Source, params: types.DocumentFormattingParams
 ) -> list[types.TextEdit]:
-    """What `coursebuild fmt` changes."""
+    """Return the edits that `coursebuild fmt` would make."""
     owner, width = texts.owner(source), texts.library.course.width
     if owner is None:
         return []
     callouts, lesson = frozenset(texts.library.callouts), isinstance(owner, Lesson)
     new = format_document(source, callouts, lesson=lesson, width=width).value
-    whole = types.TextEdit(texts.places.range(source.span()), new)
-    return [] if new == source.text else [whole]
+    edit = types.TextEdit(texts.places.range(source.span()), new)
+    return [] if new == source.text else [edit]

@@ -1,7 +1,7 @@
-"""Places in texts and edits of them, as a client has them.
+"""Converts places and edits between the course and a client.
 
-Entry point: `Places`. A client counts lines as CommonMark does, and in a line UTF-16 units, or what
-it has agreed on. Texts are never cut at other line ends that Python knows, such as U+2028.
+Entry point: `Places`. A client counts lines as CommonMark does, and within a line UTF-16 units or
+those of the agreed encoding. Other line ends that Python knows, such as U+2028, end no line.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ _UNITS = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-
 
 
 class Places:
-    """Of the files of a course."""
+    """The paths, offsets and spans of a course as a client writes them."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
         self.encoding: str = "utf-16"
         self._uris: dict[str, str] = {}
-        """As the client writes them, by path."""
+        """The URIs that the client used, by path."""
 
     def path(self, uri: str) -> str:
-        """The path of a file below the course's folder, POSIX and relative; empty for others."""
+        """Return the path of a file relative to the course's folder; empty for files outside."""
         file = Path((uri.startswith("file:") and uris.to_fs_path(uri)) or "/")
         full = file.parent.resolve() / file.name
         if not full.is_relative_to(self.root):
@@ -39,11 +39,11 @@ class Places:
         return path
 
     def uri(self, path: str) -> str:
-        """The address of a file of the course."""
+        """Return the URI of a file of the course."""
         return self._uris.get(path) or uris.from_fs_path(str(self.root / path)) or ""
 
     def offset(self, source: Source, position: types.Position) -> int:
-        """The offset of a position, or the nearest that there is."""
+        """Return the offset of a position, or the nearest that exists."""
         if position.line >= len(source.line_starts):
             return len(source.text)
         codec, size = _UNITS[self.encoding]
@@ -51,25 +51,25 @@ class Places:
         return source.line_starts[position.line] + len(units.decode(codec, "ignore"))
 
     def position(self, source: Source, offset: int) -> types.Position:
-        """The position of an offset."""
+        """Return the position of an offset."""
         codec, size = _UNITS[self.encoding]
         line, column = source.position(offset)
         before = source.line_text(line)[: column - 1]
         return types.Position(line - 1, len(before.encode(codec)) // size)
 
     def range(self, span: Span) -> types.Range:
-        """The range of a span."""
-        start, end = (self.position(span.source, at) for at in (span.start, span.end))
+        """Return the range of a span."""
+        start, end = (self.position(span.source, offset) for offset in (span.start, span.end))
         return types.Range(start, end)
 
     def location(self, span: Span) -> types.Location:
-        """Where a span stands."""
+        """Return the file and the range of a span."""
         return types.Location(self.uri(span.path), self.range(span))
 
     def changes(self, edits: Iterable[Edit]) -> dict[str, list[types.TextEdit]]:
-        """Edits by the addresses of their files."""
-        found: dict[str, list[types.TextEdit]] = {}
+        """Return edits by the URIs of their files."""
+        changes: dict[str, list[types.TextEdit]] = {}
         for edit in edits:
-            its = found.setdefault(self.uri(edit.span.path), [])
-            its.append(types.TextEdit(self.range(edit.span), edit.text))
-        return found
+            file_edits = changes.setdefault(self.uri(edit.span.path), [])
+            file_edits.append(types.TextEdit(self.range(edit.span), edit.text))
+        return changes

@@ -1,10 +1,10 @@
-"""Another name for a lesson, a term or a label, wherever the course names it.
+"""Renames a lesson, a term or a label wherever the course names it.
 
-Entry points: `name_at`, what is named at a place; `rename`, the edits that name it otherwise.
+Entry points: `name_at`, the name at a place; `rename`, the edits that change it.
 
-1. A lesson gets another id, and its file another path, as `coursebuild rename` gives them.
-2. A term gets another name in the glossary, and links to it the id that follows from the name.
-3. A label is that of a formula, or the id that is given to a heading.
+1. A lesson gets a new id, and its file a new path, as with `coursebuild rename`.
+2. A term gets a new name in the glossary, and links to it the id that follows from the name.
+3. A label is that of a formula, or the explicit id of a heading.
 """
 
 from __future__ import annotations
@@ -27,96 +27,97 @@ from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.course_map import with_lesson_renamed
-from coursebuild.features.authoring.references import references
+from coursebuild.features.authoring.references import rename_references
 from coursebuild.features.language_server.commands.lookup import look_up
 from coursebuild.features.language_server.commands.texts import OpenTexts
 
 
 class _Name(Struct, frozen=True):
-    """Something that has a name, which can be another one."""
+    """A name that can be changed."""
 
     span: Span
-    """Where it is named."""
     text: str
-    renamed: Callable[[str], types.WorkspaceEdit]
-    """The edits that give it another name; an exception where it cannot have that."""
+    rename: Callable[[str], types.WorkspaceEdit]
+    """Return the edits for a new name; raise `JsonRpcInvalidParams` where it cannot be used."""
 
 
 def name_at(
-    texts: OpenTexts, source: Source, asked: types.PrepareRenameParams
+    texts: OpenTexts, source: Source, params: types.PrepareRenameParams
 ) -> types.PrepareRenamePlaceholder | None:
-    """The name at a place, and where it stands."""
-    found = _name(texts, source, asked.position)
-    if found is None:
+    """Return the name at a place, and its range."""
+    name = _find_name(texts, source, params.position)
+    if name is None:
         return None
-    return types.PrepareRenamePlaceholder(texts.places.range(found.span), found.text)
+    return types.PrepareRenamePlaceholder(texts.places.range(name.span), name.text)
 
 
 def rename(
-    texts: OpenTexts, source: Source, asked: types.RenameParams
+    texts: OpenTexts, source: Source, params: types.RenameParams
 ) -> types.WorkspaceEdit | None:
-    """The edits that give what is named at a place another name.
+    """Return the edits that give the thing at a place a new name.
 
     Raises:
         JsonRpcInvalidParams: it cannot have this name.
     """
-    found = _name(texts, source, asked.position)
-    return None if found is None else found.renamed(asked.new_name)
+    name = _find_name(texts, source, params.position)
+    return None if name is None else name.rename(params.new_name)
 
 
-def _name(texts: OpenTexts, source: Source, position: types.Position) -> _Name | None:
+def _find_name(texts: OpenTexts, source: Source, position: types.Position) -> _Name | None:
     offset, document = texts.places.offset(source, position), texts.document(source)
     for label, span in {} if document is None else _labels(document).items():
         if span.start <= offset <= span.end:
-            return _label(texts, source.path, label, span)
-    found = look_up(texts, source, position)
-    if found is None or found.target is None:
+            return _label_name(texts, source.path, label, span)
+    referent = look_up(texts, source, position)
+    if referent is None or referent.target is None:
         return None
-    if isinstance(found.target, model.TermTarget):
-        return _term(texts, found.target.id, found.span)
-    path, anchor = _anchor(texts.library, found.target, source.path)
-    start = found.span.start + found.span.text.rfind("#") + 1
+    target, span = referent.target, referent.span
+    if isinstance(target, model.TermTarget):
+        return _term_name(texts, target.id, span)
+    path, anchor = _resolve_anchor(texts.library, target, source.path)
+    start = span.start + span.text.rfind("#") + 1
     if anchor and offset >= start:
-        return _label(texts, path, anchor, source.span(start, start + len(anchor)))
-    if isinstance(found.target, model.LessonTarget):
-        return _lesson(texts, texts.library.lessons[found.target.id], found.span)
+        return _label_name(texts, path, anchor, source.span(start, start + len(anchor)))
+    if isinstance(target, model.LessonTarget):
+        return _lesson_name(texts, texts.library.lessons[target.id], span)
     return None
 
 
-def _written(texts: OpenTexts, edits: Iterable[Edit]) -> types.WorkspaceEdit:
-    """Edits, each once: several links may have their address from one place."""
-    once = {(edit.span.path, edit.span.start): edit for edit in edits}
-    return types.WorkspaceEdit(texts.places.changes(once.values()))
+def _workspace_edit(texts: OpenTexts, edits: Iterable[Edit]) -> types.WorkspaceEdit:
+    """Return edits for the client, each once, since several links can share one address."""
+    unique_edits = {(edit.span.path, edit.span.start): edit for edit in edits}
+    return types.WorkspaceEdit(texts.places.changes(unique_edits.values()))
 
 
 # --- lessons
 
 
-def _lesson(texts: OpenTexts, lesson: model.Lesson, span: Span) -> _Name:
+def _lesson_name(texts: OpenTexts, lesson: model.Lesson, span: Span) -> _Name:
     start = span.start + max(span.text.rfind(lesson.id), 0)
 
-    def renamed(id: str) -> types.WorkspaceEdit:
+    def rename_lesson(id: str) -> types.WorkspaceEdit:
         course, places = texts.library.course, texts.places
-        edits = references(course, lesson, id)
-        of_map = [edit for edit in edits if edit.span.source == course.map]
+        edits = rename_references(course, lesson, id)
+        map_edits = [edit for edit in edits if edit.span.source == course.map]
         try:
-            whole_map = Edit(course.map.span(), with_lesson_renamed(course, lesson, id, of_map))
+            new_map = with_lesson_renamed(course, lesson, id, map_edits)
         except UsageError as error:
             raise JsonRpcInvalidParams(str(error)) from None
-        changes = places.changes([whole_map, *(edit for edit in edits if edit not in of_map)])
-        named = types.OptionalVersionedTextDocumentIdentifier
-        files = [types.TextDocumentEdit(named(uri), its) for uri, its in changes.items()]
+        text_edits = (edit for edit in edits if edit not in map_edits)
+        changes = places.changes([Edit(course.map.span(), new_map), *text_edits])
+        identifier = types.OptionalVersionedTextDocumentIdentifier
+        file_edits = [types.TextDocumentEdit(identifier(uri), e) for uri, e in changes.items()]
         old, new = places.uri(lesson.path), places.uri(replace(lesson, id=id).path)
-        moved = [] if lesson.document is None else [types.RenameFile(old, new)]
-        return types.WorkspaceEdit(document_changes=[*files, *moved])
+        file_renames = [] if lesson.document is None else [types.RenameFile(old, new)]
+        return types.WorkspaceEdit(document_changes=[*file_edits, *file_renames])
 
-    return _Name(span.source.span(start, start + len(lesson.id)), lesson.id, renamed)
+    return _Name(span.source.span(start, start + len(lesson.id)), lesson.id, rename_lesson)
 
 
 # --- terms
 
 
-def _term(texts: OpenTexts, id: str, span: Span) -> _Name | None:
+def _term_name(texts: OpenTexts, id: str, span: Span) -> _Name | None:
     owner = texts.library.terms[id]
     document = texts.document(texts.source(owner.path))
     inlines = () if document is None else model.document_inlines(document)
@@ -124,74 +125,73 @@ def _term(texts: OpenTexts, id: str, span: Span) -> _Name | None:
     if term is None:
         return None
 
-    def renamed(name: str) -> types.WorkspaceEdit:
+    def rename_term(name: str) -> types.WorkspaceEdit:
         new = term_id(name)
         if not new or set('{}"\n') & set(name):
             raise JsonRpcInvalidParams('a term has letters or digits, and none of `{`, `}`, `"`')
         if new != id and new in texts.library.terms:
             raise JsonRpcInvalidParams(f"there is a term `{new}` already")
         start = term.span.start + term.span.text.rindex("{")
-        same = name == collapse_spaces(model.plain_text(term.children))
-        edits = [Edit(term.span.source.span(start, term.span.end), _TERM[same].format(name))]
+        is_text = name == collapse_spaces(model.plain_text(term.children))
+        attribute = "{term}" if is_text else f'{{term="{name}"}}'
+        edits = [Edit(term.span.source.span(start, term.span.end), attribute)]
         for link, target in _links(texts):
             if isinstance(target, model.TermTarget) and target.id == id:
                 edits.append(Edit(link.target_span, f"term:{new}"))
-        edits += _anchored(texts, owner.path, term.anchor, f"term:{new}")
-        return _written(texts, edits)
+        edits += _edit_anchor_links(texts, owner.path, term.anchor, f"term:{new}")
+        return _workspace_edit(texts, edits)
 
-    return _Name(span, term.name, renamed)
-
-
-_TERM = '{{term="{}"}}', "{{term}}"
-"""A name of its own, and that of the words in the text."""
+    return _Name(span, term.name, rename_term)
 
 
 # --- labels
 
 
-def _label(texts: OpenTexts, path: str, label: str, span: Span) -> _Name | None:
+def _label_name(texts: OpenTexts, path: str, label: str, span: Span) -> _Name | None:
     document = texts.document(texts.source(path))
     place = None if document is None else _labels(document).get(label)
     if document is None or place is None:
-        return None  # an anchor that follows from a text
+        return None  # an anchor that follows from the text of a heading
 
-    def renamed(name: str) -> types.WorkspaceEdit:
-        formula = label.startswith("eq:")
-        if not re.fullmatch(r"eq:[\w-]+" if formula else r"[\w:.-]*[\w:-]", name):
-            form = "`eq:` and then " if formula else ""
+    def rename_label(name: str) -> types.WorkspaceEdit:
+        is_formula = label.startswith("eq:")
+        if not re.fullmatch(r"eq:[\w-]+" if is_formula else r"[\w:.-]*[\w:-]", name):
+            form = "`eq:` and then " if is_formula else ""
             raise JsonRpcInvalidParams(f"a label is {form}letters, digits, `-` and `_`")
         if name != label and name in anchors(document):
             raise JsonRpcInvalidParams(f"there is an anchor `{name}` already")
-        return _written(texts, [Edit(place, name), *_anchored(texts, path, label, name)])
+        link_edits = _edit_anchor_links(texts, path, label, name)
+        return _workspace_edit(texts, [Edit(place, name), *link_edits])
 
-    return _Name(span, label, renamed)
+    return _Name(span, label, rename_label)
 
 
 def _labels(document: model.Document) -> dict[str, Span]:
-    """The labels that are written in a document, and where."""
-    found = {}
+    """Return the explicit labels of a document, and their places."""
+    labels = {}
     for node in (*model.document_blocks(document), *model.document_inlines(document)):
         if isinstance(node, model.Math | model.MathBlock) and node.label is not None:
-            found[node.label.id] = node.label.span
+            labels[node.label.id] = node.label.span
         elif isinstance(node, model.Heading) and node.explicit:
             start = node.span.start + node.span.text.rindex(f"#{node.anchor}") + 1
-            found[node.anchor] = node.span.source.span(start, start + len(node.anchor))
-    return found
+            labels[node.anchor] = node.span.source.span(start, start + len(node.anchor))
+    return labels
 
 
 def _links(texts: OpenTexts) -> Iterator[tuple[model.Link, model.Target]]:
-    """All links of the course, also of what was typed just now, and where they lead."""
+    """Yield all links of the course with their targets, those just typed included."""
     course = texts.library.course
-    for known in course.documents:
-        path = known.source.path
-        typed = texts.document(texts.source(path)) if path in texts.session.open_texts else None
-        for inline in model.document_inlines(typed or known):
+    for document in course.documents:
+        path = document.source.path
+        is_open = path in texts.session.open_texts
+        open_document = texts.document(texts.source(path)) if is_open else None
+        for inline in model.document_inlines(open_document or document):
             if isinstance(inline, model.Link):
                 yield inline, model.resolve(inline.target, course, path)
 
 
-def _anchor(library: Library, target: model.Target, path: str) -> tuple[str, str]:
-    """The file of a lesson or page that a link in a file leads into, and the anchor there."""
+def _resolve_anchor(library: Library, target: model.Target, path: str) -> tuple[str, str]:
+    """Return the file and the anchor that a link in a file leads to, in a lesson or page."""
     match target:
         case model.LessonTarget(id=id, anchor=anchor) if id in library.lessons:
             return library.lessons[id].path, unquote(anchor or "")
@@ -203,10 +203,10 @@ def _anchor(library: Library, target: model.Target, path: str) -> tuple[str, str
             return "", ""
 
 
-def _anchored(texts: OpenTexts, path: str, anchor: str, new: str) -> Iterator[Edit]:
-    """The edits of all links to an anchor of a file."""
+def _edit_anchor_links(texts: OpenTexts, path: str, anchor: str, new: str) -> Iterator[Edit]:
+    """Yield the edits that lead all links to an anchor of a file to a new one."""
     for link, target in _links(texts):
-        if _anchor(texts.library, target, link.span.path) == (path, anchor):
+        if _resolve_anchor(texts.library, target, link.span.path) == (path, anchor):
             span = link.target_span
             start = span.start + span.text.rindex("#") + 1
             yield Edit(span.source.span(start, span.end), new)

@@ -1,7 +1,7 @@
-"""What a client of the language server may ask, and what it is told.
+"""The requests of a client of the language server, and the diagnostics sent to it.
 
-Entry point: `Server`. Answers are for the texts as they are in the editor, of which it sends the
-whole at each change: changes of parts would go by other line ends than a course's.
+Entry point: `Server`. Answers are about the texts as they are in the editor, which sends the whole
+text at each change: partial changes would count other line ends than a course has.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.text.source import Source
 from coursebuild.features.language_server.commands.actions import actions
 from coursebuild.features.language_server.commands.completion import completions
-from coursebuild.features.language_server.commands.diagnosis import diagnoses, published
+from coursebuild.features.language_server.commands.diagnosis import current_diagnostics, to_lsp
 from coursebuild.features.language_server.commands.lookup import definition, hover
 from coursebuild.features.language_server.commands.outline import folds, headings, layout
 from coursebuild.features.language_server.commands.places import Places
@@ -29,9 +29,9 @@ from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.preview.session import Session
 
 _TEXTS: dict[str, Callable[[Any], str | None]] = {
-    types.TEXT_DOCUMENT_DID_OPEN: lambda asked: asked.text_document.text,
-    types.TEXT_DOCUMENT_DID_CHANGE: lambda asked: asked.content_changes[-1].text,
-    types.TEXT_DOCUMENT_DID_CLOSE: lambda asked: None,
+    types.TEXT_DOCUMENT_DID_OPEN: lambda params: params.text_document.text,
+    types.TEXT_DOCUMENT_DID_CHANGE: lambda params: params.content_changes[-1].text,
+    types.TEXT_DOCUMENT_DID_CLOSE: lambda params: None,
 }
 _ANSWERS: dict[str, Callable[[OpenTexts, Source, Any], Any]] = {
     types.TEXT_DOCUMENT_HOVER: hover,
@@ -51,62 +51,62 @@ _OPTIONS: dict[str, object] = {
 
 
 class Server:
-    """See the module."""
+    """Answers a client, and sends it the diagnostics of its course."""
 
     def __init__(self, session: Session, store: Memo) -> None:
         self.session, self.store, self.places = session, store, Places(session.root)
         self.client = LanguageServer(
             "coursebuild", __version__, types.TextDocumentSyncKind.Full, max_workers=1
         )
-        self._typed: set[str] = set()
-        """Paths of texts that were not read since they were typed."""
-        self._typing = threading.Condition()
+        self._edited_paths: set[str] = set()
+        """Paths of texts that were edited and not read since."""
+        self._edited = threading.Condition()
         self._loop: asyncio.AbstractEventLoop | None = None
-        """Of the thread that answers, from when the client is ready."""
+        """The loop of the thread that answers; `None` until the client is ready."""
         feature = self.client.feature
-        feature(types.INITIALIZED)(lambda asked: self._begin())
-        for method, text in _TEXTS.items():
-            feature(method)(partial(self._take, text))
+        feature(types.INITIALIZED)(lambda params: self._begin())
+        for method, get_text in _TEXTS.items():
+            feature(method)(partial(self._take_text, get_text))
         for method, answer in _ANSWERS.items():
             feature(method, _OPTIONS.get(method))(partial(self._answer, answer))
 
-    def _answer(self, answer: Callable[[OpenTexts, Source, Any], Any], asked: Any) -> Any:
-        """Answer about a text, as long as anything is known of the course."""
+    def _answer(self, answer: Callable[[OpenTexts, Source, Any], Any], params: Any) -> Any:
+        """Answer a request about a text; `None` where the course has never been readable."""
         library = self.session.library
         if library is None:
             return None
         texts = OpenTexts(self.session, library, self.places, self.store)
-        return answer(texts, texts.source(self.places.path(asked.text_document.uri)), asked)
+        return answer(texts, texts.source(self.places.path(params.text_document.uri)), params)
 
     def _begin(self) -> None:
-        """Tell the client what is wrong from now on."""
+        """Start to send diagnostics to the client."""
         encoding = self.client.workspace.position_encoding or "utf-16"
         self.places.encoding = types.PositionEncodingKind(encoding).value
         self._loop = asyncio.get_running_loop()
         self.session.tell()
 
-    # --- what is typed
+    # --- edits
 
-    def _take(self, text_of: Callable[[Any], str | None], asked: Any) -> None:
-        """Take a text of the editor, or that its file is open no longer."""
-        text, session = text_of(asked), self.session
-        path = self.places.path(asked.text_document.uri)
+    def _take_text(self, get_text: Callable[[Any], str | None], params: Any) -> None:
+        """Note the new text of a file in the editor, or that the file is no longer open."""
+        text, session = get_text(params), self.session
+        path = self.places.path(params.text_document.uri)
         if not path.startswith(("content/", "models/")) and path not in session.files_elsewhere():
             return
-        texts = {other: known for other, known in session.open_texts.items() if other != path}
-        if text is not None:  # half a character, which no file can hold, is none
+        texts = {p: open_text for p, open_text in session.open_texts.items() if p != path}
+        if text is not None:  # without half characters, which no file can hold
             texts[path] = text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
         session.open_texts = texts
-        with self._typing:
-            self._typed.add(path)
-            self._typing.notify()
+        with self._edited:
+            self._edited_paths.add(path)
+            self._edited.notify()
 
-    def take_typing(self) -> None:
-        """Read what was typed, as long as the process lives."""
+    def read_edits(self) -> None:
+        """Read edited texts, as long as the process lives."""
         while True:
-            with self._typing:
-                self._typing.wait_for(lambda: self._typed)
-                paths, self._typed = self._typed, set()
+            with self._edited:
+                self._edited.wait_for(lambda: self._edited_paths)
+                paths, self._edited_paths = self._edited_paths, set()
             self.session.calm.clear()
             try:
                 if self.session.edit(paths, saved=False) is None:
@@ -114,25 +114,25 @@ class Server:
             finally:
                 self.session.calm.set()
 
-    # --- what is wrong
+    # --- diagnostics
 
     def publish(self) -> None:
-        """Tell the client what is wrong, file by file, as long as the process lives."""
-        session, seen = self.session, -1
-        told: dict[str, list[types.Diagnostic]] = {}
+        """Send each file's diagnostics when they change, as long as the process lives."""
+        session, version = self.session, -1
+        last_sent: dict[str, list[types.Diagnostic]] = {}
         while True:
             with session.changed:
-                while self._loop is None or session.version == seen:
+                while self._loop is None or session.version == version:
                     session.changed.wait()
-                seen = session.version
-            found: dict[str, list[types.Diagnostic]] = {uri: [] for uri in told}
-            for one in diagnoses(session):
-                uri = self.places.uri(one.span.path)
-                found.setdefault(uri, []).append(published(one, self.places))
-            for uri, diagnostics in found.items():
-                if diagnostics != told.get(uri):
+                version = session.version
+            by_uri: dict[str, list[types.Diagnostic]] = {uri: [] for uri in last_sent}
+            for diagnostic in current_diagnostics(session):
+                uri = self.places.uri(diagnostic.span.path)
+                by_uri.setdefault(uri, []).append(to_lsp(diagnostic, self.places))
+            for uri, diagnostics in by_uri.items():
+                if diagnostics != last_sent.get(uri):
                     params = types.PublishDiagnosticsParams(uri, diagnostics)
                     self._loop.call_soon_threadsafe(
                         self.client.text_document_publish_diagnostics, params
                     )
-            told = {uri: diagnostics for uri, diagnostics in found.items() if diagnostics}
+            last_sent = {uri: diagnostics for uri, diagnostics in by_uri.items() if diagnostics}

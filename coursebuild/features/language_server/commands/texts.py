@@ -20,33 +20,33 @@ from coursebuild.preview.session import Session
 
 
 class OpenTexts(Struct, frozen=True):
-    """See the module."""
+    """The texts of a course as they are now."""
 
     session: Session
     library: Library
-    """What is known of the course."""
+    """The course as it was last read."""
     places: Places
     store: Memo
 
     def source(self, path: str) -> Source:
-        """The text of a file of the course; one of nothing where there is none."""
+        """Return the text of a file of the course; an empty one where there is no such file."""
         read = read_sources(self.session.root, [path], self.session.open_texts)
         return next(iter(read.value), Source(path, ""))
 
     def document(self, source: Source) -> Document | None:
-        """A lesson or page with its prose; `None` for any other text, and for one too long."""
+        """Return the document of a lesson or page; `None` for other texts, and those too long."""
         owner = self.owner(source)
         callouts = frozenset(self.library.callouts)
-        return None if owner is None else _parsed(source, callouts, isinstance(owner, Lesson))
+        return None if owner is None else _parse(source, callouts, isinstance(owner, Lesson))
 
     def owner(self, source: Source) -> Owner | None:
-        """The lesson or page that has a text, if it is not too long to be read."""
+        """Return the lesson or page of a text, unless the text is too long to be read."""
         course = self.library.course
-        known = course.owners if len(source.text) <= course.limits.text else ()
-        return next((owner for owner in known if owner.path == source.path), None)
+        owners = course.owners if len(source.text) <= course.limits.text else ()
+        return next((owner for owner in owners if owner.path == source.path), None)
 
 
 @lru_cache(maxsize=16)
-def _parsed(source: Source, callouts: frozenset[str], lesson: bool) -> Document:
-    """Remembered: an editor asks many things about a text before it is another."""
+def _parse(source: Source, callouts: frozenset[str], lesson: bool) -> Document:
+    """Cached, since an editor sends many requests about the same text."""
     return parse_document(source, callouts, lesson=lesson).value
