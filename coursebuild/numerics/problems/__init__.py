@@ -26,7 +26,7 @@ from coursebuild.numerics.problems import (
 @cache
 def all_problems() -> dict[str, Problem]:
     """Every hard case by its name, in the order of their numbers."""
-    found = (
+    problems = (
         tumbling_box.problem(),
         *pendulum.problems(),
         *tops.problems(),
@@ -39,4 +39,4 @@ def all_problems() -> dict[str, Problem]:
         *oscillators.problems(),
         *scales.problems(),
     )
-    return {problem.name: problem for problem in sorted(found, key=lambda one: one.case)}
+    return {problem.name: problem for problem in sorted(problems, key=lambda problem: problem.case)}

@@ -35,23 +35,23 @@ class Chain(Struct, frozen=True):
     gravity: float = 9.81
 
     def motion(self, times: Array) -> Motion:
-        """At the rising times (n,) s."""
+        """The motion at the rising times (n,) s."""
         count = len(self.masses)
-        turned = np.array([np.cos(self.bend / 2), 0.0, np.sin(self.bend / 2), 0.0])
-        omega = quat_to_mat(turned) @ np.array(self.spin or (0.0, 0.0, 0.0))
-        start = np.concatenate([np.tile(turned, count), np.tile(omega, count)])
+        tilted = np.array([np.cos(self.bend / 2), 0.0, np.sin(self.bend / 2), 0.0])
+        omega = quat_to_mat(tilted) @ np.array(self.spin or (0.0, 0.0, 0.0))
+        start = np.concatenate([np.tile(tilted, count), np.tile(omega, count)])
         masses = np.array(self.masses)
         tolerance = 1e-13 if np.ptp(masses) == 0 else 1e-10
         states = bulirsch_stoer(self._rate, start, times, tolerance)
         attitude = states[:, : 4 * count].reshape(-1, count, 4)
-        above = np.roll(attitude, 1, axis=1)
-        above[:, 0] = (1.0, 0.0, 0.0, 0.0)
-        relative = quat_mul(quat_conj(above), attitude)
-        gained = np.diff(states[:, 4 * count :].reshape(-1, count, 3), axis=1, prepend=0.0)
+        parents = np.roll(attitude, 1, axis=1)
+        parents[:, 0] = (1.0, 0.0, 0.0, 0.0)
+        relative = quat_mul(quat_conj(parents), attitude)
+        relative_omega = np.diff(states[:, 4 * count :].reshape(-1, count, 3), axis=1, prepend=0.0)
         if self.spin is None:
             angles = 2 * np.arctan2(relative[..., 2], relative[..., 0])
-            return Motion(times, angles, np.empty((len(times), 0, 4)), gained[..., 1])
-        velocity = np.einsum("nkji,nkj->nki", quat_to_mat(attitude), gained)
+            return Motion(times, angles, np.empty((len(times), 0, 4)), relative_omega[..., 1])
+        velocity = np.einsum("nkji,nkj->nki", quat_to_mat(attitude), relative_omega)
         return Motion(times, np.empty((len(times), 0)), relative, velocity.reshape(len(times), -1))
 
     def _rate(self, state: State) -> State:
@@ -68,21 +68,21 @@ class Chain(Struct, frozen=True):
             ],
             axis=1,
         )
-        carried = np.cumsum(self.masses[::-1])[::-1]  # the mass from each body on
-        shared = carried[np.maximum.outer(np.arange(count), np.arange(count))]
+        carried_mass = np.cumsum(self.masses[::-1])[::-1]  # the mass from each body on
+        shared_mass = carried_mass[np.maximum.outer(np.arange(count), np.arange(count))]
         s = np.cross(u[:, None], -np.eye(3))  # u × as a matrix
-        matrix = -(self.length**2) * np.einsum("ij,iab,jbc->iajc", shared, s, s)
+        matrix = -(self.length**2) * np.einsum("ij,iab,jbc->iajc", shared_mass, s, s)
         matrix = matrix.reshape(3 * count, -1) + self.inertia * np.eye(3 * count)
-        needed = self.length * shared @ _cross(omega, _cross(omega, u))
-        needed[:, 2] += carried * self.gravity
-        turned = np.linalg.solve(matrix, -self.length * _cross(u, needed).ravel())
-        return np.concatenate([slope.ravel() / 2, turned])
+        load = self.length * shared_mass @ _cross(omega, _cross(omega, u))
+        load[:, 2] += carried_mass * self.gravity
+        acceleration = np.linalg.solve(matrix, -self.length * _cross(u, load).ravel())
+        return np.concatenate([slope.ravel() / 2, acceleration])
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Of rows (n, 3)."""
-    found: Array = np.cross(a, b)
-    return found
+    """The cross products of rows (n, 3)."""
+    product: Array = np.cross(a, b)
+    return product
 
 
 CHAINS = {
@@ -92,7 +92,7 @@ CHAINS = {
 }
 _PRECISION = Sizes(1e-10, 1e-10, 1e-9)
 _HINGE = '<joint type="hinge" axis="0 1 0"/>'
-_TURNED = (0.9689124217106447, 0.0, 0.24740395925452294, 0.0)
+_TILTED = (0.9689124217106447, 0.0, 0.24740395925452294, 0.0)
 
 
 def _mjcf(joint: str, *bodies: str) -> str:
@@ -123,7 +123,7 @@ def problems() -> tuple[Problem, ...]:
             "chain-balls",
             "Chain of six ball joints",
             _mjcf('<joint type="ball"/>', *[body] * 6),
-            Scenario(0.5, 0.05, _TURNED + upright * 5, spinning),
+            Scenario(0.5, 0.05, _TILTED + upright * 5, spinning),
         ),
         _problem(  # the light bodies between the pivot and the heavy one swing at 1e4 rad/s
             "chain-heavy-tip",

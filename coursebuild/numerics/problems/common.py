@@ -1,4 +1,4 @@
-"""What the hard cases share: their models' text, simulating for a while, motions.
+"""Parts that the hard cases share: their models' text, simulating for a while, motions.
 
 Entry points: `model_text`, `run_steps`, `divisions`; `motion_without_attitude`, `turning_at_rest`.
 """
@@ -43,11 +43,11 @@ def divisions(sample: float, *parts: int) -> tuple[float, ...]:
 
 
 def motion_without_attitude(times: Array, position: Array, velocity: Array) -> Motion:
-    """Of slides and hinges: positions (n, p) and velocities (n, v)."""
+    """A motion of slides and hinges, with positions (n, p) and velocities (n, v)."""
     return Motion(times, position, np.empty((len(times), 0, 4)), velocity)
 
 
 def turning_at_rest(times: Array, attitude: Array, omega: Array) -> Motion:
-    """Of a free body whose centre rests: attitude (n, 4) and angular velocity (n, 3), rad/s."""
+    """A motion of a free body whose centre rests: attitude (n, 4) and rad/s (n, 3)."""
     still = np.zeros((len(times), 3))
     return Motion(times, still, attitude[:, None], np.concatenate([still, omega], axis=1))

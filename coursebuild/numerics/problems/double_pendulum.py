@@ -40,12 +40,12 @@ from coursebuild.numerics.problems.common import (
     motion_without_attitude,
 )
 
-_PARTED = 0.1
-"""rad: a motion that is off by as much is another one."""
-_MEMBERS, _AROUND = 12, 1e-3
-"""Of an ensemble, and how far they begin from the case, rad."""
+_PARTING = 0.1
+"""rad: the error at which a motion has nothing in common with the exact one."""
+_MEMBERS, _RADIUS = 12, 1e-3
+"""The size of the ensemble, and how far it begins from the case, rad."""
 _STEP, _SPAN = 1e-3, 50.0
-"""s, of what is measured: the timestep, and the time over which an exponent is."""
+"""s: the timestep of the measurements, and the time over which an exponent is measured."""
 
 _LINK = '<joint type="hinge" axis="0 1 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 0.01 1"/>'
 MJCF = model_text(
@@ -92,7 +92,7 @@ class DoublePendulum(Struct, frozen=True):
 
 
 def _cosine_sine(angle: Decimal) -> tuple[Decimal, Decimal]:
-    """By their series."""
+    """The cosine and sine of an angle, by their series."""
     sums, term = [Decimal(0), Decimal(0)], Decimal(1)
     for n in range(80):
         sums[n % 2] += term if n % 4 < 2 else -term
@@ -107,22 +107,22 @@ def _ensemble() -> list[DoublePendulum]:
     """Beginnings on a circle around that of the case."""
     turns = [2 * math.pi * n / _MEMBERS for n in range(_MEMBERS)]
     return [
-        DoublePendulum(2.0 + _AROUND * math.cos(turn), 0.5 + _AROUND * math.sin(turn))
+        DoublePendulum(2.0 + _RADIUS * math.cos(turn), 0.5 + _RADIUS * math.sin(turn))
         for turn in turns
     ]
 
 
 def horizons(integrator: Integrator) -> list[float]:
     """When the error of the angles first passes 0.1 rad, s, for each member of the ensemble."""
-    model, found = compile_model(MJCF, integrator, _STEP), []
+    model, times = compile_model(MJCF, integrator, _STEP), []
     for member in _ensemble():
         scenario = Scenario(20.0, 0.05, (member.upper, member.lower))
         run = simulate(replace(problem(), scenario=scenario), model).states
         truth = reference_motion(replace(REFERENCE, solution=member), tuple(run.times.tolist()))
         error = np.linalg.norm(run.qpos - truth.position, axis=1)
-        beyond = np.flatnonzero(~(error < _PARTED))
-        found.append(float(run.times[beyond[0]]) if len(beyond) else math.inf)
-    return found
+        parted = np.flatnonzero(~(error < _PARTING))
+        times.append(float(run.times[parted[0]]) if len(parted) else math.inf)
+    return times
 
 
 def exponents(integrator: Integrator) -> list[float]:
@@ -130,22 +130,22 @@ def exponents(integrator: Integrator) -> list[float]:
 
     Two runs of each, brought near to each other again and again.
     """
-    model, found = compile_model(MJCF, integrator, _STEP), []
+    model, rates = compile_model(MJCF, integrator, _STEP), []
     for member in _ensemble():
         scenario = Scenario(_SPAN, 0.5, (member.upper, member.lower))
-        data, near = initial_data(scenario, model), initial_data(scenario, model)
+        data, neighbour = initial_data(scenario, model), initial_data(scenario, model)
         distance, total = 1e-8, 0.0
-        near.qpos[0] += distance
+        neighbour.qpos[0] += distance
         for _ in scenario.times:
-            for one in (data, near):
-                advance(model, one, scenario.steps(_STEP))
-            apart = np.concatenate([near.qpos - data.qpos, near.qvel - data.qvel])
+            for state in (data, neighbour):
+                advance(model, state, scenario.steps(_STEP))
+            apart = np.concatenate([neighbour.qpos - data.qpos, neighbour.qvel - data.qvel])
             size = float(np.linalg.norm(apart))
             total += math.log(size / distance)
-            near.qpos[:] = data.qpos + apart[:2] * distance / size
-            near.qvel[:] = data.qvel + apart[2:] * distance / size
-        found.append(total / _SPAN)
-    return found
+            neighbour.qpos[:] = data.qpos + apart[:2] * distance / size
+            neighbour.qvel[:] = data.qvel + apart[2:] * distance / size
+        rates.append(total / _SPAN)
+    return rates
 
 
 def problem() -> Problem:
@@ -167,14 +167,14 @@ def problem() -> Problem:
                 "s",
                 None,
                 horizons,
-                f"{_MEMBERS} beginnings {_AROUND:g} rad around, each against 40 digits",
+                f"{_MEMBERS} beginnings {_RADIUS:g} rad around, each against 40 digits",
             ),
             ScalarCheck(
                 "Lyapunov exponent, over 50 s at 1 ms",
                 "1/s",
                 None,
                 exponents,
-                f"Benettin's method, {_MEMBERS} beginnings {_AROUND:g} rad around",
+                f"Benettin's method, {_MEMBERS} beginnings {_RADIUS:g} rad around",
                 (Integrator.RK4,),
             ),
         ),

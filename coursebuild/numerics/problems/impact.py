@@ -47,10 +47,9 @@ from coursebuild.numerics.problems.common import (
 GAP, SPEED, CONTACT = 0.05, 1.0, math.pi / 1000
 """m, m/s, and how long a contact lasts, s."""
 _PHASES = 16
-"""Of a step, in which a contact can begin."""
+"""Moments within a step at which a contact can begin."""
 _LENGTHS = 4
-"""Of a contact, from a whole number of steps on: at whole numbers errors cancel that elsewhere do
-not."""
+"""Lengths of a contact, from a whole number of steps up: at whole numbers some errors cancel."""
 
 _GEOM = 'condim="1" solref="-1000000 0" solimp="0.9 0.9 0.001 0.5 2"'
 _OPTION = f'{NO_GRAVITY} tolerance="0"'
@@ -67,9 +66,9 @@ BOUNCE = model_text(
 )
 CRADLE = model_text("\n".join(map(_ball, ("0", "0.25", "0.5"))), _OPTION)
 TOUCHING = model_text("\n".join(map(_ball, ("0", "0.25", "0.45"))), _OPTION)
-_MEETING = Scenario(0.1, 0.01, (0.0,), (1.0,))
-_PASSING = Scenario(0.13, 0.01, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-_SHARED = Scenario(0.06, 0.002, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+_BOUNCE_SCENARIO = Scenario(0.1, 0.01, (0.0,), (1.0,))
+_CRADLE_SCENARIO = Scenario(0.13, 0.01, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+_TOUCHING_SCENARIO = Scenario(0.06, 0.002, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
 class Bounce(Struct, frozen=True):
@@ -81,7 +80,7 @@ class Bounce(Struct, frozen=True):
     """√stiffness, rad/s."""
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         gap, speed, rate, contact = self.gap, self.speed, self.rate, math.pi / self.rate
         t = times - gap / speed
         touching = [t < 0, t < contact]
@@ -99,26 +98,26 @@ class Cradle(Bounce, frozen=True):
     """
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         gap, full, rate, contact = self.gap, self.speed, self.rate, math.pi / self.rate
         place, speed = np.zeros((len(times), 3)), np.zeros((len(times), 3))
-        free, flown_from = 0.0, 0.0  # when the ball begins to fly, and from where
+        start, flown_from = 0.0, 0.0  # when the ball begins to fly, and from where
         for ball in range(3):
-            meets = math.inf if ball == 2 else free + (gap - flown_from) / full
-            flies = (times >= free) & (times < meets)
-            place[flies, ball] = flown_from + full * (times[flies] - free)
+            meets = math.inf if ball == 2 else start + (gap - flown_from) / full
+            flies = (times >= start) & (times < meets)
+            place[flies, ball] = flown_from + full * (times[flies] - start)
             speed[flies, ball] = full
             if ball == 2:
                 break
             t = times - meets
-            pushes, done = (t >= 0) & (t < contact), t >= contact
+            pushes, has_pushed = (t >= 0) & (t < contact), t >= contact
             sine, cosine = np.sin(rate * t[pushes]), np.cos(rate * t[pushes])
             place[pushes, ball] = gap + full * (t[pushes] + sine / rate) / 2
             place[pushes, ball + 1] = full * (t[pushes] - sine / rate) / 2
             speed[pushes, ball] = full * (1 + cosine) / 2
             speed[pushes, ball + 1] = full * (1 - cosine) / 2
-            place[done, ball] = gap + full * contact / 2
-            free, flown_from = meets + contact, full * contact / 2
+            place[has_pushed, ball] = gap + full * contact / 2
+            start, flown_from = meets + contact, full * contact / 2
         return motion_without_attitude(times, place, speed)
 
 
@@ -132,21 +131,21 @@ class TouchingCradle(Bounce, frozen=True):
     impedance: float = 0.9
 
     def _forces(self, depth: Array) -> Array:
-        """What the contacts push with, (2,) N: depths (2,) m, those below 0 do not touch.
+        """The forces of the contacts, (2,) N, by their depths (2,) m; below 0 they do not touch.
 
         A + R has no positive number beside its diagonal, so that no force comes out negative.
         """
-        found = np.zeros(2)
+        forces = np.zeros(2)
         touching = depth > 0
         if touching.any():
             a = _J[touching] @ _J[touching].T
             r = np.diag(np.diag(a)) * (1 - self.impedance) / self.impedance
             push = self.rate**2 / self.impedance * depth[touching]
-            found[touching] = np.linalg.solve(a + r, push)
-        return found
+            forces[touching] = np.linalg.solve(a + r, push)
+        return forces
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
 
         def rate(state: State) -> State:
             depth = _J @ state[:3] - np.array([self.gap, 0.0])
@@ -165,13 +164,13 @@ class TouchingCradle(Bounce, frozen=True):
 
 
 def restitution(integrator: Integrator, steps: int) -> float:
-    """How fast the ball comes back, relative to how fast it came, at worst.
+    """The worst ratio of the speed with which the ball returns to that with which it came.
 
     A contact begins at any moment of a step, and lasts `steps` steps or a part of a step more.
     """
     cases = ((steps + k / _LENGTHS, j / _PHASES) for k in range(_LENGTHS) for j in range(_PHASES))
-    found = [_back(integrator, length, phase) for length, phase in cases]
-    return max(found, key=lambda back: math.inf if math.isnan(back) else abs(back - 1))
+    restitutions = [_back(integrator, length, phase) for length, phase in cases]
+    return max(restitutions, key=lambda back: math.inf if math.isnan(back) else abs(back - 1))
 
 
 def _back(integrator: Integrator, length: float, phase: float) -> float:
@@ -186,7 +185,7 @@ def _back(integrator: Integrator, length: float, phase: float) -> float:
 def last_velocity(
     mjcf: str, scenario: Scenario, integrator: Integrator, ball: int, steps: int
 ) -> float:
-    """The velocity of a ball after everything, m/s, with so many steps in a contact."""
+    """The velocity of a ball at the end, m/s, with so many steps in a contact."""
     timestep = CONTACT / steps
     count = round(scenario.duration / timestep)
     return float(run_steps(mjcf, scenario, integrator, timestep, count).qvel[ball])
@@ -194,12 +193,12 @@ def last_velocity(
 
 def problems() -> tuple[Problem, ...]:
     """The impact and the cradles."""
-    parted = Problem(
+    impact = Problem(
         name="elastic-impact",
         title="Elastic impact on a wall",
         case=8,
         mjcf=BOUNCE,
-        scenario=_MEETING,
+        scenario=_BOUNCE_SCENARIO,
         position_bound=1.0,
         velocity_bound=2 * SPEED,
         reference=Reference("closed", "half an oscillation without damping", Bounce()),
@@ -218,45 +217,47 @@ def problems() -> tuple[Problem, ...]:
         note="an impact begins within a step: no order is to be expected",
     )
     exchanged = "equal masses exchange their velocities"
-    passed = replace(
-        parted,
+    cradle = replace(
+        impact,
         name="newtons-cradle",
         title="Newton's cradle with gaps",
         mjcf=CRADLE,
-        scenario=_PASSING,
+        scenario=_CRADLE_SCENARIO,
         reference=Reference("closed", exchanged, Cradle()),
         checks=(
             ScalarCheck(
                 "velocity of the last ball, 20 steps in a contact",
                 "m/s",
                 SPEED,
-                lambda integrator: last_velocity(CRADLE, _PASSING, integrator, 2, 20),
+                lambda integrator: last_velocity(CRADLE, _CRADLE_SCENARIO, integrator, 2, 20),
                 exchanged,
             ),
         ),
         note="a cradle whose balls touch is another problem: all contacts act at once",
     )
     source = "MuJoCo's soft contacts, Bulirsch–Stoer in small steps"
-    shared = replace(
-        parted,
+    touching_cradle = replace(
+        impact,
         name="newtons-cradle-touching",
         title="Newton's cradle, two balls of which touch",
         mjcf=TOUCHING,
-        scenario=_SHARED,
+        scenario=_TOUCHING_SCENARIO,
         reference=Reference("ode", source, TouchingCradle()),
         precision=Sizes(1e-10, 0.0, 1e-8),
         timesteps=divisions(0.002, 16, 32, 64, 128),
-        checks=tuple(_shared(ball, name) for ball, name in enumerate(("first", "middle", "last"))),
+        checks=tuple(
+            _touching_check(ball, name) for ball, name in enumerate(("first", "middle", "last"))
+        ),
         note="all contacts act at once: the last ball does not take over the whole velocity",
     )
-    return parted, passed, shared
+    return impact, cradle, touching_cradle
 
 
-def _shared(ball: int, name: str) -> ScalarCheck:
+def _touching_check(ball: int, name: str) -> ScalarCheck:
     return ScalarCheck(
         f"velocity of the {name} ball, 80 steps in a contact",
         "m/s",
         lambda _: float(TouchingCradle().motion(np.array([0.06])).velocity[0, ball]),
-        lambda integrator: last_velocity(TOUCHING, _SHARED, integrator, ball, 80),
+        lambda integrator: last_velocity(TOUCHING, _TOUCHING_SCENARIO, integrator, ball, 80),
         "the soft contacts of MuJoCo, integrated",
     )

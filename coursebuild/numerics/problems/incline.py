@@ -62,7 +62,7 @@ class Incline(Struct, frozen=True):
     slope: float
     friction: float | None
     """Of a block; `None`: it is a ball, and rolls."""
-    across: bool = False
+    is_diagonal: bool = False
     """Whether it goes half-way between the axes."""
     gravity: float = 9.81
     height: float = 0.05
@@ -70,26 +70,30 @@ class Incline(Struct, frozen=True):
 
     @property
     def acceleration(self) -> float:
-        """Along the slope, m/s²."""
+        """The acceleration along the slope, m/s²."""
         fall, press = self.gravity * math.sin(self.slope), self.gravity * math.cos(self.slope)
         return 5 / 7 * fall if self.friction is None else max(0.0, fall - self.friction * press)
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         speed = self.acceleration * times
         way, turn = speed * times / 2, 0.0 if self.friction else 1 / self.height
-        along = np.array([1.0, 1.0, 0.0]) / math.sqrt(2) if self.across else np.array([1.0, 0, 0])
-        axis = np.array([-along[1], along[0], 0.0])
-        place = way[:, None] * along + np.array([0.0, 0.0, self.height])
+        direction = (
+            np.array([1.0, 1.0, 0.0]) / math.sqrt(2) if self.is_diagonal else np.array([1.0, 0, 0])
+        )
+        axis = np.array([-direction[1], direction[0], 0.0])
+        place = way[:, None] * direction + np.array([0.0, 0.0, self.height])
         half = way * turn / 2
         attitude = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * axis], axis=1)
         # Turning about an axis that does not move: the same in the body's frame and in the world's.
-        velocity = np.concatenate([speed[:, None] * along, speed[:, None] * turn * axis], axis=1)
+        velocity = np.concatenate(
+            [speed[:, None] * direction, speed[:, None] * turn * axis], axis=1
+        )
         return Motion(times, place, attitude[:, None], velocity)
 
 
-def _rigid(text: str, _: Scenario, times: Array) -> Motion:
-    """What rigid contacts would do with a model's numbers."""
+def _rigid_motion(text: str, _: Scenario, times: Array) -> Motion:
+    """The motion with rigid contacts, from the numbers of a model."""
     model = compile_model(text, Integrator.EULER, _STEP)
     pull, normal = model.opt.gravity[:2], -float(model.opt.gravity[2])
     size, spin = float(np.hypot(*pull)), np.zeros(3)
@@ -104,21 +108,21 @@ def _rigid(text: str, _: Scenario, times: Array) -> Motion:
         push = pull * max(0.0, 1 - grip / size)
     place = model.body_pos[1] + np.outer(times**2 / 2, [*push, 0.0])
     axis = np.cross([0.0, 0.0, 1.0], [*pull, 0.0])
-    turned = axis_angle_to_quat(axis, float(np.linalg.norm(spin)) * times**2 / 2)
-    return Motion(times, place, turned[:, None], np.outer(times, [*push, 0.0, *spin]))
+    attitude = axis_angle_to_quat(axis, float(np.linalg.norm(spin)) * times**2 / 2)
+    return Motion(times, place, attitude[:, None], np.outer(times, [*push, 0.0, *spin]))
 
 
-RIGID = SecondReference("Newton’s and Coulomb’s laws for the numbers of the MJCF", _rigid)
+RIGID = SecondReference("Newton’s and Coulomb’s laws for the numbers of the MJCF", _rigid_motion)
 
 
 def acceleration(text: str, integrator: Integrator) -> float:
-    """Along the slope, m/s²: from 0.5 s, when the contact has settled, to 1 s, at 1 ms."""
+    """The acceleration along the slope, m/s²: from 0.5 s, when the contact has settled, to 1 s."""
     half, whole = (_speed(text, integrator, seconds) for seconds in (0.5, 1.0))
     return (whole - half) / 0.5
 
 
 def _speed(text: str, integrator: Integrator, seconds: float) -> float:
-    """Along the slope after so many seconds from rest, m/s."""
+    """The speed along the slope after so many seconds from rest, m/s."""
     data = run_steps(text, _SCENARIO, integrator, _STEP, round(seconds / _STEP))
     return math.hypot(data.qvel[0], data.qvel[1])
 
@@ -126,26 +130,28 @@ def _speed(text: str, integrator: Integrator, seconds: float) -> float:
 def problems() -> tuple[Problem, ...]:
     """Sliding along an axis and between two, rolling, sticking; with both cones."""
     return (
-        *(_sliding(cone, across) for cone in _CONES for across in (False, True)),
-        *(_rolling(cone) for cone in _CONES),
-        *(_sticking(cone) for cone in _CONES),
+        *(_sliding_problem(cone, is_diagonal) for cone in _CONES for is_diagonal in (False, True)),
+        *(_rolling_problem(cone) for cone in _CONES),
+        *(_sticking_problem(cone) for cone in _CONES),
     )
 
 
-def _sliding(cone: Cone, across: bool) -> Problem:
-    slide = Incline(math.radians(45), 0.5, across)
-    text = mjcf("box", ACROSS if across else SLIDING, cone, "0.5")
+def _sliding_problem(cone: Cone, is_diagonal: bool) -> Problem:
+    slide = Incline(math.radians(45), 0.5, is_diagonal)
+    text = mjcf("box", ACROSS if is_diagonal else SLIDING, cone, "0.5")
     name = "acceleration when sliding, from 0.5 s to 1 s at 1 ms"
     checks = [_acceleration(name, text, slide.acceleration, "Coulomb's law")]
-    if cone == "pyramidal" and across:  # |f₁| + |f₂| ≤ μ f leaves μ/√2 half-way between the axes
+    if (
+        cone == "pyramidal" and is_diagonal
+    ):  # |f₁| + |f₂| ≤ μ f leaves μ/√2 half-way between the axes
         blunted = replace(slide, friction=0.5 / math.sqrt(2)).acceleration
         name = "the same, against a pyramid's friction"
         checks.append(_acceleration(name, text, blunted, "|f₁| + |f₂| ≤ μ f"))
-    where = "between the axes" if across else "along an axis"
+    course = "between the axes" if is_diagonal else "along an axis"
     article = "an" if cone == "elliptic" else "a"
     return _problem(
-        f"sliding-block-{cone}-{'across' if across else 'along'}",
-        f"Block sliding {where} of {article} {cone} cone",
+        f"sliding-block-{cone}-{'across' if is_diagonal else 'along'}",
+        f"Block sliding {course} of {article} {cone} cone",
         text,
         Reference("closed", "Coulomb's law, a = g (sin α − μ cos α)", slide),
         tuple(checks),
@@ -153,11 +159,11 @@ def _sliding(cone: Cone, across: bool) -> Problem:
     )
 
 
-def _rolling(cone: Cone) -> Problem:
+def _rolling_problem(cone: Cone) -> Problem:
     roll = Incline(math.radians(20), None)
     text = mjcf("sphere", ROLLING, cone, "1")
     name, law = "acceleration when rolling, from 0.5 s to 1 s at 1 ms", "a = 5/7 g sin α"
-    found = _problem(
+    problem = _problem(
         f"rolling-ball-{cone}",
         f"Ball rolling, {cone} cone",
         text,
@@ -165,14 +171,14 @@ def _rolling(cone: Cone) -> Problem:
         (_acceleration(name, text, roll.acceleration, law),),
         "the ball sinks in, and so rolls on a shorter arm: the error is the model's",
     )
-    return replace(found, velocity_bound=200.0)
+    return replace(problem, velocity_bound=200.0)
 
 
-def _sticking(cone: Cone) -> Problem:
+def _sticking_problem(cone: Cone) -> Problem:
     text = mjcf("box", STICKING, cone, "0.5")
     creep = partial(_speed, text, seconds=2.0)
     law = "Coulomb's law: tan α < μ, so that it rests"
-    found = _problem(
+    problem = _problem(
         f"sticking-block-{cone}",
         f"Block that should stick, {cone} cone",
         text,
@@ -180,7 +186,7 @@ def _sticking(cone: Cone) -> Problem:
         (ScalarCheck("creep after 2 s at 1 ms", "m/s", 0.0, creep, "Coulomb's law"),),
         "soft friction gives way at a steady velocity",
     )
-    return replace(found, scenario=Scenario(2.0, 0.1), position_bound=1.0, velocity_bound=1.0)
+    return replace(problem, scenario=Scenario(2.0, 0.1), position_bound=1.0, velocity_bound=1.0)
 
 
 def _acceleration(name: str, text: str, exact: float, law: str) -> ScalarCheck:

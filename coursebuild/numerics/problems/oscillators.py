@@ -58,9 +58,9 @@ _SOLREF = {0.1: "0.2 0.1", 1.0: "0.02 1"}
 def problems() -> tuple[Problem, ...]:
     """Each oscillator with some damping ratios."""
     return (
-        *map(_spring, _DAMPING),
-        *map(_servo, _KV),
-        *map(_equality, _SOLREF),
+        *map(_spring_problem, _DAMPING),
+        *map(_servo_problem, _KV),
+        *map(_equality_problem, _SOLREF),
     )
 
 
@@ -75,7 +75,7 @@ class Oscillation(Struct, frozen=True):
     v0: float = 5.0
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         ratio, rate, x0, v0 = self.ratio, self.rate, self.x0, self.v0
         decay = ratio * rate
         if ratio == 1.0:
@@ -105,14 +105,16 @@ class Pursuit(Struct, frozen=True):
     hold: float = 0.05
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         x, v, begin = 0.0, 0.0, 0.0
         place, speed = np.empty((len(times), 1)), np.empty((len(times), 1))
         for target in self.targets:
-            here = times > begin + 1e-12  # what is after the hold is written again in the next one
-            at = np.append(times[here] - begin, self.hold)
+            in_hold = (
+                times > begin + 1e-12
+            )  # what is after the hold is written again in the next one
+            at = np.append(times[in_hold] - begin, self.hold)
             part = Oscillation(self.ratio, self.rate, x - target, v).motion(at)
-            place[here], speed[here] = part.position[:-1] + target, part.velocity[:-1]
+            place[in_hold], speed[in_hold] = part.position[:-1] + target, part.velocity[:-1]
             x, v = float(part.position[-1, 0]) + target, float(part.velocity[-1, 0])
             begin += self.hold
         return motion_without_attitude(times, place, speed)
@@ -135,8 +137,8 @@ def limit_of(ratio: float, rate: float, integrator: Integrator, *explicit: Integ
 
 def rk4_limit(ratio: float) -> float:
     """The first hω at which the Runge–Kutta method does not damp an oscillator."""
-    under = cmath.sqrt(ratio**2 - 1)
-    roots = (-ratio + under, -ratio - under)
+    discriminant_root = cmath.sqrt(ratio**2 - 1)
+    roots = (-ratio + discriminant_root, -ratio - discriminant_root)
 
     def growth(z: float) -> float:
         return max(abs(rk4_factor(root * z)) for root in roots)
@@ -155,7 +157,7 @@ def rk4_factor(z: complex) -> complex:
     return 1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))
 
 
-def _spring(ratio: float) -> Problem:
+def _spring_problem(ratio: float) -> Problem:
     rate, explicit = SPRING_RATE, Integrator.EULER_EXPLICIT
     damper = f'stiffness="100" damping="{_DAMPING[ratio]}"'
     joint = f'<joint type="slide" axis="1 0 0" {damper}/>'
@@ -169,7 +171,7 @@ def _spring(ratio: float) -> Problem:
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
         reference=Reference("closed", "the linear oscillator", Oscillation(ratio, rate)),
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
-        limit=lambda one: limit_of(ratio, rate, one, explicit),
+        limit=lambda integrator: limit_of(ratio, rate, integrator, explicit),
         energy_conserved=ratio == 0,
         search=(1e-2 / rate, 1e2 / rate),
         span=_SPAN * max(1.0, 0.2 * ratio) / rate,
@@ -177,32 +179,32 @@ def _spring(ratio: float) -> Problem:
     )
 
 
-def _servo(ratio: float) -> Problem:
+def _servo_problem(ratio: float) -> Problem:
     rate, explicit = SERVO_RATE, (Integrator.EULER, Integrator.EULER_EXPLICIT)
     gains = f'kp="10000" kv="{_KV[ratio]}"'
     motor = f'  <actuator><position joint="slide" {gains}/></actuator>\n'
     source = "the linear oscillator about each target"
-    bound = BOUND / 10
+    limit = BOUND / 10
     return Problem(
         name=f"stiff-servo-{ratio:g}",
         title=f"Stiff servo, ζ = {ratio:g}",
         case=6,
         mjcf=model_text(_ball(_SLIDE), NO_GRAVITY, NO_CONTACT, motor),
         scenario=Scenario(0.1, 0.01, controls=((0.1,), (-0.05,)), hold=0.05),
-        position_bound=bound,
-        velocity_bound=bound * rate * (1 + 4 * ratio),
+        position_bound=limit,
+        velocity_bound=limit * rate * (1 + 4 * ratio),
         reference=Reference("closed", source, Pursuit(ratio, rate)),
         timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
-        limit=lambda one: limit_of(ratio, rate, one, *explicit),
+        limit=lambda integrator: limit_of(ratio, rate, integrator, *explicit),
         search=(1e-2 / rate, 1e2 / rate),
         span=_SPAN * max(1.0, 0.2 * ratio) / rate,
         room=BOUND**2,
     )
 
 
-def _equality(ratio: float) -> Problem:
+def _equality_problem(ratio: float) -> Problem:
     rate, implicit = EQUALITY_RATE, (Integrator.RK4, Integrator.DISCRETE)
-    explicit = [one for one in Integrator if one not in implicit]
+    explicit = [integrator for integrator in Integrator if integrator not in implicit]
     soft = f'solref="{_SOLREF[ratio]}" solimp="0.9 0.9 0.001 0.5 2"'
     equality = f'  <equality><joint joint1="slide" {soft}/></equality>\n'
     flags = '<flag refsafe="disable" contact="disable"/>'
@@ -217,7 +219,7 @@ def _equality(ratio: float) -> Problem:
         velocity_bound=BOUND * rate * (1 + 4 * ratio),
         reference=Reference("closed", source, Oscillation(ratio, rate)),
         timesteps=divisions(0.02, 4, 8, 16, 32, 64, 128, 256),
-        limit=lambda one: limit_of(ratio, rate, one, *explicit),
+        limit=lambda integrator: limit_of(ratio, rate, integrator, *explicit),
         search=(1e-2 / rate, 1e1 / rate),
         span=_SPAN / rate,
         room=BOUND**2,

@@ -62,7 +62,7 @@ def mjcf(kind: Kind) -> str:
 
 
 class Swing(Struct, frozen=True):
-    """Of a pendulum that is let go at rest."""
+    """The swing of a pendulum that is let go at rest."""
 
     kind: Kind
     begin: float
@@ -81,7 +81,7 @@ class Swing(Struct, frozen=True):
         return math.sqrt(self.mass * self.gravity * self.length / moment)
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         from scipy.special import ellipj
 
         k, k1 = math.sin(self.begin / 2), math.cos(self.begin / 2)
@@ -92,7 +92,7 @@ class Swing(Struct, frozen=True):
 
 
 def _as_motion(kind: Kind, times: Array, angle: Array, rate: Array) -> Motion:
-    """Of the angle (n,) rad and its rate (n,) rad/s."""
+    """The motion of an angle (n,) rad with its rate (n,) rad/s."""
     if kind == "hinge":
         return motion_without_attitude(times, angle[:, None], rate[:, None])
     attitude = axis_angle_to_quat(_AXIS, angle)[:, None]
@@ -102,14 +102,14 @@ def _as_motion(kind: Kind, times: Array, angle: Array, rate: Array) -> Motion:
     return turning_at_rest(times, attitude[:, 0], turning)
 
 
-def _held(text: str, scenario: Scenario, times: Array) -> Motion:
-    """A free body that a rigid pivot holds, as the soft one of the model would like to."""
+def _held_motion(text: str, scenario: Scenario, times: Array) -> Motion:
+    """The motion of the free body if its soft pivot were rigid."""
     ball = text.replace(_PIVOT, "").replace(_JOINTS["connect"], _JOINTS["ball"])
-    found = forward_motion(ball, replace(scenario, qpos=scenario.qpos[3:]), times)
-    return turning_at_rest(times, found.attitude[:, 0], found.velocity)
+    motion = forward_motion(ball, replace(scenario, qpos=scenario.qpos[3:]), times)
+    return turning_at_rest(times, motion.attitude[:, 0], motion.velocity)
 
 
-HELD = SecondReference("MuJoCo’s accelerations with a ball joint, DOP853", _held)
+RIGID_PIVOT = SecondReference("MuJoCo’s accelerations with a ball joint, DOP853", _held_motion)
 
 
 def problems() -> tuple[Problem, ...]:
@@ -119,19 +119,19 @@ def problems() -> tuple[Problem, ...]:
 
 
 def _problem(kind: Kind, degrees: int) -> Problem:
-    angle, turned = _STARTS[degrees]
-    start = {"hinge": angle, "ball": turned, "connect": (0.0, 0.0, 0.0, *turned)}[kind]
+    angle, quaternion = _STARTS[degrees]
+    start = {"hinge": angle, "ball": quaternion, "connect": (0.0, 0.0, 0.0, *quaternion)}[kind]
     source = "Jacobi's elliptic functions, Landau & Lifshitz, Mechanics, § 11"
     return Problem(
         name=f"pendulum-{kind}-{degrees}",
-        title=f"Pendulum from {degrees}°, {_SAID[kind]}",
+        title=f"Pendulum from {degrees}°, {_SUSPENSIONS[kind]}",
         case=2,
         mjcf=mjcf(kind),
         scenario=Scenario(4.0, 0.1, start),
         position_bound=math.pi,
         velocity_bound=8.0,
         reference=Reference("closed", source, Swing(kind, math.radians(degrees))),
-        second=HELD if kind == "connect" else None,
+        second=RIGID_PIVOT if kind == "connect" else None,
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
         search=None if kind == "connect" else (1e-3, 3.0),
         span=500.0,
@@ -141,7 +141,7 @@ def _problem(kind: Kind, degrees: int) -> Problem:
     )
 
 
-_SAID = {
+_SUSPENSIONS = {
     "hinge": "a hinge",
     "ball": "a ball joint",
     "connect": "a free body held by connect",

@@ -35,7 +35,7 @@ class Parabola(Struct, frozen=True):
     gravity: float
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         t = times[:, None]
         launch, fall = np.array(self.launch), np.array([0.0, 0.0, -self.gravity])
         upright = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (len(times), 1, 4))
@@ -53,7 +53,7 @@ def fall_error(integrator: Integrator) -> float:
 
 
 def exact_error(integrator: Integrator) -> float:
-    """What it should be: −gTh/2 where velocities are stepped first, nothing with RK4."""
+    """The error in theory: −gTh/2 where velocities are stepped first, nothing with RK4."""
     return 0.0 if integrator is Integrator.RK4 else -PARABOLA.gravity * 1.0 * _STEP / 2
 
 

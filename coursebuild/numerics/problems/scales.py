@@ -29,7 +29,7 @@ from coursebuild.numerics.problems.common import (
     motion_without_attitude,
     run_steps,
 )
-from coursebuild.numerics.problems.tops import FreeTop, free_body, known_turn, turning
+from coursebuild.numerics.problems.tops import FreeTop, free_body, spinning, top_reference
 
 FAR, CRAWL = 1e9, 1e-3
 """m and m/s."""
@@ -58,42 +58,42 @@ def _axial_moment(_: Integrator) -> float:
     return float(mujoco.MjModel.from_xml_string(balanced).body_inertia[1, 2])
 
 
-def sunk(integrator: Integrator) -> float:
-    """How deep the resting cube lies in the floor, relative to its edge, after 1 s at 1 ms."""
+def relative_depth(integrator: Integrator) -> float:
+    """The depth of the resting cube in the floor, relative to its edge, after 1 s at 1 ms."""
     data = run_steps(RESTING, Scenario(1.0, 0.1), integrator, 1e-3, 1000)
     return float((0.0005 - data.qpos[2]) / 0.001)
 
 
-def crawled(integrator: Integrator, timestep: float) -> float:
-    """How far the distant body went in a second, m."""
+def distance_crawled(integrator: Integrator, timestep: float) -> float:
+    """The distance that the distant body covers in a second, m."""
     data = run_steps(DISTANT, _FAR_AWAY, integrator, timestep, round(1.0 / timestep))
     return float(data.qpos[0] - FAR)
 
 
 class UniformMotion(Struct, frozen=True):
-    """Of a slide."""
+    """The uniform motion of a slide."""
 
     begin: float
     speed: float
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         place = self.begin + self.speed * times[:, None]
         return motion_without_attitude(times, place, np.full((len(times), 1), self.speed))
 
 
 def problems() -> tuple[Problem, ...]:
     """The cube, the distant body and the plate."""
-    return (_cube(), _distant(), _plate())
+    return (_cube_problem(), _distant_problem(), _plate_problem())
 
 
-def _cube() -> Problem:
+def _cube_problem() -> Problem:
     return Problem(
         name="millimetre-cube",
         title="Cube of 1 mm",
         case=13,
         mjcf=CUBE,
-        scenario=turning(3.0, 4.0, 12.0),
+        scenario=spinning(3.0, 4.0, 12.0),
         position_bound=1.5,
         velocity_bound=100.0,
         reference=Reference("closed", "a steady turn", FreeTop(1.0, 1.0, (3.0, 4.0, 12.0))),
@@ -103,7 +103,7 @@ def _cube() -> Problem:
                 "how deep it rests in the floor, in edges",
                 "",
                 0.0,
-                sunk,
+                relative_depth,
                 "rigid bodies do not sink",
             ),
         ),
@@ -113,7 +113,7 @@ def _cube() -> Problem:
     )
 
 
-def _distant() -> Problem:
+def _distant_problem() -> Problem:
     spacing = math.ulp(FAR)
     return Problem(
         name="distant-body",
@@ -131,7 +131,7 @@ def _distant() -> Problem:
                 f"distance gone in 1 s at 1 mm/s, {timestep:g} s a step",
                 "m",
                 CRAWL,
-                lambda integrator, timestep=timestep: crawled(integrator, timestep),  # type: ignore[misc]
+                lambda integrator, timestep=timestep: distance_crawled(integrator, timestep),  # type: ignore[misc]
                 "a uniform motion",
                 (Integrator.EULER, Integrator.RK4),
             )
@@ -142,16 +142,16 @@ def _distant() -> Problem:
     )
 
 
-def _plate() -> Problem:
+def _plate_problem() -> Problem:
     return Problem(
         name="flat-plate",
         title="Flat plate, A + B = C",
         case=13,
         mjcf=free_body("0.08333333333333333 0.08333333333333333 0.16666666666666666"),
-        scenario=turning(1.0, 2.0, 3.0),
+        scenario=spinning(1.0, 2.0, 3.0),
         position_bound=1.5,
         velocity_bound=100.0,
-        reference=known_turn(FreeTop(1 / 12, 1 / 6, (1.0, 2.0, 3.0))),
+        reference=top_reference(FreeTop(1 / 12, 1 / 6, (1.0, 2.0, 3.0))),
         timesteps=divisions(0.05, 5, 10, 20, 40, 80),
         checks=(
             ScalarCheck(

@@ -37,8 +37,8 @@ _RESTS = {
     1e3: (-1.5711696e-03, -3.1423392e-03),
     1e4: (-1.56975696e-02, -3.13951392e-02),
 }
-"""Where the balls rest by that mass, m: the scenarios begin there."""
-_SETTLED = 3.0
+"""By that mass, where the balls rest, m: the scenarios begin there."""
+_SETTLING = 3.0
 
 
 def mjcf(ratio: float) -> str:
@@ -55,7 +55,7 @@ def mjcf(ratio: float) -> str:
 
 
 class RestingStack(Struct, frozen=True):
-    """As deep as its contacts give way."""
+    """A stack at rest, sunk as deep as its contacts give way."""
 
     upper: float
     lower: float = 1.0
@@ -65,22 +65,22 @@ class RestingStack(Struct, frozen=True):
 
     @property
     def depths(self) -> Array:
-        """Of the lower and the upper contact, (2,) m."""
+        """The depths of the lower and the upper contact, (2,) m."""
         forces = self.gravity * np.array([self.lower + self.upper, self.upper])
         inverse = np.array([1 / self.lower, 1 / self.lower + 1 / self.upper])
-        found: Array = forces * inverse * (1 - self.impedance) * self.timeconst**2
-        return found
+        depths: Array = forces * inverse * (1 - self.impedance) * self.timeconst**2
+        return depths
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         still = np.zeros((len(times), 2))
         return motion_without_attitude(times, still - np.cumsum(self.depths), still)
 
 
-def _settled(integrator: Integrator, ratio: float) -> Any:
+def _settle(integrator: Integrator, ratio: float) -> Any:
     """`mjData` of the stack, let go without overlap and left to itself for a while."""
     scenario = Scenario(1.0, 0.1, (0.0, 0.0))
-    return run_steps(mjcf(ratio), scenario, integrator, 1e-3, round(_SETTLED / 1e-3))
+    return run_steps(mjcf(ratio), scenario, integrator, 1e-3, round(_SETTLING / 1e-3))
 
 
 def problems() -> tuple[Problem, ...]:
@@ -89,8 +89,8 @@ def problems() -> tuple[Problem, ...]:
 
 
 def _problem(ratio: float) -> Problem:
-    known = RestingStack(ratio)
-    depth = known.depths.sum()
+    solution = RestingStack(ratio)
+    depth = solution.depths.sum()
     return Problem(
         name=f"stack-{ratio:g}",
         title=f"Stack of 1 kg under {ratio:g} kg",
@@ -99,23 +99,23 @@ def _problem(ratio: float) -> Problem:
         scenario=Scenario(0.2, 0.002, _RESTS[ratio]),
         position_bound=1.0,
         velocity_bound=10.0,
-        reference=Reference("closed", "r = f (1 − d) Â/(k d²)", known),
+        reference=Reference("closed", "r = f (1 − d) Â/(k d²)", solution),
         precision=Sizes(1e-13, 0.0, 1e-11),
         timesteps=(2e-3, 1e-3, 5e-4),
         checks=(
             ScalarCheck(
-                f"how far the upper body sinks, let go without overlap, {_SETTLED:g} s at 1 ms",
+                f"how far the upper body sinks, let go without overlap, {_SETTLING:g} s at 1 ms",
                 "m",
                 float(depth),
                 # Contacts would not say it of balls that passed each other.
-                lambda integrator: float(-_settled(integrator, ratio).qpos[1]),
+                lambda integrator: float(-_settle(integrator, ratio).qpos[1]),
                 "r = f (1 − d) Â/(k d²), both contacts",
             ),
             ScalarCheck(
                 "velocity that is left then",
                 "m/s",
                 0.0,
-                lambda integrator: float(np.max(np.abs(_settled(integrator, ratio).qvel))),
+                lambda integrator: float(np.max(np.abs(_settle(integrator, ratio).qvel))),
                 "at rest",
             ),
         ),

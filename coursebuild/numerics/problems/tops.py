@@ -48,7 +48,7 @@ _Y, _Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 def problems() -> tuple[Problem, ...]:
     """The free ones, and the heavy top."""
-    return (*(_free(name) for name in TOPS), _heavy())
+    return (*(_free_problem(name) for name in TOPS), _heavy_problem())
 
 
 class FreeTop(Struct, frozen=True):
@@ -79,8 +79,8 @@ class FreeTop(Struct, frozen=True):
         omega = np.stack([x * cosine - y * sine, x * sine + y * cosine, np.full_like(turn, z)], 1)
         momentum = self.inertia * np.array(self.omega)
         size = float(np.linalg.norm(momentum))
-        about = axis_angle_to_quat(momentum, size / self.transverse * times)
-        return turning_at_rest(times, quat_mul(about, axis_angle_to_quat(_Z, -turn)), omega)
+        precession = axis_angle_to_quat(momentum, size / self.transverse * times)
+        return turning_at_rest(times, quat_mul(precession, axis_angle_to_quat(_Z, -turn)), omega)
 
 
 def free_body(moments: str) -> str:
@@ -89,12 +89,12 @@ def free_body(moments: str) -> str:
     return model_text(f"    <body><freejoint/>{inertial}</body>", NO_GRAVITY, NO_CONTACT)
 
 
-def turning(x: float, y: float, z: float) -> Scenario:
+def spinning(x: float, y: float, z: float) -> Scenario:
     """A second of a free body with this angular velocity, rad/s."""
     return Scenario(1.0, 0.05, qvel=(0.0, 0.0, 0.0, x, y, z))
 
 
-def known_turn(top: FreeTop) -> Reference:
+def top_reference(top: FreeTop) -> Reference:
     """The closed form as a reference."""
     return Reference("closed", "Goldstein, 5.6", top)
 
@@ -104,16 +104,16 @@ TOPS = {
     "thin-rod": FreeTop(0.01, 1e-6, (1.0, 0.0, 20.0)),
     "coin": FreeTop(1.0e-6, 1.999e-6, (1.0, 0.0, 20.0)),
 }
-_FREE = {
-    "free-top": ("Symmetric top, free", free_body("0.02 0.02 0.03"), turning(1.0, 0.0, 40.0)),
-    "thin-rod": ("Thin rod, free", free_body("0.01 0.01 1e-6"), turning(1.0, 0.0, 20.0)),
-    "coin": ("Coin, free", free_body("1e-6 1e-6 1.999e-6"), turning(1.0, 0.0, 20.0)),
+_FREE_BODIES = {
+    "free-top": ("Symmetric top, free", free_body("0.02 0.02 0.03"), spinning(1.0, 0.0, 40.0)),
+    "thin-rod": ("Thin rod, free", free_body("0.01 0.01 1e-6"), spinning(1.0, 0.0, 20.0)),
+    "coin": ("Coin, free", free_body("1e-6 1e-6 1.999e-6"), spinning(1.0, 0.0, 20.0)),
 }
 """Titles, models and scenarios."""
 
 
 def transverse_growth(integrator: Integrator, z: float) -> float:
-    """By what a step multiplies the transverse angular velocity, z = hΩ."""
+    """The factor by which a step multiplies the transverse angular velocity, z = hΩ."""
     match integrator:
         case Integrator.EULER | Integrator.EULER_EXPLICIT:
             return math.hypot(1.0, z)
@@ -134,9 +134,9 @@ def _limit(top: FreeTop, integrator: Integrator) -> Limit:
 
 
 def measured_growth(name: str, integrator: Integrator, z: float) -> float:
-    """The mean growth over some steps, by which the first and the last velocity differ."""
+    """The mean growth in a step, from the first and the last velocity of some steps."""
     top = TOPS[name]
-    _, mjcf, scenario = _FREE[name]
+    _, mjcf, scenario = _FREE_BODIES[name]
     data = run_steps(mjcf, scenario, integrator, z / abs(top.rate), _STEPS)
     first = math.hypot(*top.omega[:2])
     return float((math.hypot(data.qvel[3], data.qvel[4]) / first) ** (1 / _STEPS))
@@ -152,9 +152,9 @@ def _growth(name: str, z: float) -> ScalarCheck:
     )
 
 
-def _free(name: str) -> Problem:
+def _free_problem(name: str) -> Problem:
     top = TOPS[name]
-    title, mjcf, scenario = _FREE[name]
+    title, mjcf, scenario = _FREE_BODIES[name]
     return Problem(
         name=name,
         title=title,
@@ -163,7 +163,7 @@ def _free(name: str) -> Problem:
         scenario=scenario,
         position_bound=1.5,
         velocity_bound=10 * abs(top.omega[2]),
-        reference=known_turn(top),
+        reference=top_reference(top),
         timesteps=divisions(0.05, 40, 60, 80, 120, 160, 320, 640, 1280),
         checks=tuple(_growth(name, z) for z in (0.03, 0.1, 0.3)),
         limit=lambda integrator: _limit(top, integrator),
@@ -217,25 +217,25 @@ class HeavyTop(Struct, frozen=True):
         return rate
 
     def motion(self, times: Array) -> Motion:
-        """At the times (n,) s."""
+        """The motion at the times (n,) s."""
         _, u0, _, rate, _ = self._terms()
         fallen, sinking = self._fall(times)
         u = u0 - fallen
         sine = np.sqrt(1 - u * u)
-        around = self._precession_rate(times)
+        precession_rate = self._precession_rate(times)
         precession = cumulative_integral(self._precession_rate, times, 0.3 / rate)
-        own = self.spin * times - cumulative_integral(
+        spin_angle = self.spin * times - cumulative_integral(
             lambda at: self._precession_rate(at) * (u0 - self._fall(at)[0]), times, 0.3 / rate
         )
         tilted = quat_mul(
             axis_angle_to_quat(_Z, precession), axis_angle_to_quat(_Y, np.arctan2(sine, u))
         )
-        attitude = quat_mul(tilted, axis_angle_to_quat(_Z, own))
+        attitude = quat_mul(tilted, axis_angle_to_quat(_Z, spin_angle))
         nod = sinking / sine
         omega = np.stack(
             [
-                -around * sine * np.cos(own) + nod * np.sin(own),
-                around * sine * np.sin(own) + nod * np.cos(own),
+                -precession_rate * sine * np.cos(spin_angle) + nod * np.sin(spin_angle),
+                precession_rate * sine * np.sin(spin_angle) + nod * np.cos(spin_angle),
                 np.full_like(times, self.spin),
             ],
             axis=1,
@@ -246,17 +246,17 @@ class HeavyTop(Struct, frozen=True):
 _TOP = HeavyTop(gravity=9.81, mass=0.5, height=0.06, axial=4e-4, central=3e-4, spin=250.0, tilt=0.5)
 
 
-def _heavy() -> Problem:
+def _heavy_problem() -> Problem:
     """Half a second of the top."""
     inertial = '<inertial pos="0 0 0.06" mass="0.5" diaginertia="3e-4 3e-4 4e-4"/>'
     world = f'    <body><joint type="ball"/>{inertial}</body>'
-    turned = (0.9689124217106447, 0.0, 0.24740395925452294, 0.0)
+    quaternion = (0.9689124217106447, 0.0, 0.24740395925452294, 0.0)
     return Problem(
         name="heavy-top",
         title="Heavy top on a ball joint, 250 rad/s",
         case=3,
         mjcf=model_text(world, 'gravity="0 0 -9.81"', NO_CONTACT),
-        scenario=Scenario(0.5, 0.02, turned, (0.0, 0.0, 250.0)),
+        scenario=Scenario(0.5, 0.02, quaternion, (0.0, 0.0, 250.0)),
         position_bound=1.5,
         velocity_bound=1000.0,
         reference=Reference("closed", "Lagrange's top, Goldstein, 5.7, with quadratures", _TOP),

@@ -122,16 +122,16 @@ class Tumbling(Struct, frozen=True):
         Two triads of the same three directions, in both frames: L, L × e₁ and their product.
         """
         i = self.moments
-        along = self.omega(times) * i
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
-        across = np.cross(along, np.array([1.0, 0.0, 0.0]))
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        body = np.stack([along, across, np.cross(along, across)], axis=2)
-        z = np.broadcast_to(np.array([0.0, 0.0, 1.0]), along.shape)
+        momentum_axis = self.omega(times) * i
+        momentum_axis /= np.linalg.norm(momentum_axis, axis=1, keepdims=True)
+        normal = np.cross(momentum_axis, np.array([1.0, 0.0, 0.0]))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        body = np.stack([momentum_axis, normal, np.cross(momentum_axis, normal)], axis=2)
+        z = np.broadcast_to(np.array([0.0, 0.0, 1.0]), momentum_axis.shape)
         node = np.stack([-np.sin(angles), np.cos(angles), np.zeros_like(angles)], axis=1)
         world = np.stack([z, node, np.cross(z, node)], axis=2)
-        turned: Array = world @ np.swapaxes(body, 1, 2)
-        return turned
+        rotations: Array = world @ np.swapaxes(body, 1, 2)
+        return rotations
 
     def _precession(self, times: Array) -> Array:
         """How far the axis of the least moment has gone about L (n,), rad: Gauss's quadrature.
@@ -143,13 +143,13 @@ class Tumbling(Struct, frozen=True):
         def speed(at: Array) -> Array:
             omega = self.omega(at)
             second, third = i2 * omega[:, 1] ** 2, i3 * omega[:, 2] ** 2
-            found: Array = self.momentum * (second + third) / (i2 * second + i3 * third)
-            return found
+            rates: Array = self.momentum * (second + third) / (i2 * second + i3 * third)
+            return rates
 
         return cumulative_integral(speed, times, 0.5 / self.rate)
 
     def motion(self, times: Array) -> Motion:
-        """Everything, at the times (n,) in s."""
+        """The motion at the times (n,) s."""
         return turning_at_rest(times, self.attitude(times), self.omega(times))
 
 
@@ -158,9 +158,9 @@ def measured_crossing(integrator: Integrator, nudge: float) -> float:
     from scipy.interpolate import CubicHermiteSpline
     from scipy.optimize import brentq
 
-    one, timestep = _begun_with(nudge), 2e-3
-    model = compile_model(one.mjcf, integrator, timestep)
-    data = initial_data(one.scenario, model)
+    nudged, timestep = _with_nudge(nudge), 2e-3
+    model = compile_model(nudged.mjcf, integrator, timestep)
+    data = initial_data(nudged.scenario, model)
     mujoco.mj_forward(model, data)
     before, slope = float(data.qvel[4]), float(data.qacc[4])
     for step in range(round(4 * Tumbling(nudge).first_crossing / timestep)):
@@ -180,17 +180,17 @@ def kinetic_drift(integrator: Integrator) -> float:
 
     The last states after some flips depend on the last digit of the first one; this does not.
     """
-    one = _begun_with(1e-3)
-    data = run_steps(one.mjcf, one.scenario, integrator, 2e-3, 10_000)
+    nudged = _with_nudge(1e-3)
+    data = run_steps(nudged.mjcf, nudged.scenario, integrator, 2e-3, 10_000)
     inertia = Tumbling(1e-3).moments
     final = float(inertia @ np.array(data.qvel[3:]) ** 2)
-    first = float(inertia @ np.array(one.scenario.qvel[3:]) ** 2)
+    first = float(inertia @ np.array(nudged.scenario.qvel[3:]) ** 2)
     return 100 * (final / first - 1)
 
 
-def _begun_with(nudge: float) -> Problem:
-    one = problem()
-    return replace(one, scenario=replace(one.scenario, qvel=(0, 0, 0, nudge, SPIN, 0)))
+def _with_nudge(nudge: float) -> Problem:
+    base = problem()
+    return replace(base, scenario=replace(base.scenario, qvel=(0, 0, 0, nudge, SPIN, 0)))
 
 
 def problem() -> Problem:
@@ -221,7 +221,7 @@ def problem() -> Problem:
                 kinetic_drift,
                 "no torque acts",
             ),
-            *(_flip(one) for one in NUDGES),
+            *(_flip(nudge) for nudge in NUDGES),
         ),
         search=(1e-4, 1.0),
         span=100.0,

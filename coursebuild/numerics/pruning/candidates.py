@@ -252,16 +252,16 @@ def far_bodies(
     bodies; where there are none, about those with names. Where all are alike none is far.
     """
     model, tree = text.model, text.model.body_treeid
-    needed = {name for inner in text.elements for name in _references(inner, code_names)}
-    needed |= set(code_names)
-    needed |= {name.rstrip("0123456789") for name in needed}  # what is repeated has a number
+    used_names = {name for inner in text.elements for name in _references(inner, code_names)}
+    used_names |= set(code_names)
+    used_names |= {name.rstrip("0123456789") for name in needed}  # what is repeated has a number
     ranks = dict.fromkeys(_moving_trees(model, runs), 3)
     roots: dict[Element, list[int]] = {}
     for element, ids in text.things("body"):
         names = {inner.get("name") for inner in element.walk()} - {None, ""}
         for number in {int(tree[i]) for i in ids} - {-1}:
             is_free_body = model.tree_bodynum[number] == 1 and model.tree_dofnum[number] == 6
-            rank = 3 if names & needed else 0 if is_free_body else 2
+            rank = 3 if names & used_names else 0 if is_free_body else 2
             ranks[number] = max(rank, ranks.get(number, 0), 1 if element.get("name") else 0)
             if int(model.tree_bodyadr[number]) in ids:
                 roots.setdefault(element, []).append(number)
