@@ -39,7 +39,7 @@ from coursebuild.core.syntax.wording import (
     format_name,
     format_value,
     type_help,
-    wrong_type,
+    wrong_type_message,
 )
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
@@ -103,10 +103,12 @@ class _Decoder:
         self.diagnostics.append(diagnose(rule, span, message, help=help))
         return _FAILED
 
-    def wrong_type(self, node: Node, type: inspect.Type, name: str, help: str = "") -> object:
+    def report_wrong_type(
+        self, node: Node, type: inspect.Type, name: str, help: str = ""
+    ) -> object:
         if isinstance(node, ErrorNode):  # the parser has reported it
             return _FAILED
-        message = wrong_type(node, name, type, self.format)
+        message = wrong_type_message(node, name, type, self.format)
         help = help or type_help(node, type) or _field_help(name, type)
         return self.report("field-type", node.mark, message, help)
 
@@ -115,7 +117,7 @@ class _Decoder:
     ) -> object:
         """The value of a node of a declared type; `remarks` are the `extra` of its `Meta`."""
         if not accepts(type, node):
-            return self.wrong_type(node, type, name)
+            return self.report_wrong_type(node, type, name)
         match type, node:
             case inspect.Metadata(), _:
                 return self.decode_value(node, type.type, name, type.extra or _NO_REMARKS)
@@ -271,7 +273,9 @@ class _Decoder:
         if tag_node is None:
             return self.decode_untagged(node, tag, variants)
         if not isinstance(tag_node, StringNode):
-            return self.wrong_type(tag_node, inspect.StrType(), tag, did_you_mean("", variants))
+            return self.report_wrong_type(
+                tag_node, inspect.StrType(), tag, did_you_mean("", variants)
+            )
         if tag_node.value in variants:
             return self.decode_struct(node, variants[tag_node.value], variants)
         message = f"{format_name(tag)} cannot be {format_value(tag_node)}"

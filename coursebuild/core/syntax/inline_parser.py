@@ -132,7 +132,7 @@ def _term(state: StateInline, silent: bool) -> bool:
     if silent:
         return False
     assert isinstance(state, InlineState)
-    if state.pos > state.last_braced:
+    if state.pos > state.last_attribute:
         return False
     start, limit = state.pos, state.posMax
     end = parseLinkLabel(state, start)
@@ -272,7 +272,7 @@ def _set_places(state: StateInline, first_token: int, start: int) -> None:
         else:
             token.start, token.end = cursor, cursor + len(token.content)
             cursor = token.end
-    state.mark = end
+    state.text_start = end
 
 
 def _build_parser(rules: InlineRules, stop: re.Pattern[str]) -> MarkdownIt:

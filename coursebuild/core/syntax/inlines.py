@@ -53,7 +53,7 @@ from coursebuild.core.syntax.markdown import References
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken
-from coursebuild.core.syntax.unread_markup import unread_markup
+from coursebuild.core.syntax.unread_markup import check_unread_markup
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -133,7 +133,7 @@ class _TokenReader:
             else:
                 self._add_leaf(token)
         self._flush()
-        for diagnostic in unread_markup(self.content, self.texts):
+        for diagnostic in check_unread_markup(self.content, self.texts):
             self.reader.report(diagnostic)
         return tuple(self.stack[0].nodes)
 

@@ -1,8 +1,8 @@
 """Python blocks: scripts that are extracted and run, and code that is only shown.
 
-Entry point: `parse_python`. Keys: `file`, `timeout`, `requires`, `args`, `figure`, `norun`,
-`diverges`, `writes` of a script; `fragment` of code that need not parse; `show` of code that is
-that of a file.
+Entry point: `parse_python`. Keys of a script: `file`, `timeout`, `requires`, `args`, `figure`,
+`norun`, `diverges`, `deep`, `writes`, `record`. Code that is only shown may have `fragment`, if it
+need not parse, or `show`, if it is copied from a file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from coursebuild.core.text.source import Excerpt
 
 DEFAULT_TIMEOUT = 60.0
 """Seconds."""
-LONGEST_TIMEOUT = 86400.0
+MAX_TIMEOUT = 86400.0
 """Seconds."""
 
 _VALUES = ("timeout", "requires", "args", "writes", "record", "figure")
@@ -31,19 +31,19 @@ _FLAGS = ("norun", "diverges", "deep")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
 _UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
-_SHADOWED = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - {
+_UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - {
     "code",
     "test",
     "this",
 }
 _PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
-_OURS = ("content", "models", "examples", "features", "public")
+_RESERVED_FOLDERS = ("content", "models", "examples", "features", "public")
 _FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCII)
-_ON_LINE = re.compile(r"\b(on|at) line ([0-9]+)")
+_LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
 def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
-    """A `python` fence: a `Script` where it has a proper `file=`, else `PlainCode`."""
+    """A `python` fence: a `Script` if it has a valid `file=`, else `PlainCode`."""
     keys = fence.keys(values=("file", "show", *_VALUES), flags=(*_FLAGS, "fragment"))
     diagnostics = list(keys.diagnostics)
     file, fragment = keys.value.get("file"), keys.value.get("fragment")
@@ -62,14 +62,14 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
         message = "a block shows a part of a file, or it is a script or a fragment of its own"
         diagnostics.append(diagnose("fence-key-value", show.span, message))
     elif show is None and (fragment is None or has_file):
-        diagnostics += _syntax_mistake(fence.body, script=has_file)
-    script = None if file is None else _script(fence, file, keys.value, diagnostics)
-    source = None if show is None or has_file else _source_part(fence, show, diagnostics)
+        diagnostics += _check_syntax(fence.body, script=has_file)
+    script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
+    source = None if show is None or has_file else _read_source_part(fence, show, diagnostics)
     code = PlainCode(fence.span, fence.body, fragment is not None and file is None, source)
     return Parsed(script or code, tuple(diagnostics))
 
 
-def _source_part(fence: Fence, show: Word, diagnostics: list[Diagnostic]) -> SourcePart | None:
+def _read_source_part(fence: Fence, show: Word, diagnostics: list[Diagnostic]) -> SourcePart | None:
     path, _, part = (show.value or "").partition("#")
     if _PATH.fullmatch(path) and not fence.nested:
         return SourcePart(path, part, show.value_span, fence.body_span, fence.prefix)
@@ -81,27 +81,27 @@ def _source_part(fence: Fence, show: Word, diagnostics: list[Diagnostic]) -> Sou
     return None
 
 
-def _script(
+def _build_script(
     fence: Fence, file: Word, keys: FenceKeys, diagnostics: list[Diagnostic]
 ) -> Script | None:
     path = file.value or ""
-    wrong, help = path_mistake(path), "a script is written to `examples/`, for example "
+    mistake, help = path_mistake(path), "a script is written to `examples/`, for example "
     help += "`examples/l4_2_inertia.py`"
     if fence.nested:
-        wrong, help = "a text of a quiz or lab cannot hold a script", ""
-    if wrong:
-        diagnostics.append(diagnose("script-path", file.value_span, wrong, help=help))
-    timeout = _timeout(keys.get("timeout"), diagnostics)
-    requires = _modules(keys.get("requires"), diagnostics)
-    args = _arguments(keys.get("args"), diagnostics)
-    writes = _folders(keys.get("writes"), diagnostics)
+        mistake, help = "a text of a quiz or lab cannot hold a script", ""
+    if mistake:
+        diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
+    timeout = _read_timeout(keys.get("timeout"), diagnostics)
+    requires = _read_modules(keys.get("requires"), diagnostics)
+    args = _read_arguments(keys.get("args"), diagnostics)
+    writes = _read_folders(keys.get("writes"), diagnostics)
     record = keys.get("record")
     if record is not None and record.value != "once":
         message = f"`{record.value}` is not a way to record"
         help = "write `record=once`"
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
-    figures = tuple(_figures(keys.get("figure"), diagnostics))
-    if wrong:
+    figures = tuple(_read_figures(keys.get("figure"), diagnostics))
+    if mistake:
         return None
     return Script(
         fence.span,
@@ -124,26 +124,26 @@ def _script(
 
 def _with_line_end(body: Excerpt) -> Excerpt:
     """The text with exactly one final line end."""
-    kept = body.text.rstrip("\n")
-    if len(kept) < len(body.text):
-        return body.slice(0, len(kept) + 1)
-    return Excerpt(body.source, kept + "\n", body.pieces)
+    text = body.text.rstrip("\n")
+    if len(text) < len(body.text):
+        return body.slice(0, len(text) + 1)
+    return Excerpt(body.source, text + "\n", body.pieces)
 
 
-def _timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
+def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
     if word is None or word.value is None:
         return DEFAULT_TIMEOUT
     seconds = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
-    if 0 < seconds <= LONGEST_TIMEOUT:
+    if 0 < seconds <= MAX_TIMEOUT:
         return seconds
     message = f"`{word.value}` is not a number of seconds above 0"
-    if seconds > LONGEST_TIMEOUT:
+    if seconds > MAX_TIMEOUT:
         message = f"`{word.value}` s is more than a day"
     diagnostics.append(diagnose("fence-key-value", word.value_span, message))
     return DEFAULT_TIMEOUT
 
 
-def _figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[FigureName]:
+def _read_figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[FigureName]:
     for name in () if word is None else word.parts():
         if _FIGURE.fullmatch(name.text):
             yield FigureName(name.text, name.span())
@@ -154,7 +154,7 @@ def _figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[Figur
             diagnostics.append(diagnose("fence-key-value", name.span(), message, help=help))
 
 
-def _modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
+def _read_modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
     if word is None:
         return ()
     modules: dict[str, None] = {}
@@ -172,7 +172,7 @@ def _modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...
     return tuple(modules)
 
 
-def _arguments(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
+def _read_arguments(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
     if word is None or word.value is None:
         return ()
     try:
@@ -183,12 +183,12 @@ def _arguments(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, .
         return ()
 
 
-def _folders(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
+def _read_folders(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
     folders = []
     for part in () if word is None else word.parts():
         folder = part.text.rstrip("/")
         first = folder.partition("/")[0]
-        if _PATH.fullmatch(folder) and first not in _OURS:
+        if _PATH.fullmatch(folder) and first not in _RESERVED_FOLDERS:
             folders.append(folder)
             continue
         message = f"`{part.text}` is not a folder that a script may write into"
@@ -198,7 +198,7 @@ def _folders(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...
 
 
 def path_mistake(path: str) -> str:
-    """Why a script cannot have this path; empty where it can."""
+    """Why a script cannot have this path; empty if it can."""
     parts = path.split("/")
     stem = parts[-1].removesuffix(".py")
     if any(ord(char) < 32 or ord(char) == 127 for char in path):
@@ -219,15 +219,15 @@ def path_mistake(path: str) -> str:
         return f"`{path}` has a character that not every file system takes"
     if any(len(part.encode()) > 255 for part in parts):
         return "a part of the path is longer than 255 bytes"
-    if reserved := next((part for part in parts if _DEVICE.fullmatch(part)), None):
-        return f"`{reserved}` is a reserved name on some systems"
-    if stem in _SHADOWED:
+    if device := next((part for part in parts if _DEVICE.fullmatch(part)), None):
+        return f"`{device}` is a reserved name on some systems"
+    if stem in _UNUSABLE_NAMES:
         return f"`{path}` would be imported in place of the module `{stem}` by its neighbours"
     return ""
 
 
-def _syntax_mistake(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
-    """Where and why a piece of Python does not parse, if it does not."""
+def _check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
+    """Report where and why a piece of Python does not parse, if it does not."""
     error = _compile_error(code.text)
     if error is None:
         return
@@ -236,23 +236,24 @@ def _syntax_mistake(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
     row = rows[line - 1]
     start = min(max((error.offset or 1) - 1, 0), len(row.text))
     indentation = len(row.text) - len(row.text.lstrip())
-    start = max(start, indentation)  # python may point into the white space before the code
+    start = max(start, indentation)  # Python may point into the white space before the code
     end = len(row.text)
     if error.end_lineno in (None, error.lineno):
         end = max((error.end_offset or 0) - 1, 0)
     end = max(start, min(max(end, start + 1), len(row.text)))
 
-    def lesson_line(found: re.Match[str]) -> str:
-        return f"{found[1]} line {rows[int(found[2]) - 1].span().line}"
+    def lesson_line(match: re.Match[str]) -> str:
+        return f"{match[1]} line {rows[int(match[2]) - 1].span().line}"
 
-    message, _, help = _ON_LINE.sub(lesson_line, error.msg).partition(". ")
+    message, _, help = _LINE_REFERENCE.sub(lesson_line, error.msg).partition(". ")
     if not help and not script:
         help = "write `fragment` after `python` if it is not meant to be complete"
-    yield diagnose("python-syntax", row.span(start, end), _lower(message), help=_lower(help))
+    message, help = _lower_first(message), _lower_first(help)
+    yield diagnose("python-syntax", row.span(start, end), message, help=help)
 
 
-def _lower(sentence: str) -> str:
-    """A sentence of Python's as part of ours."""
+def _lower_first(sentence: str) -> str:
+    """A sentence of Python as part of ours: without its capital, unless that is a name."""
     if sentence[1:2].islower():
         return sentence[:1].lower() + sentence[1:]
     return sentence
@@ -260,7 +261,7 @@ def _lower(sentence: str) -> str:
 
 @lru_cache(maxsize=64)
 def _compile_error(code: str) -> SyntaxError | None:
-    """The first thing that Python has against a text; remembered, while others are written."""
+    """The first error of Python in a text; kept, as a preview parses unchanged blocks again."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -269,7 +270,7 @@ def _compile_error(code: str) -> SyntaxError | None:
         return error.with_traceback(None)
     except (ValueError, MemoryError, RecursionError, OverflowError) as error:
         message = f"the code cannot be compiled: {error}"
-        found = SyntaxError(message if str(error) else "the code is nested too deeply")
-        found.end_offset = 1
-        return found
+        syntax_error = SyntaxError(message if str(error) else "the code is nested too deeply")
+        syntax_error.end_offset = 1
+        return syntax_error
     return None

@@ -1,13 +1,13 @@
-"""Where markdown-it's tokens stand: tokens, parser states and excerpts that keep positions.
+"""Tokens and parser states of markdown-it that keep positions.
 
 Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are
 `PositionedToken`s), `locate` (content rows into an `Excerpt`).
 
-1. Block rules cut lines out of the text by `getLines`; `BlockState` notes where each of those rows
-   began.
-2. `locate` joins such rows of what was parsed, a whole file or a text in JSON, to an excerpt.
-3. Inline rules work on one block's content; `InlineState` notes from where to where each token
-   reaches in it.
+1. Block rules cut lines out of the text by `getLines`; `BlockState` keeps the position of each of
+   these rows.
+2. `locate` joins such rows of the parsed text, a whole file or a text in JSON, to an excerpt.
+3. Inline rules work on one block's content; `InlineState` keeps the start and the end of each token
+   in it.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from coursebuild.core.text.source import Excerpt, Source
 
 
 class SourceSlice(NamedTuple):
-    """The stretch `[start, end)` of the parsed text, which became part of a block's content."""
+    """The part `[start, end)` of the parsed text, which belongs to a block's content."""
 
     start: int
     end: int
     padding: int = 0
-    """How many spaces stand before it, for a part of the tab before `start`."""
+    """How many spaces are put before it, in place of the rest of a tab before `start`."""
 
 
 @dataclass(slots=True)
@@ -43,20 +43,20 @@ class PositionedToken(Token):
     start: int = -1
     end: int = -1
     rows: Sequence[SourceSlice] = ()
-    """What a block's content was made of, a row a line."""
+    """The rows of a block's content, one for each line."""
 
 
 class BlockState(StateBlock):
-    """The state of the block rules; notes the rows that the last rule cut out."""
+    """The state of the block rules; `rows` are those that the last rule cut out."""
 
     def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
         super().__init__(src, md, env, [])
         self.rows: Sequence[SourceSlice] = ()
         self.lines_left = 0
-        """How many lines containers may still read."""
+        """How many more lines containers may read."""
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
-        """Add a token; that of an item of a list, which has no rule of its own, gets its place."""
+        """Add a token; give its place to a list item, which has no rule that could do so."""
         if nesting < 0:
             self.level -= 1
         token = PositionedToken(ttype, tag, nesting, level=self.level, block=True)
@@ -78,12 +78,12 @@ class BlockState(StateBlock):
         src, first = self.src, self.bMarks[line]
         last = self.eMarks[line] + 1 if line_end else self.eMarks[line]
         shift = self.tShift[line]
-        begin, column = first, 0
+        start, column = first, 0
         while column < indent and first < last:
             char = src[first] if first < len(src) else ""
             if char == "\t":
                 column += 4 - (column + self.bsCount[line]) % 4
-            elif char == " " or first - begin < shift:
+            elif char == " " or first - start < shift:
                 column += 1
             else:
                 break
@@ -92,28 +92,28 @@ class BlockState(StateBlock):
 
 
 class InlineState(StateInline):
-    """The state of the inline rules; `mark` is where the text that is not yet a token began."""
+    """The state of the inline rules; `text_start` is that of the text not yet in a token."""
 
     def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
         super().__init__(src, md, env, [])
-        self.mark = 0
-        self.last_bracket, self.last_braced = src.rfind("]"), src.rfind("]{")
-        """Where the last `]` and the last `]{` stand."""
+        self.text_start = 0
+        self.last_bracket, self.last_attribute = src.rfind("]"), src.rfind("]{")
+        """The offsets of the last `]` and the last `]{`."""
         self.last_runs: dict[int, int] = {}
-        """Where the last run of each number of backticks begins."""
+        """The offset of the last run of each number of backticks."""
         self.literal = ""
-        """In a text that is HTML: the open element in which a dollar is a dollar."""
+        """The open element of HTML in which a dollar is a dollar, or empty."""
 
     def pushPending(self) -> Token:  # noqa: N802
         """Make the pending text a token."""
         token = PositionedToken("text", "", 0, level=self.pendingLevel, content=self.pending)
-        token.start, token.end = self.mark, self.mark + len(self.pending)
+        token.start, token.end = self.text_start, self.text_start + len(self.pending)
         self.tokens.append(token)
         self.pending = ""
         return token
 
     def push(self, ttype: str, tag: str, nesting: Literal[-1, 0, 1]) -> Token:
-        """Add a token that begins here; the tokenizer sets its end when the rule is through."""
+        """Add a token that begins here; its end is set when the rule has finished."""
         if self.pending:
             self.pushPending()
         meta = None
@@ -126,7 +126,7 @@ class InlineState(StateInline):
             self._prev_delimiters.append(self.delimiters)
             self.delimiters = []
             meta = {"delimiters": self.delimiters}
-            self.mark = self.pos
+            self.text_start = self.pos
         self.pendingLevel = self.level
         self.tokens.append(token)
         self.tokens_meta.append(meta)
@@ -135,8 +135,8 @@ class InlineState(StateInline):
 
 def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
     """The rows joined, each character with its place in the source of `base`."""
-    follows = all(row.end == after.start for row, after in pairwise(rows))
-    if rows and follows and not any(row.padding for row in rows):  # as most are
+    is_contiguous = all(row.end == after.start for row, after in pairwise(rows))
+    if rows and is_contiguous and not any(row.padding for row in rows):  # the usual case
         return base.slice(rows[0].start, rows[-1].end)
     parts: list[Excerpt] = []
     for start, end, padding in rows:
@@ -148,12 +148,11 @@ def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
 
 def trim(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:
     """The excerpt without white space at its ends."""
-    given = excerpt.text
-    if not given or (given[0] not in chars and given[-1] not in chars):
+    text = excerpt.text
+    if not text or (text[0] not in chars and text[-1] not in chars):
         return excerpt
-    text = given.lstrip(chars)
-    lead = len(given) - len(text)
-    return excerpt.slice(lead, lead + len(text.rstrip(chars)))
+    start = len(text) - len(text.lstrip(chars))
+    return excerpt.slice(start, start + len(text.strip(chars)))
 
 
 def read_markdown(source: Source) -> Excerpt:
@@ -163,6 +162,6 @@ def read_markdown(source: Source) -> Excerpt:
 
 
 def normalize(excerpt: Excerpt) -> Excerpt:
-    """An excerpt with CommonMark's line ends and without NUL, each character where it was."""
+    """An excerpt with CommonMark's line ends and without NUL; no character changes its place."""
     text = excerpt.text.replace("\r\n", " \n").replace("\r", "\n").replace("\0", "\ufffd")
     return excerpt if text == excerpt.text else Excerpt(excerpt.source, text, excerpt.pieces)

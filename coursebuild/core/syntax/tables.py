@@ -1,7 +1,7 @@
 r"""Tables: rows and cells, each with its place.
 
-Entry point: `read_table`. markdown-it finds the tables and their rows; a row is split here, at each
-`|` that no backslash stands before, while `\|` is a `|` in the cell.
+Entry point: `read_table`. markdown-it finds the tables and their rows. A row is split here, at each
+`|` without a backslash before it; `\|` is a `|` in the cell.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def read_table(
     report: Callable[[Diagnostic], None],
 ) -> tuple[Table, int]:
     """The table whose opening token has the index `at`, and the index after its closing one."""
-    opened = tokens[at]
+    opening = tokens[at]
     align: list[Literal["left", "right", "center"] | None] = []
     rows: list[PositionedToken] = []
     while (token := tokens[at]).type != "table_close":
@@ -42,12 +42,12 @@ def read_table(
             rows.append(token)
         elif token.type == "th_open":
             align.append(_ALIGN.get(token.attrs.get("style")))
-    cells = [_cells(base, row, len(align), inlines, report) for row in rows]
-    span = base.span(opened.start, opened.end)
+    cells = [_read_cells(base, row, len(align), inlines, report) for row in rows]
+    span = base.span(opening.start, opening.end)
     return Table(span, tuple(align), cells[0], tuple(cells[1:])), at + 1
 
 
-def _cells(
+def _read_cells(
     base: Excerpt,
     row: PositionedToken,
     columns: int,
@@ -66,19 +66,22 @@ def _cells(
 
 
 def _split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
-    """The cells of the row that stands between two offsets of `base`."""
+    """The cells of the row between two offsets of `base`."""
     line = base.text[start:end]
     at = start + len(line) - len(line.lstrip(MD_TRIM_CHARS))
     end = start + len(line.rstrip(MD_TRIM_CHARS))
-    cells: list[list[Excerpt]] = [[]]
+    parts: list[list[Excerpt]] = [[]]
     for pipe in _PIPE.finditer(base.text, at, end):
-        cells[-1].append(base.slice(at, pipe.start()))
+        parts[-1].append(base.slice(at, pipe.start()))
         if pipe[0] == "|":
-            cells.append([])
+            parts.append([])
             at = pipe.end()
         else:  # the pipe is text, without its backslash
             at = pipe.end() - 1
-    cells[-1].append(base.slice(at, end))
-    found = [Excerpt.join(parts) for parts in cells]
-    found = found[not found[0].text :]
-    return [trim(cell) for cell in (found if found and found[-1].text else found[:-1])]
+    parts[-1].append(base.slice(at, end))
+    cells = [Excerpt.join(cell_parts) for cell_parts in parts]
+    if not cells[0].text:
+        del cells[0]
+    if cells and not cells[-1].text:
+        del cells[-1]
+    return [trim(cell) for cell in cells]

@@ -1,7 +1,7 @@
-"""What the parsers of quizzes and labs need from Markdown, without knowing how it is parsed.
+"""Markdown inside fences of features, which need not know how it is parsed.
 
-Entry points: `TextParser`, `Prose.read`. The parser of a document hands itself in this shape to
-`parse_quiz` and `parse_lab`, so that their texts share the document's footnotes, anchors and rules.
+Entry points: `TextParser`, `Prose.read`. The parser of a document gives features a `TextParser`, so
+that texts in quizzes and labs share the document's footnotes, anchors and rules.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from coursebuild.core.text.source import Excerpt
 
 
 class TextParser(Protocol):
-    """Markdown inside another language: every node's span points at the lesson's own text."""
+    """Parses Markdown inside another language; the spans of nodes point into the lesson."""
 
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
         """The blocks of a text; math between the tags of HTML is math. Never raises."""
@@ -32,29 +32,31 @@ class TextParser(Protocol):
 class Prose(Struct, frozen=True):
     """The Markdown strings inside a quiz or a lab, each parsed once."""
 
-    _read: dict[Node, tuple[Any, ...]]
+    _content: dict[Node, tuple[Any, ...]]
     diagnostics: tuple[Diagnostic, ...]
 
     @classmethod
     def read(cls, texts: Iterable[tuple[StringNode, str]], parser: TextParser) -> Prose:
-        """Parse each text, `blocks` or `inlines`; a blank one says nothing."""
-        parsed = {
-            node: parser.blocks(node.excerpt) if kind == "blocks" else parser.inlines(node.excerpt)
-            for node, kind in texts
-            if node.value.strip()
-        }
-        found = tuple(wrong for one in parsed.values() for wrong in one.diagnostics)
-        return cls({node: one.value for node, one in parsed.items()}, found)
+        """Parse each text as `blocks` or `inlines`, but for blank ones."""
+        content: dict[Node, tuple[Any, ...]] = {}
+        diagnostics: list[Diagnostic] = []
+        for node, kind in texts:
+            if node.value.strip():
+                parse = parser.blocks if kind == "blocks" else parser.inlines
+                parsed_text: Parsed[tuple[Any, ...]] = parse(node.excerpt)
+                content[node] = parsed_text.value
+                diagnostics += parsed_text.diagnostics
+        return cls(content, tuple(diagnostics))
 
     def blocks(self, node: Node | None) -> tuple[Block, ...]:
         """The blocks of a string; none for a field that is not given."""
-        return () if node is None else self._read.get(node, ())
+        return () if node is None else self._content.get(node, ())
 
     def inlines(self, node: Node | None) -> tuple[Inline, ...]:
         """The inlines of a string; none for a field that is not given."""
-        return () if node is None else self._read.get(node, ())
+        return () if node is None else self._content.get(node, ())
 
     def each_item(self, node: Node | None) -> tuple[tuple[Any, ...], ...]:
-        """What the strings of an array hold, blocks or inlines, one after the other."""
+        """The blocks or inlines of each string of an array."""
         items = node.items if isinstance(node, ArrayNode) else ()
-        return tuple(self._read.get(item, ()) for item in items)
+        return tuple(self._content.get(item, ()) for item in items)

@@ -1,6 +1,6 @@
 """The table `[theme]` of course.toml: logo, icons, accent, style sheets, fonts.
 
-Entry points: `ThemeTable`; `theme`, the value of it, its files not read yet; `check_contrast`.
+Entry points: `ThemeTable`; `theme`, its value, with files not read yet; `check_contrast`.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 
-def _file(what: str, endings: str, example: str) -> Meta:
+def _file_field(noun: str, endings: str, example: str) -> Meta:
     """The field of a file in `theme/` with one of these endings."""
     return matching(
-        rf"^theme(/[\w-][\w.-]*)+\.({endings})$", f"{what} in `theme/`, as in `theme/{example}`"
+        rf"^theme(/[\w-][\w.-]*)+\.({endings})$", f"{noun} in `theme/`, as in `theme/{example}`"
     )
 
 
-Picture: TypeAlias = Annotated[str, _file("an SVG or PNG", "svg|png", "logo.svg")]
-Png: TypeAlias = Annotated[str, _file("a PNG", "png", "icon.png")]
-StyleSheet: TypeAlias = Annotated[str, _file("a style sheet", "css", "style.css")]
-Font: TypeAlias = Annotated[str, _file("a font", "ttf|otf|woff2?", "Vollkorn.ttf")]
-Licence: TypeAlias = Annotated[str, _file("a text", "txt|md", "OFL.txt")]
+Picture: TypeAlias = Annotated[str, _file_field("an SVG or PNG", "svg|png", "logo.svg")]
+Png: TypeAlias = Annotated[str, _file_field("a PNG", "png", "icon.png")]
+StyleSheet: TypeAlias = Annotated[str, _file_field("a style sheet", "css", "style.css")]
+Font: TypeAlias = Annotated[str, _file_field("a font", "ttf|otf|woff2?", "Vollkorn.ttf")]
+Licence: TypeAlias = Annotated[str, _file_field("a text", "txt|md", "OFL.txt")]
 Colour: TypeAlias = Annotated[str, matching("^#[0-9A-Fa-f]{6}$", "a colour as in `#17487a`")]
 
 
@@ -58,7 +58,7 @@ class ThemeTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def theme(node: ObjectNode, fields: ThemeTable) -> Theme:
-    """What the table says."""
+    """The theme that the table describes."""
 
     def file(name: str, path: str | None) -> ThemeFile | None:
         return None if path is None else ThemeFile(path, node.place(name))
@@ -68,11 +68,11 @@ def theme(node: ObjectNode, fields: ThemeTable) -> Theme:
         **pictures,
         accent=(fields.accent or "").lower(),
         accent_dark=(fields.accent_dark or "").lower(),
-        css=_files(node, "css", fields.css),
+        css=_theme_files(node, "css", fields.css),
         fonts=tuple(
             FontFamily(
                 font.use,
-                _files(table, "files", font.files),
+                _theme_files(table, "files", font.files),
                 ThemeFile(font.licence, table.place("licence")),
             )
             for table, font in zip(node.objects("font"), fields.font, strict=True)
@@ -81,7 +81,7 @@ def theme(node: ObjectNode, fields: ThemeTable) -> Theme:
 
 
 def check_contrast(node: ObjectNode, theme: Theme) -> Iterator[Diagnostic]:
-    """Warnings of accents that cannot be read on the grounds of a page."""
+    """Warn of accents that cannot be read on the grounds of a page."""
     for name, colour, grounds in (
         ("accent", theme.accent, GROUNDS_LIGHT),
         ("accent_dark", theme.accent_dark, GROUNDS_DARK),
@@ -89,10 +89,10 @@ def check_contrast(node: ObjectNode, theme: Theme) -> Iterator[Diagnostic]:
         if colour and (ratio := contrast(colour, grounds)) < LEAST:
             scheme = "light" if grounds is GROUNDS_LIGHT else "dark"
             message = f"on {scheme} pages `{colour}` has a contrast of {ratio:.2f} : 1"
-            near = legible(colour, grounds)
-            help = f"text needs {LEAST} : 1; the nearest colour that has it is `{near}`"
+            nearest = legible(colour, grounds)
+            help = f"text needs {LEAST} : 1; the nearest colour that has it is `{nearest}`"
             yield diagnose("theme-contrast", node.place(name), message, help=help)
 
 
-def _files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[ThemeFile, ...]:
+def _theme_files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[ThemeFile, ...]:
     return tuple(map(ThemeFile, paths, (item.span for item in node.items(name))))

@@ -1,6 +1,6 @@
-"""What is wrong with a text that is not TOML, and how to mend it.
+"""Diagnostics of texts that are not TOML, more helpful than the messages of `tomllib`.
 
-Entry points: `diagnose_syntax` (from what `tomllib` says), `error_offset`.
+Entry points: `diagnose_syntax`; `error_offset`, the place that a message of `tomllib` names.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ _TOKEN = re.compile(
 )
 _SCALAR = re.compile(r"[^\n,\]}#]*")
 _WORD = re.compile(r"[\w.+-]+|\S")
-_CURLY = tuple("“”„‟‘’‚‛«»")
-_WORDS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
-_NOTHING = frozenset(("null", "None", "nil", "Null", "NULL"))
-_STRAIGHT = "TOML knows only the straight quotes `\"` and `'`"
+_CURLY_QUOTES = tuple("“”„‟‘’‚‛«»")
+_BOOLEANS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
+_NULLS = frozenset(("null", "None", "nil", "Null", "NULL"))
+_QUOTES_HELP = "TOML knows only the straight quotes `\"` and `'`"
 
 
 def error_offset(text: str, message: str) -> int:
-    """The offset that a message of `tomllib` names; the end of the text where it names none."""
+    """The offset that a message of `tomllib` names; the end of the text if it names none."""
     place = _PLACE.search(message)
     if place is None or place[1] is None:
         return len(text)
@@ -41,57 +41,59 @@ def double_backslash(command: str) -> str:
 
 
 def diagnose_syntax(body: Excerpt, message: str, rule: str) -> Diagnostic:
-    """What is wrong with a text of which `tomllib` says `message`, as a diagnostic of a rule."""
-    start, end, words, help = _mistake(body.text, message)
+    """The diagnostic of a text that `tomllib` refuses with `message`."""
+    start, end, words, help = _describe_mistake(body.text, message)
     return diagnose(rule, body.span(start, end), words, help=help)
 
 
 _Mistake = tuple[int, int, str, str]
-"""Where it begins and ends, what is wrong, and how to mend it."""
+"""Its start and end in the text, the message and the help."""
 
 
-def _mistake(text: str, message: str) -> _Mistake:
+def _describe_mistake(text: str, message: str) -> _Mistake:
     at = error_offset(text, message)
     char, words = text[at : at + 1], _PLACE.sub("", message)
     if odd := "a lone carriage return" if char == "\r" else odd_character(char):
         help = "remove it" if at == 0 else "replace it by a plain space, or remove it"
         return at, at + 1, f"{odd} cannot stand here in TOML", help
-    opened = _open_at(text, at)
-    left = text[opened] if opened is not None else ""
-    if opened is not None and left in "\"'":
-        return _unclosed_string(text, opened)
+    opening = _innermost_opening(text, at)
+    bracket = text[opening] if opening is not None else ""
+    if opening is not None and bracket in "\"'":
+        return _unclosed_string(text, opening)
     if re.match("Unescaped|Escaped|Invalid hex", words):
         start = text.rindex("\\", 0, at)
         help = double_backslash(tex_word(text, start + 1))
         return start, start + 2, f"`{text[start : start + 2]}` is not an escape of TOML", help
-    if opened is not None and at >= len(text):
-        return opened, opened + 1, f"`{left}` is never closed", ""
-    if opened is not None and left == "{" and char == "\n":
+    if opening is not None and at >= len(text):
+        return opening, opening + 1, f"`{bracket}` is never closed", ""
+    if opening is not None and bracket == "{" and char == "\n":
         help = "a longer table has a `[header]` of its own"
-        return opened, opened + 1, "a table in braces stands on one line", help
+        return opening, opening + 1, "a table in braces stands on one line", help
     if words.startswith(("Invalid value", "Invalid date")):
-        return _no_value(text, at)
+        return _wrong_value(text, at)
     if words.startswith(("Expected newline", "Unclosed")):
-        return _after_value(text, at, "]" if words == "Unclosed array" else "}" if left else "")
-    help = _STRAIGHT if char in _CURLY else "TOML writes `key = value`" if char == ":" else ""
+        closer = "]" if words == "Unclosed array" else "}" if bracket else ""
+        return _wrong_end_of_value(text, at, closer)
+    help = "TOML writes `key = value`" if char == ":" else ""
+    help = _QUOTES_HELP if char in _CURLY_QUOTES else help
     if words.startswith("Invalid"):
-        return _expected(text, at, "a key", help)
+        return _expected_instead(text, at, "a key", help)
     if words.startswith("Expected "):
-        return _expected(text, at, words.removeprefix("Expected ").replace("'", "`"), help)
+        return _expected_instead(text, at, words.removeprefix("Expected ").replace("'", "`"), help)
     return at, at, words[:1].lower() + words[1:], help
 
 
-def _open_at(text: str, at: int) -> int | None:
-    """The innermost bracket that is open at an offset, or the quote that is never closed."""
-    opened: list[int] = []
+def _innermost_opening(text: str, at: int) -> int | None:
+    """The offset of the innermost bracket open at `at`, or of a quote that is never closed."""
+    openings: list[int] = []
     for token in _TOKEN.finditer(text):
         if token.start() >= at:
             break
         if token[0] in ("[", "{", '"', "'"):
-            opened.append(token.start())
-        elif token[0] in ("]", "}") and opened:
-            opened.pop()
-    return opened[-1] if opened else None
+            openings.append(token.start())
+        elif token[0] in ("]", "}") and openings:
+            openings.pop()
+    return openings[-1] if openings else None
 
 
 def _unclosed_string(text: str, start: int) -> _Mistake:
@@ -103,42 +105,42 @@ def _unclosed_string(text: str, start: int) -> _Mistake:
     return start, end, "the string is not closed on its line", help
 
 
-def _no_value(text: str, start: int) -> _Mistake:
-    """What stands in the place of a value."""
+def _wrong_value(text: str, start: int) -> _Mistake:
+    """Describe what stands in the place of a value."""
     scalar = _SCALAR.match(text, start)
-    written = scalar[0].rstrip() if scalar else ""
-    if not written:
+    value = scalar[0].rstrip() if scalar else ""
+    if not value:
         return start, start, "a value is missing", 'an empty text is written `""`'
-    message = f"`{shorten(written)}` is not a value of TOML"
-    return start, start + len(written), message, _value_help(written)
+    message = f"`{shorten(value)}` is not a value of TOML"
+    return start, start + len(value), message, _value_help(value)
 
 
-def _value_help(written: str) -> str:
-    if written in _WORDS:
-        return f"write `{_WORDS[written]}`"
-    if written in _NOTHING:
+def _value_help(text: str) -> str:
+    if text in _BOOLEANS:
+        return f"write `{_BOOLEANS[text]}`"
+    if text in _NULLS:
         return "TOML has no such value; leave the field out"
-    if written[0] in _CURLY:
-        return _STRAIGHT
-    if re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", written):
+    if text[0] in _CURLY_QUOTES:
+        return _QUOTES_HELP
+    if re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", text):
         return "a number has no leading zeros, and digits on both sides of its point"
-    if '"' in written or "'" in written:
+    if '"' in text or "'" in text:
         return ""
-    return f'text stands between quotes: `"{shorten(written)}"`'
+    return f'text stands between quotes: `"{shorten(text)}"`'
 
 
-def _after_value(text: str, at: int, closer: str) -> _Mistake:
-    """What follows a value: the rest of a word that began like a number, or something else."""
+def _wrong_end_of_value(text: str, at: int, closer: str) -> _Mistake:
+    """Describe what wrongly follows a value, such as letters after digits."""
     before = re.search(r"[\w.+:-]*\Z", text[:at])
     if before and before[0] and not text[at].isspace() and text[at] not in ",#":
-        return _no_value(text, before.start())
-    what, help = "the end of the line", "each `key = value` stands on a line of its own"
+        return _wrong_value(text, before.start())
+    noun, help = "the end of the line", "each `key = value` stands on a line of its own"
     if closer:
-        what, help = f"`,` or `{closer}`", "values in brackets have commas between them"
-    return _expected(text, at, what, help)
+        noun, help = f"`,` or `{closer}`", "values in brackets have commas between them"
+    return _expected_instead(text, at, noun, help)
 
 
-def _expected(text: str, at: int, what: str, help: str) -> _Mistake:
+def _expected_instead(text: str, at: int, noun: str, help: str) -> _Mistake:
     word = _WORD.match(text, at)
-    found = f"`{shorten(word[0])}`" if word else "the end of the line"
-    return at, word.end() if word else at, f"expected {what}, found {found}", help
+    quotation = f"`{shorten(word[0])}`" if word else "the end of the line"
+    return at, word.end() if word else at, f"expected {noun}, found {quotation}", help

@@ -1,13 +1,13 @@
 """Block content: markdown-it's block tokens become `Block` nodes with spans.
 
-Entry points: `TextReader` (one text into blocks), `Texts` (the `TextParser` that quizzes and labs
-get).
+Entry points: `TextReader`, which reads the blocks of a text; `NestedTextParser`, the `TextParser`
+for quizzes and labs.
 
-1. `prepare` makes the tokens and notes the explicit ids and the footnotes in them, which must be
-   known before the first reference.
-2. `blocks` walks the flat tokens once, a method for each kind of block; containers call back for
-   what they hold.
-3. A paragraph looks at what follows it: `Output:` and the block below it are one `Recording`.
+1. `TextReader` makes the tokens, and collects the explicit ids and the footnotes in them, which
+   must be known before the first reference.
+2. It walks the flat tokens once, with a method for each kind of block; containers read the blocks
+   inside them by recursion.
+3. A paragraph looks ahead: `Output:` and the block below it are one `Recording`.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ class TextReader:
     ) -> None:
         self.base, self.session, self.nested = base, session, nested
         self.balance = Balance(session.report)
-        self.texts = Texts(session)
+        self.texts = NestedTextParser(session)
         self.tokens = block_tokens(base, references)
         self.at = 0
         self.inlines = InlineReader(references, session, self.balance)
-        self._prepare()
+        self._collect_ids_and_footnotes()
 
-    def _prepare(self) -> None:
+    def _collect_ids_and_footnotes(self) -> None:
         for i, token in enumerate(self.tokens):
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(self._content(token)).value.id
@@ -66,16 +66,16 @@ class TextReader:
             elif token.type == "footnote_reference_open":
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
-                read = self._later(i + 1)
+                read = self._defer_reading(i + 1)
                 self.session.notes.add(FootnoteText(label, label_span, self._span(token), read))
-        deep = next((token for token in self.tokens if token.info == TOO_DEEP), None)
-        if deep is not None:
+        deep_token = next((token for token in self.tokens if token.info == TOO_DEEP), None)
+        if deep_token is not None:
             message = "quotes, lists or footnotes nest too deep here"
-            place = self._span(deep).first_line()
+            place = self._span(deep_token).first_line()
             self.session.report(diagnose("nesting-deep", place, message))
 
-    def _later(self, at: int) -> Callable[[], tuple[model.Block, ...]]:
-        """Reads the footnote whose first token has the index `at`."""
+    def _defer_reading(self, at: int) -> Callable[[], tuple[model.Block, ...]]:
+        """Return a function that reads the footnote whose first token has the index `at`."""
 
         def read() -> tuple[model.Block, ...]:
             self.at = at
@@ -84,7 +84,7 @@ class TextReader:
         return read
 
     def read(self) -> tuple[model.Block, ...]:
-        """The blocks of the text, its footnotes left for later."""
+        """The blocks of the text without its footnotes, which are read last."""
         blocks = self._blocks(None)
         self.balance.finish()
         return blocks
@@ -92,8 +92,8 @@ class TextReader:
     # -- walking
 
     def _blocks(self, stop: str | None) -> tuple[model.Block, ...]:
-        """The blocks up to a closing token, which is passed."""
-        out: list[model.Block] = []
+        """The blocks up to a closing token, which is skipped."""
+        blocks: list[model.Block] = []
         self.balance.enter()
         while self.at < len(self.tokens):
             token = self.tokens[self.at]
@@ -102,9 +102,9 @@ class TextReader:
                 break
             block = _READERS[token.type](self, token)
             if block is not None:
-                out.append(block)
+                blocks.append(block)
         self.balance.leave()
-        return tuple(out)
+        return tuple(blocks)
 
     def _span(self, token: PositionedToken) -> Span:
         return self.base.span(token.start, token.end)
@@ -115,52 +115,54 @@ class TextReader:
 
     # -- leaves
 
-    def _paragraph(self, token: PositionedToken) -> model.Block:
+    def _read_paragraph(self, token: PositionedToken) -> model.Block:
         self.at += 2
         content = self._content(token)
         children = self.inlines.read(content)
         span = content.span()
         if not self.nested and "Output" in content.text[:16] and is_caption(children):
-            recording = self._recording(children, span)
+            recording = self._read_recording(children, span)
             if recording is not None:
                 return recording
-        elif not self.nested and (kind := self._next_kind()) is not None:
+        elif not self.nested and (kind := self._peek_fence_kind()) is not None:
             self.session.diagnostics += check_near_caption(children, span, kind)
         if not self.nested and content.text.startswith(FIGURE):
-            children, shown = read_figure(children, span, self.session.figures)
-            return model.Paragraph(span, children, token.hidden, shown)
+            children, shows_image = read_figure(children, span, self.session.figures)
+            return model.Paragraph(span, children, token.hidden, shows_image)
         return model.Paragraph(span, children, token.hidden)
 
-    def _next(self) -> PositionedToken | None:
+    def _peek(self) -> PositionedToken | None:
         return self.tokens[self.at] if self.at < len(self.tokens) else None
 
-    def _next_kind(self) -> str | None:
-        """The kind of the fence that follows, if one does."""
-        token = self._next()
+    def _peek_fence_kind(self) -> str | None:
+        """The kind of the next block, if it is a fence."""
+        token = self._peek()
         if token is None or token.type != "fence":
             return None
         return (token.info.split() or [""])[0]
 
-    def _heading(self, token: PositionedToken) -> model.Heading:
+    def _read_heading(self, token: PositionedToken) -> model.Heading:
         self.at += 2
         span = self._span(token)
         attributes = read_attributes(self._content(token))
         self.session.diagnostics += attributes.diagnostics
         children = self.inlines.read(attributes.value.title, mentions=False)
         level = int(token.tag[1:])
-        session, above = self.session, None if self.nested else self.session.level
-        session.diagnostics += check_heading(span, level, above, children, lesson=session.lesson)
+        session, previous_level = self.session, None if self.nested else self.session.level
+        session.diagnostics += check_heading(
+            span, level, previous_level, children, lesson=session.lesson
+        )
         if not self.nested:
             session.level = level
         return model.Heading(
             span,
             level,
             children,
-            *self._anchor(attributes.value, children),
+            *self._take_anchor(attributes.value, children),
             attributes.value.classes,
         )
 
-    def _anchor(
+    def _take_anchor(
         self, attributes: Attributes, children: tuple[model.Inline, ...]
     ) -> tuple[str, bool]:
         anchors = self.session.anchors
@@ -169,38 +171,42 @@ class TextReader:
             return attributes.id.text[1:], True
         return anchors.make(model.plain_text(children)), False
 
-    def _fence(self, token: PositionedToken) -> model.Block:
+    def _read_fence(self, token: PositionedToken) -> model.Block:
         fence = read_fence(token, self.base, nested=self.nested)
         block = read_block(fence, self.session, self.texts)
-        if isinstance(block, model.Script) and not block.norun and self._next_kind() == "text":
-            below = self.tokens[self.at]
-            if below.info.split() == ["text"]:  # its keys are told as what they are
-                self.session.report(diagnose_missing_caption(self._span(below)))
+        if (
+            isinstance(block, model.Script)
+            and not block.norun
+            and self._peek_fence_kind() == "text"
+        ):
+            next_token = self.tokens[self.at]
+            if next_token.info.split() == ["text"]:  # with keys, these are reported instead
+                self.session.report(diagnose_missing_caption(self._span(next_token)))
         return block
 
-    def _code(self, token: PositionedToken) -> model.CodeBlock:
+    def _read_code(self, token: PositionedToken) -> model.CodeBlock:
         code = locate(self.base, token.rows)
-        self._fence_inside(code)
+        self._check_indented_fence(code)
         return model.CodeBlock(
             self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )
 
-    def _fence_inside(self, code: Excerpt) -> None:
-        """Tell of a fence that is indented, by which its block became text that is shown."""
+    def _check_indented_fence(self, code: Excerpt) -> None:
+        """Report a fence that is shown as text because it is indented."""
         opening = INDENTED_FENCE.match(code.text)
         if opening is None:
             return
-        closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
-        if closed and not is_known_kind(opening[2]):
+        is_closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
+        if is_closed and not is_known_kind(opening[2]):
             return
         message = "this fence is indented by a tab or four blanks, so its block is shown as text"
         help = "take the white space before it away"
         place = code.span(opening.start(1), opening.end())
         self.session.report(diagnose("fence-indented", place, message, help=help))
-        self.session.closes_indented = not closed
+        self.session.closes_indented = not is_closed
 
-    def _html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
-        """Raw HTML, kept as it is unless it holds formulas."""
+    def _read_html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
+        """Raw HTML, read as inlines if it holds formulas or is nested."""
         html = locate(self.base, token.rows)
         if self.nested or "$" in html.text:
             content = trim(html, " \t\n")
@@ -213,10 +219,10 @@ class TextReader:
         text = html.text if html.text.endswith("\n") else html.text + "\n"
         return model.HtmlBlock(self._span(token), text, find_media(html), find_forbidden(html))
 
-    def _rule(self, token: PositionedToken) -> model.ThematicBreak:
+    def _read_thematic_break(self, token: PositionedToken) -> model.ThematicBreak:
         return model.ThematicBreak(self._span(token))
 
-    def _math(self, token: PositionedToken) -> model.MathBlock:
+    def _read_math(self, token: PositionedToken) -> model.MathBlock:
         text = locate(self.base, token.rows)
         start, end = text.text.index("$$") + 2, len(text.text)
         if token.info != "unclosed":
@@ -228,10 +234,10 @@ class TextReader:
             self.session.report(diagnose("math-unclosed", place, message, help=help))
         elif not tex.text:
             self.session.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
-        return model.MathBlock(self._span(token), tex, self._label(text, end + 2))
+        return model.MathBlock(self._span(token), tex, self._read_label(text, end + 2))
 
-    def _label(self, text: Excerpt, at: int) -> model.Label | None:
-        """The label of the formula that ends before an offset."""
+    def _read_label(self, text: Excerpt, at: int) -> model.Label | None:
+        """The label after a formula that ends before an offset."""
         braces = LABEL.match(text.text, at)
         label = read_label(text.slice(*braces.span(1)), self.session.report) if braces else None
         if label is not None:
@@ -240,50 +246,50 @@ class TextReader:
 
     # -- containers
 
-    def _quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
-        span, opened = self._span(token), self.tokens[self.at]
-        if opened.type == "paragraph_open":
-            head = read_head(self._content(opened), self.session.callouts)
+    def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
+        span, first_token = self._span(token), self.tokens[self.at]
+        if first_token.type == "paragraph_open":
+            head = read_head(self._content(first_token), self.session.callouts)
             if head is not None:
                 self.session.diagnostics += head.diagnostics
-                return self._callout(span, head.value)
+                return self._read_callout(span, head.value)
         return model.BlockQuote(span, self._blocks("blockquote_close"))
 
-    def _callout(self, span: Span, head: Head) -> model.Callout:
+    def _read_callout(self, span: Span, head: Head) -> model.Callout:
         title = self.inlines.read(head.title)
         self.at += 3
-        first: tuple[model.Block, ...] = ()
+        rest: tuple[model.Block, ...] = ()
         if head.rest.text:
-            first = (model.Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
-        blocks = (*first, *self._blocks("blockquote_close"))
+            rest = (model.Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
+        blocks = (*rest, *self._blocks("blockquote_close"))
         return model.Callout(span, head.kind, head.kind_span, title, head.folded, blocks)
 
-    def _list(self, token: PositionedToken) -> model.ListBlock:
+    def _read_list(self, token: PositionedToken) -> model.ListBlock:
         ordered = token.type == "ordered_list_open"
         items: list[model.ListItem] = []
         while (item := self.tokens[self.at]).type == "list_item_open":
             self.at += 1
-            items.append(self._item(item))
+            items.append(self._read_item(item))
         self.at += 1
         return model.ListBlock(
             self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
 
-    def _item(self, token: PositionedToken) -> model.ListItem:
+    def _read_item(self, token: PositionedToken) -> model.ListItem:
         blocks = self._blocks("list_item_close")
         marker = self.base.span(token.start, token.start + len(token.info) + 1)
         span = marker.to(blocks[-1].span) if blocks else marker
         return model.ListItem(span, blocks, token.meta.get("checked"))
 
-    def _table(self, token: PositionedToken) -> model.Table:
-        table, self.at = self._read_table(self.at - 1)
+    def _read_table(self, token: PositionedToken) -> model.Table:
+        table, self.at = self._table_at(self.at - 1)
         return table
 
-    def _read_table(self, at: int) -> tuple[model.Table, int]:
+    def _table_at(self, at: int) -> tuple[model.Table, int]:
         return read_table(self.tokens, at, self.base, self.inlines.read, self.session.report)
 
-    def _footnote(self, token: PositionedToken) -> None:
-        """Pass over a footnote: it is read later."""
+    def _skip_footnote(self, token: PositionedToken) -> None:
+        """Skip a footnote, which is read later."""
         depth = 1
         while depth:
             kind = self.tokens[self.at].type
@@ -292,11 +298,13 @@ class TextReader:
 
     # -- recorded output
 
-    def _recording(self, caption: tuple[model.Inline, ...], span: Span) -> model.Recording | None:
-        """The recording whose caption was just read, if what follows is its body."""
-        match self._next():
+    def _read_recording(
+        self, caption: tuple[model.Inline, ...], span: Span
+    ) -> model.Recording | None:
+        """The recording with the caption just read, if the next block is its body."""
+        match self._peek():
             case PositionedToken(type="table_open"):
-                table, self.at = self._read_table(self.at)
+                table, self.at = self._table_at(self.at)
                 return record_table(caption, span, table, self.session)
             case PositionedToken(type="fence") as token:
                 fence = read_fence(token, self.base, nested=False)
@@ -312,23 +320,23 @@ class TextReader:
 
 
 _READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]] = {
-    "paragraph_open": TextReader._paragraph,
-    "heading_open": TextReader._heading,
-    "fence": TextReader._fence,
-    "code_block": TextReader._code,
-    "html_block": TextReader._html,
-    "hr": TextReader._rule,
-    "math_block": TextReader._math,
-    "blockquote_open": TextReader._quote,
-    "bullet_list_open": TextReader._list,
-    "ordered_list_open": TextReader._list,
-    "table_open": TextReader._table,
-    "footnote_reference_open": TextReader._footnote,
+    "paragraph_open": TextReader._read_paragraph,
+    "heading_open": TextReader._read_heading,
+    "fence": TextReader._read_fence,
+    "code_block": TextReader._read_code,
+    "html_block": TextReader._read_html,
+    "hr": TextReader._read_thematic_break,
+    "math_block": TextReader._read_math,
+    "blockquote_open": TextReader._read_quote,
+    "bullet_list_open": TextReader._read_list,
+    "ordered_list_open": TextReader._read_list,
+    "table_open": TextReader._read_table,
+    "footnote_reference_open": TextReader._skip_footnote,
 }
 
 
-class Texts:
-    """Markdown inside quizzes, labs and io blocks (a `TextParser`)."""
+class NestedTextParser:
+    """Parses Markdown inside quizzes, labs and io blocks, as a `TextParser`."""
 
     def __init__(self, session: ParsingState) -> None:
         self._session = session
@@ -353,5 +361,5 @@ class Texts:
         return inlines
 
     def _references(self) -> References:
-        """The document's link definitions; those that a text adds are its own."""
+        """A copy of the document's link definitions, as those in a text hold in it only."""
         return dict(self._session.references)

@@ -1,6 +1,6 @@
-"""What an author meant and nothing read: formulas, bound numbers, and markup of other tools.
+"""Markup that is shown as it is written: broken formulas and bindings, and that of other tools.
 
-Entry point: `unread_markup`. A page would show all of these as they are written.
+Entry point: `check_unread_markup`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from coursebuild.core.text.source import Excerpt
 
 _TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
 """A command, an index or an exponent."""
-_MEANT = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
-"""A dollar sign that no sum of money follows."""
+_DOLLAR = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
+"""A dollar sign that no amount of money follows."""
 _MATH_HELP = (
     "in `$x$` no blank stands inside the dollar signs, no digit follows the last one, and no line "
     "of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
 )
 
-_ESCAPED = re.compile(r"(?:\\[()\[\]]|\s)+")
-_SIGNS = re.compile(r"[{\[\\$]|==|!!!|\?\?\?|:::")
-"""What markup of other tools cannot do without."""
+_ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
+_FOREIGN_SIGNS = re.compile(r"[{\[\\$]|==|!!!|\?\?\?|:::")
+"""Characters of which markup of other tools has at least one."""
 _NUMBER = r"(?<![\w.])[-+\u2212]?\d[\w.,]*"
 _FOREIGN: dict[str, tuple[str, str, str]] = {
     "binding": (
@@ -88,80 +88,80 @@ _FOREIGN: dict[str, tuple[str, str, str]] = {
         "tabs are a feature: `plugins/tabs` of coursebuild",
     ),
 }
-"""Markup that nothing here reads: how it looks, what becomes of it, and what to write."""
+"""Markup of other tools by kind: its pattern, what becomes of it, and what to write instead."""
 _ANY_FOREIGN = re.compile(
     "|".join(f"(?P<{kind}>{pattern})" for kind, (pattern, _, _) in _FOREIGN.items()),
     re.MULTILINE | re.IGNORECASE,
 )
 
 
-def unread_markup(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Diagnostic]:
-    """What stands unread in a block's content.
+def check_unread_markup(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Diagnostic]:
+    """Report markup in a block's content that was not read.
 
-    `texts` are its texts that are neither code nor formulas nor escaped, each with its place in the
-    content, in order.
+    `texts` are its texts that are neither code nor formulas nor escaped, in order, each with its
+    offset in the content.
     """
-    dollar = _unread_formula(texts)
+    dollar = _find_unread_formula(texts)
     if dollar is not None:
-        what = "a dollar sign and TeX stand in the text: no formula was read here"
-        yield diagnose("math-unread", content.span(dollar, dollar + 1), what, help=_MATH_HELP)
-    yield from _foreign(content, texts)
+        message = "a dollar sign and TeX stand in the text: no formula was read here"
+        yield diagnose("math-unread", content.span(dollar, dollar + 1), message, help=_MATH_HELP)
+    yield from _find_foreign(content, texts)
 
 
-def _unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
-    """Where the first dollar sign of a formula is that was not read.
+def _find_unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
+    """The offset of the first dollar sign of a formula that was not read.
 
     `$5` is money and stays so. But a blank inside `$x = $`, or a list that begins in the middle of
     a formula because a line of it starts with `+ `, leaves dollar signs and commands of TeX in the
     text.
     """
     dollars = [text for _, text in texts if "$" in text]
-    if not any(_MEANT.search(text) for text in dollars):
+    if not any(_DOLLAR.search(text) for text in dollars):
         return None
     parts, end = list[str](), 0
     for at, text in texts:
-        parts += ["\0"] * (at > end) + [text]  # what stands between two texts parts them
+        parts += ["\0"] * (at > end) + [text]  # other content lies between two texts
         end = at + len(text)
     if _TEX.search("".join(parts)) is None:
         return None
     return next(at + text.index("$") for at, text in texts if "$" in text)
 
 
-def _foreign(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Diagnostic]:
-    """Markup that another tool would read."""
+def _find_foreign(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Diagnostic]:
+    """Report markup that another tool would read."""
     whole = content.text
-    escaped = "\\(" in whole or "\\[" in whole
-    if not escaped and not any(_SIGNS.search(text) for _, text in texts):
+    has_escaped_bracket = "\\(" in whole or "\\[" in whole
+    if not has_escaped_bracket and not any(_FOREIGN_SIGNS.search(text) for _, text in texts):
         return
     parts, end = list[str](), 0
     for at, text in texts:
-        parts += [_blank(whole[end:at]), text]
+        parts += [_mask(whole[end:at]), text]
         end = at + len(text)
-    parts.append(_blank(whole[end:]))
-    for found in _ANY_FOREIGN.finditer("".join(parts)):
-        start, kind = found.start(), found.lastgroup or ""
-        written = whole[start : found.end()].strip()
-        start = whole.index(written, start)
+    parts.append(_mask(whole[end:]))
+    for match in _ANY_FOREIGN.finditer("".join(parts)):
+        start, kind = match.start(), match.lastgroup or ""
+        markup = whole[start : match.end()].strip()
+        start = whole.index(markup, start)
         before = whole[:start]
         if kind == "binding" and before.endswith("`"):
-            continue  # it stands behind code: why it binds nothing is told already
-        if written.startswith("$") and written[1] != "`":
-            continue  # what stands between the dollars is no code
-        if re.match(r"\{\w", written) and kind == "attributes" and not before.endswith(")"):
-            continue  # neither a link nor an image stands before it
-        _, what, help = _FOREIGN[kind]
+            continue  # the parser of code spans has reported why it binds nothing
+        if markup.startswith("$") and markup[1] != "`":
+            continue  # no code stands between the dollars
+        if re.match(r"\{\w", markup) and kind == "attributes" and not before.endswith(")"):
+            continue  # no link or image stands before it
+        _, problem, help = _FOREIGN[kind]
         if kind == "binding":
-            number = written.partition("{")[0]
-            help = help.replace("`4.47`{out}", f"`{number or '4.47'}`{written[len(number) :]}")
+            number = markup.partition("{")[0]
+            help = help.replace("`4.47`{out}", f"`{number or '4.47'}`{markup[len(number) :]}")
         if kind == "callout":
-            help = help.replace("note", written.strip("![]?+: \t{}").lower())
+            help = help.replace("note", markup.strip("![]?+: \t{}").lower())
         rule = "binding-attribute" if kind == "binding" else "markup-foreign"
-        span = content.span(start, start + len(written))
-        yield diagnose(rule, span, f"`{shorten(written)}` {what}", help=help)
+        span = content.span(start, start + len(markup))
+        yield diagnose(rule, span, f"`{shorten(markup)}` {problem}", help=help)
 
 
-def _blank(text: str) -> str:
-    """What stands for other than text: as long, with the line ends; an escaped bracket stays."""
-    if _ESCAPED.fullmatch(text):
+def _mask(text: str) -> str:
+    """Replace content that is no text by NUL, but for line ends and escaped brackets."""
+    if _ESCAPED_BRACKETS.fullmatch(text):
         return text
     return "\n".join("\0" * len(line) for line in text.split("\n"))

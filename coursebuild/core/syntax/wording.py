@@ -1,7 +1,7 @@
-"""How messages call types and the author's values.
+"""The words of messages for types and for the author's values.
 
-Entry points: `Format` (`JSON`, `TOML`), `accepts`, `wrong_type`, `type_help`, `format_name`,
-`format_value`, `shorten`.
+Entry points: `Format` (`JSON`, `TOML`), `accepts`, `wrong_type_message`, `type_help`,
+`format_name`, `format_value`, `shorten`.
 """
 
 from __future__ import annotations
@@ -23,41 +23,39 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
 )
 
-_SHORT = 40
-"""Characters of an author's text in a message."""
+_MAX_LENGTH = 40
+"""The most characters of an author's text in a message."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
 Format: TypeAlias = Literal["JSON", "TOML"]
 JSON: Format = "JSON"
 TOML: Format = "TOML"
-"""The language that a value is written in, by which messages call it an object or a table."""
+"""The language of a value; messages call the same value an object in JSON and a table in TOML."""
 
-_SIMPLE: dict[str, tuple[str, str, type[Node]]] = {
+_NAMED_TYPES: dict[str, tuple[str, str, type[Node]]] = {
     "string": ("a string", "strings", StringNode),
     "integer": ("an integer", "integers", NumberNode),
     "number": ("a number", "numbers", NumberNode),
     "bool": ("`true` or `false`", "`true` or `false`", BoolNode),
     "object": ("an object", "objects", ObjectNode),
 }
-"""The kinds of values but arrays: one and several of them in words, and the node."""
+"""All types but arrays: the words for one value and for several, and the type of the node."""
 
 
-def _single(type: inspect.Type) -> list[inspect.Type]:
-    """The types of a union, without remarks and `null`: that a field can be left out is clear."""
+def _union_members(type: inspect.Type) -> list[inspect.Type]:
+    """The types of a union for a message, without `null`, and with one struct for all of them."""
     while isinstance(type, inspect.Metadata):
         type = type.type
     if not isinstance(type, inspect.UnionType):
         return [type]
-    types = [one for inner in type.types for one in _single(inner)]
-    structs = [one for one in types if isinstance(one, inspect.StructType)]
-    return [
-        one for one in types if not isinstance(one, inspect.NoneType) and one not in structs[1:]
-    ]
+    types = [member for inner in type.types for member in _union_members(inner)]
+    structs = [member for member in types if isinstance(member, inspect.StructType)]
+    return [t for t in types if not isinstance(t, inspect.NoneType) and t not in structs[1:]]
 
 
-def _kind(type: inspect.Type) -> str:
-    """What a type is called that is neither a union nor `null`."""
+def _type_name(type: inspect.Type) -> str:
+    """The name of a type that is neither a union nor `null`."""
     match type:
         case inspect.StrType() | inspect.LiteralType():
             return "string"
@@ -75,21 +73,21 @@ def _kind(type: inspect.Type) -> str:
             raise TypeError(f"no value of a lesson is of {type}")
 
 
-def _in_words(type: inspect.Type) -> tuple[str, str]:
-    """What a field takes: one of it, and several."""
-    ones, many = [], []
-    for single in _single(type):
-        if isinstance(single, inspect.VarTupleType):
-            items = _in_words(single.item_type)[1]
+def _describe_type(type: inspect.Type) -> tuple[str, str]:
+    """A type in words: for one value, and for several."""
+    singulars, plurals = [], []
+    for member in _union_members(type):
+        if isinstance(member, inspect.VarTupleType):
+            items = _describe_type(member.item_type)[1]
             words = (f"an array of {items}", f"arrays of {items}")
-        elif isinstance(single, inspect.TupleType):
-            length = f"of {len(single.item_types)} values"
+        elif isinstance(member, inspect.TupleType):
+            length = f"of {len(member.item_types)} values"
             words = (f"an array {length}", f"arrays {length}")
         else:
-            words = _SIMPLE[_kind(single)][:2]
-        ones.append(words[0])
-        many.append(words[1])
-    return " or ".join(ones), " or ".join(many)
+            words = _NAMED_TYPES[_type_name(member)][:2]
+        singulars.append(words[0])
+        plurals.append(words[1])
+    return " or ".join(singulars), " or ".join(plurals)
 
 
 def accepts(type: inspect.Type, node: Node) -> bool:
@@ -97,23 +95,23 @@ def accepts(type: inspect.Type, node: Node) -> bool:
     if isinstance(type, inspect.Metadata):
         return accepts(type.type, node)
     if isinstance(type, inspect.UnionType):
-        return any(accepts(one, node) for one in type.types)
+        return any(accepts(member, node) for member in type.types)
     if isinstance(type, inspect.NoneType):
         return isinstance(node, NullNode)
-    kind = _kind(type)
+    kind = _type_name(type)
     if kind == "integer" and isinstance(node, NumberNode):
         return isinstance(node.value, int)
-    return isinstance(node, ArrayNode if kind == "array" else _SIMPLE[kind][2])
+    return isinstance(node, ArrayNode if kind == "array" else _NAMED_TYPES[kind][2])
 
 
 def shorten(text: str) -> str:
-    """A stretch of the author's text that fits into a message."""
+    """A text of the author on one line, cut to a length that fits into a message."""
     line = " ".join(text.split())
-    return line if len(line) <= _SHORT else line[: _SHORT - 1] + "…"
+    return line if len(line) <= _MAX_LENGTH else line[: _MAX_LENGTH - 1] + "…"
 
 
 def format_name(name: str) -> str:
-    """A field's name in a message; "the quiz" is no field's, and stays as it is."""
+    """The name of a field in a message; "the quiz", which is no field, stays as it is."""
     return name if name.startswith("the ") else f"`{shorten(name)}`"
 
 
@@ -122,15 +120,15 @@ def format_value(node: Node) -> str:
     return f"`{shorten(node.value if isinstance(node, StringNode) else node.raw)}`"
 
 
-def wrong_type(node: Node, name: str, type: inspect.Type, format: Format) -> str:
-    """The message for a value of a type that its field does not take."""
-    wrong = f"must be {_in_words(type)[0]}, not {_found(node)}"
+def wrong_type_message(node: Node, name: str, type: inspect.Type, format: Format) -> str:
+    """The message for a value of the wrong type."""
+    problem = f"must be {_describe_type(type)[0]}, not {_describe_value(node)}"
     if format == TOML:
-        wrong = wrong.replace("an object", "a table").replace("objects", "tables")
-    return f"{format_name(name)} {wrong}"
+        problem = problem.replace("an object", "a table").replace("objects", "tables")
+    return f"{format_name(name)} {problem}"
 
 
-def _found(node: Node) -> str:
+def _describe_value(node: Node) -> str:
     match node:
         case ObjectNode():
             return "an object"
@@ -149,27 +147,29 @@ def _found(node: Node) -> str:
 
 
 def type_help(node: Node, type: inspect.Type) -> str:
-    """How to mend a value of the wrong type, where that is clear."""
+    """How to mend a value of the wrong type, if that is clear."""
     raw = node.raw
-    kinds = {_kind(single) for single in _single(type)}
-    arrays = [one for one in _single(type) if isinstance(one, inspect.VarTupleType)]
-    items = {_kind(single) for array in arrays for single in _single(array.item_type)}
+    members = _union_members(type)
+    names = {_type_name(member) for member in members}
+    arrays = [member for member in members if isinstance(member, inspect.VarTupleType)]
+    item_types = (member for array in arrays for member in _union_members(array.item_type))
+    item_names = {_type_name(member) for member in item_types}
     if isinstance(node, NullNode):
         return "leave the field out"
-    if isinstance(node, ObjectNode) and "object" in items and raw.startswith("["):
+    if isinstance(node, ObjectNode) and "object" in item_names and raw.startswith("["):
         return f"write its header with two brackets: `[{node.mark.text}]`"
-    if len(raw) > _SHORT or "\n" in raw:
+    if len(raw) > _MAX_LENGTH or "\n" in raw:
         return ""
     if isinstance(node, NumberNode | DateNode | BoolNode):
-        plain = not isinstance(node, BoolNode) or kinds == {"string"}
-        if "string" in kinds and plain:
+        needs_quotes = not isinstance(node, BoolNode) or names == {"string"}
+        if "string" in names and needs_quotes:
             return f'put it between quotes: `"{raw}"`'
-        if "string" in items:
+        if "string" in item_names:
             return f'put it between brackets and quotes: `["{raw}"]`'
     if isinstance(node, StringNode):
-        if kinds & {"integer", "number"} and _NUMBER.fullmatch(node.value):
+        if names & {"integer", "number"} and _NUMBER.fullmatch(node.value):
             return f"write it without quotes: `{node.value}`"
-        if "bool" in kinds and node.value.lower() in ("true", "false"):
+        if "bool" in names and node.value.lower() in ("true", "false"):
             return f"write it without quotes: `{node.value.lower()}`"
     if any(accepts(array.item_type, node) for array in arrays):
         return f"put it between brackets: `[{raw}]`"
