@@ -1,11 +1,11 @@
-r"""Arithmetic between numbers: each side of a chain of relations computed, and held to the next.
+r"""Checks arithmetic between numbers: compares each side of a chain of relations with the next.
 
 Entry point: `check_arithmetic(tex)`.
 
-1. Of two sides one shows a number, as `3.2\cdot10^{-4}\ \mathrm m`, and the other must come to it
-   to the digits shown: within half a unit of the last place. After `=` a whole number is exact;
-   after `\approx` its zeros at the end need not be.
-2. A unit that is the only one of a chain, behind some of its sides, holds for all of them.
+1. One of two sides is a numeral, as `3.2\cdot10^{-4}\ \mathrm m`. The other must agree with its
+   digits, within half a unit of the last place. After `=` a whole number is exact; after
+   `\approx` its final zeros can be the result of rounding.
+2. If some sides of a chain end in the same unit, and there is no other, it holds for all sides.
    Different units are converted.
 """
 
@@ -22,7 +22,7 @@ from typing import Any, Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.features.arithmetic.evaluate import WrongDimensions, evaluate, say
+from coursebuild.features.arithmetic.evaluate import WrongDimensions, describe_dimension, evaluate
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import FormulaSide, Statement, read_statements
 
@@ -31,8 +31,8 @@ _CLOSE = 1e-12
 _ORDER = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}
 
 
-class FormulaFinding(Struct, frozen=True):
-    """What was found of two sides of a formula, at a stretch of its TeX."""
+class FormulaComparison(Struct, frozen=True):
+    """The result of comparing two sides of a formula, for a range of its TeX."""
 
     kind: Literal["holds", "wrong", "unread"]
     start: int
@@ -41,142 +41,149 @@ class FormulaFinding(Struct, frozen=True):
     help: str = ""
 
 
-class ShownNumber(Struct, frozen=True):
-    """A number as it is written."""
+class Numeral(Struct, frozen=True):
+    """A number as it is written, with its precision."""
 
     value: Any
     step: Any
     """One unit of its last place."""
-    whole: bool
+    is_whole: bool
     """Whether it has neither a point nor a power of ten."""
     digits: int
-    size: Any
-    """How large its unit is."""
+    unit_size: Any
+    """The size of its unit in base units."""
 
 
 @functools.lru_cache(maxsize=1024)
-def check_arithmetic(tex: str) -> tuple[FormulaFinding, ...]:
-    """What was found of the numbers that a formula holds against each other."""
+def check_arithmetic(tex: str) -> tuple[FormulaComparison, ...]:
+    """Compare the numbers between which a formula states a relation."""
     if not _RELATION.search(tex) or not re.search("[0-9]", tex):
         return ()
-    return tuple(found for one in read_statements(tex) for found in _chain(one))
+    statements = read_statements(tex)
+    return tuple(comparison for statement in statements for comparison in _check_chain(statement))
 
 
-def _chain(statement: Statement) -> Iterator[FormulaFinding]:
+def _check_chain(statement: Statement) -> Iterator[FormulaComparison]:
     sides = _without_common_unit(statement.sides)
     for left, right, relation in zip(sides, sides[1:], statement.relations, strict=False):
-        if not (left.numeric and right.numeric):
+        if not (left.is_numeric and right.is_numeric):
             continue
         try:
-            wrong = _mistake(left.understood(), right.understood(), relation)
-        except WrongDimensions as found:
-            yield FormulaFinding("wrong", found.start, found.end, found.reason)
-        except NotUnderstood as found:
-            yield FormulaFinding("unread", found.start, found.end, found.reason)
+            mistake = _find_mistake(left.get_expression(), right.get_expression(), relation)
+        except WrongDimensions as error:
+            yield FormulaComparison("wrong", error.start, error.end, error.reason)
+        except NotUnderstood as error:
+            yield FormulaComparison("unread", error.start, error.end, error.reason)
         else:
-            if wrong is None:
-                yield FormulaFinding("holds", left.start, right.end)
+            if mistake is None:
+                yield FormulaComparison("holds", left.start, right.end)
             else:
-                yield FormulaFinding("wrong", *wrong)
+                yield FormulaComparison("wrong", *mistake)
 
 
 def _without_common_unit(sides: tuple[FormulaSide, ...]) -> tuple[FormulaSide, ...]:
-    """The sides without their unit, where no other unit is in any of them."""
-    known = [s.expression for s in sides if isinstance(s.expression, Expression)]
-    units = {one.text for side in known for one in side.walk() if one.kind == "unit"} - {"%", "deg"}
-    if len(units) != 1 or any(s.has("unit") for s in map(_bare, known)):
+    """Remove the unit at the end of sides, if it is the only unit in all of them."""
+    expressions = [s.expression for s in sides if isinstance(s.expression, Expression)]
+    parts = (part for expression in expressions for part in expression.walk())
+    units = {part.text for part in parts if part.kind == "unit"} - {"%", "deg"}
+    if len(units) != 1 or any(e.has("unit") for e in map(_strip_unit, expressions)):
         return sides
     return tuple(
-        replace(s, expression=_bare(s.expression)) if isinstance(s.expression, Expression) else s
+        replace(s, expression=_strip_unit(s.expression))
+        if isinstance(s.expression, Expression)
+        else s
         for s in sides
     )
 
 
-def _bare(one: Expression) -> Expression:
-    """An expression without the unit at its end."""
-    if one.kind == "-" and len(one.parts) == 1:
-        return replace(one, parts=(_bare(one.parts[0]),))
-    is_unit = one.kind == "*" and one.parts[1].kind == "unit"
-    return one.parts[0] if is_unit and one.parts[1].text not in ("%", "deg") else one
+def _strip_unit(expression: Expression) -> Expression:
+    """Return an expression without the unit at its end."""
+    kind, parts = expression.kind, expression.parts
+    if kind == "-" and len(parts) == 1:
+        return replace(expression, parts=(_strip_unit(parts[0]),))
+    has_unit = kind == "*" and parts[1].kind == "unit" and parts[1].text not in ("%", "deg")
+    return parts[0] if has_unit else expression
 
 
-def _mistake(
+def _find_mistake(
     left: Expression, right: Expression, relation: str
 ) -> tuple[int, int, str, str] | None:
-    """Where two numbers do not stand in a relation, why, and what mends it; `None` if they do."""
+    """Return the range, message and help if a relation does not hold; `None` if it does."""
     if relation == "?":
         raise right.not_understood("the relation says too little")
     values = evaluate(left), evaluate(right)
     if values[0].dimension != values[1].dimension:
-        message = " is held against ".join(say(value.dimension) for value in values)
+        message = " is held against ".join(describe_dimension(value.dimension) for value in values)
         return right.start, right.end, message, ""
     if relation in _ORDER:
         if _ORDER[relation](values[0].value, values[1].value):
             return None
-        message = f"{_digits(values[0].value)} {relation} {_digits(values[1].value)} does not hold"
+        numbers = [_format_number(value.value) for value in values]
+        message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
         return right.start, right.end, message, ""
-    shown = [(n, number) for n, one in enumerate((left, right)) if (number := _shown(one))]
-    if not shown:
+    numerals = [(i, n) for i, e in enumerate((left, right)) if (n := _read_numeral(e))]
+    if not numerals:
         if relation == "≈":
             raise right.not_understood("neither side is a number whose digits could be compared")
         if _is_close(values[0].value, values[1].value):
             return None
-        message = f"{_digits(values[0].value)} and {_digits(values[1].value)} are not the same"
+        numbers = [_format_number(value.value) for value in values]
+        message = f"{numbers[0]} and {numbers[1]} are not the same"
         return right.start, right.end, message, ""
-    at, number = max(shown, key=lambda one: (one[1].step, one[0]))
-    if _shows(number, values[1 - at].value, relation):
+    index, numeral = max(numerals, key=lambda item: (item[1].step, item[0]))  # the coarser one
+    side, value = (left, right)[index], values[1 - index].value
+    if _agrees(numeral, value, relation):
         return None
-    place = (left, right)[at]
-    digits = max(number.digits + 2, 4)
-    message = f"{_digits(values[1 - at].value / number.size, digits)} comes out, and not this"
-    rounded = number.whole and relation == "=" and _shows(number, values[1 - at].value, "≈")
-    help = "write `\\approx` where a whole number is rounded" if rounded else ""
-    return place.start, place.end, message, help
+    digits = max(numeral.digits + 2, 4)
+    message = f"{_format_number(value / numeral.unit_size, digits)} comes out, and not this"
+    is_rounded = numeral.is_whole and relation == "=" and _agrees(numeral, value, "≈")
+    help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
+    return side.start, side.end, message, help
 
 
-def _digits(value: Any, digits: int = 10) -> str:
+def _format_number(value: Any, digits: int = 10) -> str:
     if isinstance(value, Fraction):
         value = Decimal(value.numerator) / Decimal(value.denominator)
     return f"{value:.{digits}g}"
 
 
-def _shows(number: ShownNumber, value: Any, relation: str) -> bool:
-    """Whether a value, rounded to the digits of a number, is the number."""
-    exact = isinstance(value, Fraction) and isinstance(number.value, Fraction)
-    if number.whole and relation == "=":
-        return value == number.value if exact else _is_close(value, number.value)
-    gap = 2 * abs(value - number.value)
-    return bool(gap <= number.step if exact else gap <= number.step * (1 + 1e-9))
+def _agrees(numeral: Numeral, value: Any, relation: str) -> bool:
+    """Whether a value, rounded to the digits of a numeral, is that number."""
+    is_exact = isinstance(value, Fraction) and isinstance(numeral.value, Fraction)
+    if numeral.is_whole and relation == "=":
+        return value == numeral.value if is_exact else _is_close(value, numeral.value)
+    gap = 2 * abs(value - numeral.value)
+    return bool(gap <= numeral.step if is_exact else gap <= numeral.step * (1 + 1e-9))
 
 
 def _is_close(left: Any, right: Any) -> bool:
     return bool(abs(left - right) <= _CLOSE * max(abs(left), abs(right)))
 
 
-def _shown(one: Expression) -> ShownNumber | None:
-    """The number that an expression is, if it is one as people write them."""
-    match one:
+def _read_numeral(expression: Expression) -> Numeral | None:
+    """Return the numeral that an expression is; `None` if it is more than that."""
+    match expression:
         case Expression(kind="number", text=text):
             whole, _, decimals = text.partition(".")
             is_whole = "." not in text
             zeros = len(whole) - len(whole.rstrip("0")) if is_whole and whole.strip("0") else 0
             step = Fraction(10) ** (zeros - len(decimals))
             digits = len(text.replace(".", "").lstrip("0")) or 1
-            return ShownNumber(Fraction(text), step, is_whole, digits, Fraction(1))
+            return Numeral(Fraction(text), step, is_whole, digits, Fraction(1))
         case Expression(kind="-", parts=(inner,)):
-            found = _shown(inner)
-            return found and replace(found, value=-found.value)
+            numeral = _read_numeral(inner)
+            return numeral and replace(numeral, value=-numeral.value)
         case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
-            size = evaluate(one).value
-            return ShownNumber(size, size, True, 1, Fraction(1))
+            size = evaluate(expression).value
+            return Numeral(size, size, True, 1, Fraction(1))
         case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
-            found, power = _shown(inner), _shown(factor)
-            if found is None or (factor.kind == "^" and (power is None or found.digits == 0)):
+            numeral, power = _read_numeral(inner), _read_numeral(factor)
+            if numeral is None or (factor.kind == "^" and (power is None or numeral.digits == 0)):
                 return None
             size = evaluate(factor).value
-            scaled = replace(found, value=found.value * size, step=found.step * size)
+            scaled = replace(numeral, value=numeral.value * size, step=numeral.step * size)
             if factor.kind == "^":
-                return replace(scaled, whole=False)
-            return replace(scaled, size=size)
+                return replace(scaled, is_whole=False)
+            return replace(scaled, unit_size=size)
         case _:
             return None

@@ -1,10 +1,10 @@
-"""Expressions → quantities: the value, in base units, and the dimension.
+"""Evaluates expressions to quantities: a value in base units, and a dimension.
 
 Entry points: `evaluate(expression, symbols, arithmetic)`; `EXACT`, the arithmetic of fractions,
-which become floating-point numbers where they must.
+which become floating-point numbers where necessary.
 
-What would be too large, or is no number, is not understood. Sums of different dimensions, and
-functions of what has one, are `WrongDimensions`.
+Results that are too large, or no numbers, are not understood. Sums of different dimensions, and
+functions of an argument with a dimension, are `WrongDimensions`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from msgspec import Struct
 from coursebuild.core.text.units import Dimension, find_unit, multiply
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 
-_MOST_BITS = 4_000
-_LONGEST = 300
+_MAX_BITS = 4_000
+_MAX_DIGITS = 300
 
 
 class WrongDimensions(NotUnderstood):
-    """That quantities of different dimensions meet."""
+    """Quantities of different dimensions are combined."""
 
 
 class PhysicalQuantity(Struct, frozen=True):
@@ -35,20 +35,20 @@ class PhysicalQuantity(Struct, frozen=True):
 
 
 class Arithmetic(Struct, frozen=True):
-    """Numbers of some kind."""
+    """The operations of one kind of numbers."""
 
     number: Callable[[str], Any]
     power: Callable[[Any, Any], Any]
     library: Any
-    """What has the functions and constants: `math`, or a context of mpmath."""
+    """Has the functions and constants: `math`, or a context of mpmath."""
     calculus: Callable[..., Any] | None = None
-    """The derivative of a function at a place, or its integral between two."""
+    """Return the derivative of a function at a point, or its integral between two."""
 
 
 def _exact_power(base: Any, exponent: Any) -> Any:
     if isinstance(base, Fraction) and isinstance(exponent, Fraction) and exponent.denominator == 1:
         bits = base.numerator.bit_length() + base.denominator.bit_length()
-        if abs(exponent) * bits > _MOST_BITS:
+        if abs(exponent) * bits > _MAX_BITS:
             raise OverflowError
         return base ** int(exponent)
     if base < 0:
@@ -57,8 +57,8 @@ def _exact_power(base: Any, exponent: Any) -> Any:
 
 
 EXACT = Arithmetic(Fraction, _exact_power, math)
-_CALLED = {"ln": "log", "arcsin": "asin", "arccos": "acos", "arctan": "atan"}
-"""Functions that libraries call otherwise."""
+_LIBRARY_NAMES = {"ln": "log", "arcsin": "asin", "arccos": "acos", "arctan": "atan"}
+"""Names of functions in libraries, where they differ from those in TeX."""
 _RECIPROCALS = {"cot": "tan", "sec": "cos", "csc": "sin"}
 _CONSTANTS = {r"\pi": "pi", r"\mathrm{e}": "e", r"\infty": "inf"}
 
@@ -68,13 +68,13 @@ def evaluate(
     symbols: Mapping[str, PhysicalQuantity] = {},
     arithmetic: Arithmetic = EXACT,
 ) -> PhysicalQuantity:
-    """What an expression comes to.
+    """Return the quantity that an expression has as its value.
 
     Raises:
         NotUnderstood: it cannot be computed.
     """
     try:
-        return _Evaluator(arithmetic, symbols).of(expression)
+        return _Evaluator(arithmetic, symbols).evaluate(expression)
     except (OverflowError, MemoryError):
         raise expression.not_understood("the numbers become too large") from None
 
@@ -83,115 +83,118 @@ class _Evaluator:
     def __init__(self, arithmetic: Arithmetic, symbols: Mapping[str, PhysicalQuantity]) -> None:
         self.arithmetic, self.symbols = arithmetic, symbols
 
-    def of(self, one: Expression) -> PhysicalQuantity:
-        """What an expression comes to."""
+    def evaluate(self, expression: Expression) -> PhysicalQuantity:
+        """Return the value of an expression."""
         try:
-            return self._of(one)
+            return self._evaluate(expression)
         except ZeroDivisionError:
-            raise one.not_understood("it divides by zero") from None
+            raise expression.not_understood("it divides by zero") from None
         except (ValueError, TypeError):
-            raise one.not_understood("it is no real number") from None
+            raise expression.not_understood("it is no real number") from None
 
-    def _of(self, one: Expression) -> PhysicalQuantity:
-        match one.kind:
+    def _evaluate(self, expression: Expression) -> PhysicalQuantity:
+        match expression.kind:
             case "number":
-                if len(one.text) > _LONGEST:
+                if len(expression.text) > _MAX_DIGITS:
                     raise OverflowError
-                return PhysicalQuantity(self.arithmetic.number(one.text))
+                return PhysicalQuantity(self.arithmetic.number(expression.text))
             case "symbol":
-                return self._symbol(one)
+                return self._evaluate_symbol(expression)
             case "unit":
-                return self._unit(one)
+                return self._evaluate_unit(expression)
             case "+" | "-":
-                return self._sum(one)
+                return self._evaluate_sum(expression)
             case "*":
-                left, right = map(self.of, one.parts)
+                left, right = map(self.evaluate, expression.parts)
                 dimension = multiply(left.dimension, right.dimension)
                 return PhysicalQuantity(left.value * right.value, dimension)
             case "/":
-                left, right = map(self.of, one.parts)
+                left, right = map(self.evaluate, expression.parts)
                 dimension = multiply(left.dimension, right.dimension, -1)
                 return PhysicalQuantity(left.value / right.value, dimension)
             case "^":
-                return self._power(one)
+                return self._evaluate_power(expression)
             case "abs":
-                (inner,) = map(self.of, one.parts)
+                (inner,) = map(self.evaluate, expression.parts)
                 return PhysicalQuantity(abs(inner.value), inner.dimension)
             case "derivative" | "integral":
-                return self._calculus(one)
+                return self._evaluate_calculus(expression)
             case name:
-                (inner,) = map(self.of, one.parts)
+                (inner,) = map(self.evaluate, expression.parts)
                 if inner.dimension:
-                    reason = f"`\\{name}` is of {say(inner.dimension)}, and not of a number"
-                    raise WrongDimensions(reason, one.start, one.end)
-                called = _RECIPROCALS.get(name) or _CALLED.get(name, name)
-                value = getattr(self.arithmetic.library, called)(inner.value)
+                    words = describe_dimension(inner.dimension)
+                    reason = f"`\\{name}` is of {words}, and not of a number"
+                    raise WrongDimensions(reason, expression.start, expression.end)
+                function_name = _RECIPROCALS.get(name) or _LIBRARY_NAMES.get(name, name)
+                value = getattr(self.arithmetic.library, function_name)(inner.value)
                 return PhysicalQuantity(1 / value if name in _RECIPROCALS else value)
 
-    def _symbol(self, one: Expression) -> PhysicalQuantity:
-        known = self.symbols.get(one.text)
-        if known is not None:
-            return known
-        if one.text not in _CONSTANTS:
-            reason = f"no lesson says what `{one.text}` is, or several differ in its unit"
-            raise one.not_understood(reason)
-        return PhysicalQuantity(getattr(self.arithmetic.library, _CONSTANTS[one.text]))
+    def _evaluate_symbol(self, expression: Expression) -> PhysicalQuantity:
+        quantity = self.symbols.get(expression.text)
+        if quantity is not None:
+            return quantity
+        if expression.text not in _CONSTANTS:
+            reason = f"no lesson says what `{expression.text}` is, or several differ in its unit"
+            raise expression.not_understood(reason)
+        return PhysicalQuantity(getattr(self.arithmetic.library, _CONSTANTS[expression.text]))
 
-    def _unit(self, one: Expression) -> PhysicalQuantity:
-        if one.text == "%":
+    def _evaluate_unit(self, expression: Expression) -> PhysicalQuantity:
+        if expression.text == "%":
             return PhysicalQuantity(self.arithmetic.number("0.01"))
-        if one.text == "deg":
+        if expression.text == "deg":
             return PhysicalQuantity(self.arithmetic.library.pi / 180)
-        unit = find_unit(one.text)
+        unit = find_unit(expression.text)
         if unit is None:
-            raise one.not_understood(f"`{one.text}` is no unit that is known")
+            raise expression.not_understood(f"`{expression.text}` is no unit that is known")
         return PhysicalQuantity(self.arithmetic.number(str(unit.size)), unit.dimension)
 
-    def _sum(self, one: Expression) -> PhysicalQuantity:
-        first, *rest = map(self.of, one.parts)
+    def _evaluate_sum(self, expression: Expression) -> PhysicalQuantity:
+        first, *rest = map(self.evaluate, expression.parts)
         if not rest:
             return PhysicalQuantity(-first.value, first.dimension)
         (second,) = rest
         if first.dimension != second.dimension and 0 not in (first.value, second.value):
-            reason = f"{say(first.dimension)} and {say(second.dimension)} are added"
-            raise WrongDimensions(reason, one.start, one.end)
-        sign = 1 if one.kind == "+" else -1
+            dimensions = [describe_dimension(term.dimension) for term in (first, second)]
+            reason = f"{dimensions[0]} and {dimensions[1]} are added"
+            raise WrongDimensions(reason, expression.start, expression.end)
+        sign = 1 if expression.kind == "+" else -1
         return PhysicalQuantity(
             first.value + sign * second.value, first.dimension or second.dimension
         )
 
-    def _power(self, one: Expression) -> PhysicalQuantity:
-        base, exponent = map(self.of, one.parts)
+    def _evaluate_power(self, expression: Expression) -> PhysicalQuantity:
+        base, exponent = map(self.evaluate, expression.parts)
         if exponent.dimension:
-            reason = f"an exponent is {say(exponent.dimension)}, and no number"
-            raise WrongDimensions(reason, one.parts[1].start, one.parts[1].end)
+            reason = f"an exponent is {describe_dimension(exponent.dimension)}, and no number"
+            raise WrongDimensions(reason, expression.parts[1].start, expression.parts[1].end)
         dimension: Dimension = ()
         if base.dimension:
-            power = _Evaluator(EXACT, {}).of(one.parts[1]).value
+            power = _Evaluator(EXACT, {}).evaluate(expression.parts[1]).value
             dimension = multiply((), base.dimension, Fraction(power).limit_denominator(1000))
         return PhysicalQuantity(self.arithmetic.power(base.value, exponent.value), dimension)
 
-    def _calculus(self, one: Expression) -> PhysicalQuantity:
-        what, by, *ends = one.parts
-        if self.arithmetic.calculus is None or (one.kind == "integral" and not ends):
-            raise one.not_understood("it is no number")
-        at = self._symbol(by)
+    def _evaluate_calculus(self, expression: Expression) -> PhysicalQuantity:
+        body, variable, *ends = expression.parts
+        if self.arithmetic.calculus is None or (expression.kind == "integral" and not ends):
+            raise expression.not_understood("it is no number")
+        point = self._evaluate_symbol(variable)
         dimension: list[Dimension] = []
 
         def function(value: Any) -> Any:
-            inner = {**self.symbols, by.text: PhysicalQuantity(value, at.dimension)}
-            found = _Evaluator(self.arithmetic, inner).of(what)
-            dimension[:] = [found.dimension]
-            return found.value
+            quantity = PhysicalQuantity(value, point.dimension)
+            inner = _Evaluator(self.arithmetic, {**self.symbols, variable.text: quantity})
+            result = inner.evaluate(body)
+            dimension[:] = [result.dimension]
+            return result.value
 
-        places = [self.of(end).value for end in ends] or [at.value]
+        places = [self.evaluate(end).value for end in ends] or [point.value]
         value = self.arithmetic.calculus(function, *places)
         sign = 1 if ends else -1
-        return PhysicalQuantity(value, multiply(dimension[0], at.dimension, sign))
+        return PhysicalQuantity(value, multiply(dimension[0], point.dimension, sign))
 
 
-def say(dimension: Dimension) -> str:
-    """A dimension in words: `length/time^2`."""
+def describe_dimension(dimension: Dimension) -> str:
+    """Return a dimension in words: `length/time^2`."""
     if not dimension:
         return "a number"
     parts = (name + ("" if power == 1 else f"^{power}") for name, power in dimension)

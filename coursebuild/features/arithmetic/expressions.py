@@ -1,4 +1,4 @@
-"""Expressions as values: what was understood of a side of a formula.
+"""Expressions: a side of a formula as a tree of operations.
 
 Entry points: `Expression`, `NotUnderstood`; `CONSTANTS`.
 """
@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
-"""Symbols that are numbers."""
+"""Symbols that stand for fixed numbers."""
 
 
 class NotUnderstood(Exception):  # noqa: N818  # it is no mistake
-    """Why something in a formula cannot be computed, and where it stands in the TeX."""
+    """A part of a formula that cannot be computed, with the reason and its range in the TeX."""
 
     def __init__(self, reason: str, start: int, end: int) -> None:
         super().__init__(reason)
@@ -24,9 +24,9 @@ class NotUnderstood(Exception):  # noqa: N818  # it is no mistake
 class Expression(Struct, frozen=True):
     """An operation on expressions, or a number, symbol or unit.
 
-    `kind` is `number`, `symbol`, `unit`, one of `+ - * / ^`, `abs`, `derivative` (of what, by which
-    symbol), `integral` (of what, by which symbol, perhaps from where, to where), or the name of a
-    function, as `sin`.
+    `kind` is `number`, `symbol`, `unit`, one of `+ - * / ^`, `abs`, `derivative` (parts: function,
+    variable), `integral` (parts: function, variable, and the limits if there are any), or the name
+    of a function, as `sin`.
     """
 
     kind: str
@@ -34,18 +34,18 @@ class Expression(Struct, frozen=True):
     end: int
     parts: tuple[Expression, ...] = ()
     text: str = ""
-    """A number's digits; the name of a symbol or a unit."""
+    """The digits of a number; the name of a symbol or a unit."""
 
     def walk(self) -> Iterator[Expression]:
-        """This expression, and all inside."""
+        """Yield this expression and all expressions in it."""
         yield self
         for part in self.parts:
             yield from part.walk()
 
     def has(self, *kinds: str) -> bool:
-        """Whether an expression of one of these kinds is inside."""
-        return any(one.kind in kinds for one in self.walk())
+        """Whether this expression is or contains one of these kinds."""
+        return any(expression.kind in kinds for expression in self.walk())
 
     def not_understood(self, reason: str) -> NotUnderstood:
-        """That this part cannot be computed."""
+        """Return the exception that says that this part cannot be computed."""
         return NotUnderstood(reason, self.start, self.end)

@@ -1,8 +1,8 @@
-"""Identities between symbols: both sides computed at random points, with their dimensions.
+"""Checks identities between symbols: computes both sides and dimensions at random points.
 
-Entry point: `check_identity(tex, symbols)`. Derivatives are taken and integrals computed by
-mpmath, in thirty digits; of an integral without limits the other side's derivative is taken. What
-is not understood does not pass.
+Entry point: `check_identity(tex, symbols)`. mpmath computes derivatives and integrals, in thirty
+digits. Where one side is an integral without limits, its integrand is compared with the derivative
+of the other side. What is not understood does not pass.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from itertools import pairwise
 from typing import Any
 
 from coursebuild.core.text.units import Dimension
-from coursebuild.features.arithmetic.chains import FormulaFinding
+from coursebuild.features.arithmetic.chains import FormulaComparison
 from coursebuild.features.arithmetic.evaluate import (
     Arithmetic,
     PhysicalQuantity,
     WrongDimensions,
+    describe_dimension,
     evaluate,
-    say,
 )
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import read_statements
 
 _POINTS = 5
 _CLOSE = 1e-12
-_MOST_BITS = 1000
-"""Of an exponent."""
+_MAX_BITS = 1000
+"""The limit for exponents."""
 
 
-def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[FormulaFinding]:
-    """What does not hold, or is not understood, in a formula of these symbols."""
+def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[FormulaComparison]:
+    """Yield the comparisons of a formula's sides that fail or are not understood."""
     statements = read_statements(tex)
     if not any(statement.relations for statement in statements):
-        yield FormulaFinding("unread", 0, len(tex), "it is no equation")
+        yield FormulaComparison("unread", 0, len(tex), "it is no equation")
     for statement in statements:
         for (left, right), relation in zip(
             pairwise(statement.sides), statement.relations, strict=True
@@ -42,56 +42,56 @@ def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[Formu
             try:
                 if relation != "=":
                     raise NotUnderstood("it is no equation", left.start, right.end)
-                yield from _compare(left.understood(), right.understood(), symbols)
-            except WrongDimensions as found:
-                yield FormulaFinding("wrong", found.start, found.end, found.reason)
-            except NotUnderstood as found:
-                yield FormulaFinding("unread", found.start, found.end, found.reason)
+                yield from _compare(left.get_expression(), right.get_expression(), symbols)
+            except WrongDimensions as error:
+                yield FormulaComparison("wrong", error.start, error.end, error.reason)
+            except NotUnderstood as error:
+                yield FormulaComparison("unread", error.start, error.end, error.reason)
 
 
 def _compare(
     left: Expression, right: Expression, symbols: Mapping[str, Dimension]
-) -> Iterator[FormulaFinding]:
+) -> Iterator[FormulaComparison]:
     import mpmath
 
     left, right = _without_integral(left, right)
     right, left = _without_integral(right, left)
-    used = {one.text for side in (left, right) for one in side.walk() if one.kind == "symbol"}
-    names = sorted(used & symbols.keys())
-    draw = random.Random(repr((left, right)))
+    parts = (*left.walk(), *right.walk())
+    names = sorted({part.text for part in parts if part.kind == "symbol"} & symbols.keys())
+    generator = random.Random(repr((left, right)))
     with mpmath.workdps(30):
-        arithmetic = _precise(mpmath.mp)
+        arithmetic = _mpmath_arithmetic(mpmath.mp)
         for _ in range(_POINTS):
-            point = {name: mpmath.mpf(round(draw.uniform(0.5, 2), 3)) for name in names}
+            point = {name: mpmath.mpf(round(generator.uniform(0.5, 2), 3)) for name in names}
             values = {name: PhysicalQuantity(value, symbols[name]) for name, value in point.items()}
-            one, other = (evaluate(side, values, arithmetic) for side in (left, right))
-            if one.dimension != other.dimension and 0 not in (one.value, other.value):
-                message = f"{say(one.dimension)} is held against {say(other.dimension)}"
-                yield FormulaFinding("wrong", right.start, right.end, message)
+            lhs, rhs = (evaluate(side, values, arithmetic) for side in (left, right))
+            if lhs.dimension != rhs.dimension and 0 not in (lhs.value, rhs.value):
+                dimensions = [describe_dimension(side.dimension) for side in (lhs, rhs)]
+                message = f"{dimensions[0]} is held against {dimensions[1]}"
+                yield FormulaComparison("wrong", right.start, right.end, message)
                 return
-            if abs(one.value - other.value) > _CLOSE * (abs(one.value) + abs(other.value)):
-                at = ", ".join(f"{name} = {float(value):g}" for name, value in point.items())
-                sides = " and ".join(mpmath.nstr(side.value, 6) for side in (one, other))
-                where = f" where {at}" if at else ""
-                yield FormulaFinding(
-                    "wrong", right.start, right.end, f"the sides are {sides}{where}"
-                )
+            if abs(lhs.value - rhs.value) > _CLOSE * (abs(lhs.value) + abs(rhs.value)):
+                symbol_values = ", ".join(f"{n} = {float(value):g}" for n, value in point.items())
+                sides = " and ".join(mpmath.nstr(side.value, 6) for side in (lhs, rhs))
+                suffix = f" where {symbol_values}" if symbol_values else ""
+                message = f"the sides are {sides}{suffix}"
+                yield FormulaComparison("wrong", right.start, right.end, message)
                 return
 
 
-def _without_integral(side: Expression, other: Expression) -> tuple[Expression, Expression]:
-    """What an integral without limits is of, and the derivative of the other side."""
+def _without_integral(side: Expression, opposite: Expression) -> tuple[Expression, Expression]:
+    """Differentiate both sides, if the first is an integral without limits."""
     if side.kind != "integral" or len(side.parts) > 2:
-        return side, other
-    what, by = side.parts
-    return what, Expression("derivative", other.start, other.end, (other, by))
+        return side, opposite
+    integrand, variable = side.parts
+    derivative = Expression("derivative", opposite.start, opposite.end, (opposite, variable))
+    return integrand, derivative
 
 
-def _precise(mp: Any) -> Arithmetic:
-    """Numbers of mpmath."""
+def _mpmath_arithmetic(mp: Any) -> Arithmetic:
 
     def power(base: Any, exponent: Any) -> Any:
-        if exponent and mp.mag(exponent) > _MOST_BITS:
+        if exponent and mp.mag(exponent) > _MAX_BITS:
             raise OverflowError
         return base**exponent
 

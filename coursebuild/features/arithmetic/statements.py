@@ -1,8 +1,8 @@
-r"""What a formula states: statements, each a chain of sides with relations between them.
+r"""Splits a formula into statements, each a chain of sides with relations between them.
 
-Entry point: `read_statements(tex)`. A formula is cut at commas, wide spaces and arrows into
-statements, and a statement at its relations into sides, all outside of braces and brackets. A side
-that is not understood says why, and its neighbours are read all the same.
+Entry point: `read_statements(tex)`. A formula is split at commas, wide spaces and arrows into
+statements, and a statement at its relations into sides, all outside braces and brackets. A side
+that is not understood holds the reason, and the other sides are read all the same.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from msgspec import Struct
 from coursebuild.features.arithmetic.expressions import CONSTANTS, Expression, NotUnderstood
 from coursebuild.features.arithmetic.tex import GREEK, SPACE, TOKEN, read_expression
 
-_LONG = 5_000
+_MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")
 _ENVIRONMENT = re.compile(r"\\(?:begin|end)\{(?:aligned|split|align\*?|gathered|equation\*?)\}")
 _WORDS = re.compile(
     r"\\(?:mathrm|text|textrm|begin|end)\s*(?:\{[^{}]*\}|\w)"
     rf"|\\(?!(?:{'|'.join(GREEK - {'pi', 'infty'})})(?![A-Za-z]))[A-Za-z]+"
 )
-"""What has letters that are no symbols."""
+"""Commands and words whose letters are no symbols."""
 _RELATIONS = {
     **{sign: sign for sign in "=<>"},
     **dict.fromkeys((r"\approx", r"\simeq", "≈"), "≈"),
@@ -42,20 +42,20 @@ _CLOSING = frozenset(("}", ")", "]", r"\}", r"\end", r"\rangle"))
 
 
 class FormulaSide(Struct, frozen=True):
-    """One side of a relation, and where it stands in the TeX."""
+    """One side of a relation, and its range in the TeX."""
 
     start: int
     end: int
     expression: Expression | NotUnderstood
 
-    numeric: bool
-    """Whether it shows numbers and no symbols, as far as can be told."""
+    is_numeric: bool
+    """Whether it has numbers and no symbols; a guess if it is not understood."""
 
-    def understood(self) -> Expression:
-        """The expression.
+    def get_expression(self) -> Expression:
+        """Return the expression.
 
         Raises:
-            NotUnderstood: it is none.
+            NotUnderstood: the side is not understood.
         """
         if isinstance(self.expression, NotUnderstood):
             raise self.expression
@@ -63,7 +63,7 @@ class FormulaSide(Struct, frozen=True):
 
 
 class Statement(Struct, frozen=True):
-    """Sides with the relations between them: `=`, `≈`, `<` …, or `?` for one of other kinds."""
+    """Sides with the relations between them: `=`, `≈`, `<` …, or `?` for any other."""
 
     sides: tuple[FormulaSide, ...]
     relations: tuple[str, ...]
@@ -71,17 +71,17 @@ class Statement(Struct, frozen=True):
 
 @functools.lru_cache(maxsize=256)
 def read_statements(tex: str) -> tuple[Statement, ...]:
-    """What a formula states."""
-    return tuple(_statements(tex)) if len(tex) <= _LONG else ()
+    """Return the statements of a formula; none if it is too long."""
+    return tuple(_read_statements(tex)) if len(tex) <= _MAX_LENGTH else ()
 
 
-def _statements(tex: str) -> Iterator[Statement]:
-    tex = _ENVIRONMENT.sub(lambda found: " " * len(found[0]), tex)
+def _read_statements(tex: str) -> Iterator[Statement]:
+    tex = _ENVIRONMENT.sub(lambda match: " " * len(match[0]), tex)
     sides: list[FormulaSide] = []
     relations: list[str] = []
-    for start, end, sign in _pieces(tex):
+    for start, end, sign in _split_sides(tex):
         if SPACE.sub("", tex[start:end]).strip("."):
-            sides.append(_side(tex, start, end))
+            sides.append(_read_side(tex, start, end))
         if sign:
             relations.append(_RELATIONS[sign])
             continue
@@ -90,8 +90,8 @@ def _statements(tex: str) -> Iterator[Statement]:
         sides, relations = [], []
 
 
-def _pieces(tex: str) -> Iterator[tuple[int, int, str]]:
-    """Where the pieces of a formula stand, and the relation after each; empty at other cuts."""
+def _split_sides(tex: str) -> Iterator[tuple[int, int, str]]:
+    """Yield the range of each side, and the relation after it; empty at the end of a statement."""
     depth, start = 0, 0
     for token in TOKEN.finditer(tex):
         sign = token[0]
@@ -102,22 +102,23 @@ def _pieces(tex: str) -> Iterator[tuple[int, int, str]]:
             space = SPACE.match(tex, token.end())
             after = TOKEN.match(tex, space.end() if space else token.end())
             if after is not None and after[0] in _RELATIONS:
-                continue  # the next row goes on with what is before it
+                continue  # the next row continues the statement
         if sign == "," and _DIGITS.match(tex, token.start() - 1):
-            continue  # which may stand for a point, or for nothing
+            continue  # a comma between digits, which `read_expression` refuses
         if sign in _RELATIONS or sign in _CUTS:
             yield start, token.start(), sign if sign in _RELATIONS else ""
             start = token.end()
     yield start, len(tex), ""
 
 
-def _side(tex: str, start: int, end: int) -> FormulaSide:
+def _read_side(tex: str, start: int, end: int) -> FormulaSide:
     try:
-        found = read_expression(tex, start, end)
+        expression = read_expression(tex, start, end)
     except NotUnderstood as reason:
         rest = _WORDS.sub("", tex[start:end])
-        numeric = re.search("[0-9]", rest) is not None and re.search("[A-Za-z]", rest) is None
-        return FormulaSide(start, end, reason, numeric)
-    symbols = (one.text for one in found.walk() if one.kind == "symbol")
-    numeric = all(name in CONSTANTS for name in symbols) and not found.has("derivative", "integral")
-    return FormulaSide(start, end, found, numeric)
+        is_numeric = re.search("[0-9]", rest) is not None and re.search("[A-Za-z]", rest) is None
+        return FormulaSide(start, end, reason, is_numeric)
+    symbols = (part.text for part in expression.walk() if part.kind == "symbol")
+    has_calculus = expression.has("derivative", "integral")
+    is_numeric = all(name in CONSTANTS for name in symbols) and not has_calculus
+    return FormulaSide(start, end, expression, is_numeric)

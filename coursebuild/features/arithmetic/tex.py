@@ -1,8 +1,8 @@
-r"""TeX → expressions: the part of its mathematics whose meaning is certain.
+r"""Parses the part of mathematics in TeX whose meaning is certain.
 
-Entry point: `read_expression(tex, start, end)`, by recursive descent. A number, a symbol or a group
-beside another is a product; what can be read in two ways (`a/bc`, `f(x)`, `2\tfrac12`) is not
-understood. A number is `12`, `1\,000`, `1{,}000` or `0.5`; `\mathrm{kg}` behind it is its unit.
+Entry point: `read_expression(tex, start, end)`, by recursive descent. Numbers, symbols and groups
+side by side are a product; what can be read in two ways (`a/bc`, `f(x)`, `2\tfrac12`) is not
+understood. A number is `12`, `1\,000`, `1{,}000` or `0.5`; `\mathrm{kg}` after it is its unit.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import re
 
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 
-_MOST = 100
-"""Factors of an expression, so that nothing nests deeper."""
+_MAX_FACTORS = 100
+"""The limit for one expression, which also limits how deep it nests."""
 TOKEN = re.compile(r"\\[A-Za-z]+\*?|\\[\s\S]|[\s\S]")
 SPACE = re.compile(
     r"(?:\s|&|~|\\[,;:! ]|\\(?:left|right|[bB]igg?[lrm]?|displaystyle|textstyle|nolimits|limits"
@@ -34,9 +34,9 @@ GREEK = frozenset(
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _FRACTIONS = frozenset((r"\frac", r"\tfrac", r"\dfrac"))
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
-_AFTER = frozenset(")]}|+-−=<>,;:.!'_^/*") | {r"\rvert", r"\cdot", r"\times", r"\div", "⋅", "×"}
+_NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^/*") | {r"\rvert", r"\cdot", r"\times", r"\div", "⋅", "×"}
 _ONE, _TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
-_ODD = {
+_REASONS = {
     ",": "a comma between digits may part two numbers",
     r"\pm": "`\\pm` has two values",
     r"\mp": "`\\mp` has two values",
@@ -47,21 +47,23 @@ _ODD = {
     r"\begin": "it is an array",
     r"\log": "the base of `\\log` is not said",
 }
-_ODD |= {rf"\{name}": "something is left out" for name in "dots ldots cdots dotsc dotsb".split()}
+_REASONS |= {
+    rf"\{name}": "something is left out" for name in "dots ldots cdots dotsc dotsb".split()
+}
 
 
 def read_expression(tex: str, start: int, end: int) -> Expression:
-    """What stands between two offsets, but for a full stop at its end.
+    """Parse the TeX between two offsets, except for a full stop at its end.
 
     Raises:
-        NotUnderstood: it has another meaning, several, or none.
+        NotUnderstood: its meaning is unknown or ambiguous.
     """
     reader = _Reader(tex, start, end)
-    found = reader.sum()
-    reader.takes(".")
+    expression = reader.sum()
+    reader.take(".")
     if reader.peek():
-        raise reader.odd()
-    return found
+        raise reader.not_understood()
+    return expression
 
 
 class _Reader:
@@ -70,24 +72,24 @@ class _Reader:
     def __init__(self, tex: str, start: int, end: int) -> None:
         self.tex, self.at, self.end = tex, start, end
         self.count = 0
-        self.seen: tuple[int, str] = (-1, "")
-        """Where the last token that was looked at stands, and the token."""
+        self.peeked: tuple[int, str] = (-1, "")
+        """The offset of the last token that `peek` returned, and the token."""
 
     # --- tokens
 
     def peek(self) -> str:
-        """The next token, past spaces; empty at the end."""
-        if self.seen[0] == self.at:  # each rule asks again
-            return self.seen[1]
+        """Return the next token, past spaces; empty at the end."""
+        if self.peeked[0] == self.at:  # each rule asks again
+            return self.peeked[1]
         space = SPACE.match(self.tex, self.at, self.end)
         if space is not None:
             self.at = space.end()
-        found = TOKEN.match(self.tex, self.at, self.end)
-        self.seen = self.at, found[0] if found is not None else ""
-        return self.seen[1]
+        token = TOKEN.match(self.tex, self.at, self.end)
+        self.peeked = self.at, token[0] if token is not None else ""
+        return self.peeked[1]
 
-    def takes(self, *signs: str) -> str:
-        """The next token, passed over, where it is one of these."""
+    def take(self, *signs: str) -> str:
+        """Consume and return the next token if it is one of these."""
         sign = self.peek()
         if not sign or sign not in signs:
             return ""
@@ -95,20 +97,22 @@ class _Reader:
         return sign
 
     def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        """What of a pattern stands next, past spaces."""
+        """Match a pattern at the next token."""
         self.peek()
         return pattern.match(self.tex, self.at, self.end)
 
-    def odd(self, reason: str = "") -> NotUnderstood:
-        """That what stands next is not understood."""
+    def not_understood(self, reason: str = "") -> NotUnderstood:
+        """Return the exception that says that the next token is not understood."""
         sign = self.peek()
         if not reason:
-            reason = _ODD.get(sign, f"`{sign}` is not known" if sign else "something is missing")
+            reason = _REASONS.get(
+                sign, f"`{sign}` is not known" if sign else "something is missing"
+            )
         return NotUnderstood(reason, self.at, min(self.end, self.at + max(1, len(sign))))
 
     def group(self) -> Expression:
-        """An argument: a group in braces, or what a single token is."""
-        if self.takes("{"):
+        """Parse an argument: a group in braces, or a single token."""
+        if self.take("{"):
             return self.bracket("}")
         digit = self.peek()
         if digit.isascii() and digit.isdigit():
@@ -117,8 +121,8 @@ class _Reader:
         return self.base()
 
     def raw(self) -> str:
-        """The text of an argument."""
-        if not self.takes("{"):
+        """Return the text of an argument."""
+        if not self.take("{"):
             sign = self.peek()
             self.at += len(sign)
             return sign
@@ -132,124 +136,125 @@ class _Reader:
     # --- grammar
 
     def sum(self) -> Expression:
-        """Terms with signs between."""
+        """Parse terms with signs between them."""
         self.peek()
         start = self.at
-        sign = self.takes("+", "-", "−")
-        found = self.product()
+        sign = self.take("+", "-", "−")
+        total = self.product()
         if sign in ("-", "−"):
-            found = Expression("-", start, self.at, (found,))
-        while sign := self.takes("+", "-", "−"):
+            total = Expression("-", start, self.at, (total,))
+        while sign := self.take("+", "-", "−"):
             term = self.product()
-            found = Expression("+" if sign == "+" else "-", start, self.at, (found, term))
-        return found
+            total = Expression("+" if sign == "+" else "-", start, self.at, (total, term))
+        return total
 
     def product(self) -> Expression:
-        """Factors, with signs between or side by side."""
-        found = self.power()
-        divided = False
+        """Parse factors, with signs between them or side by side."""
+        product = self.power()
+        is_quotient = False
         while True:
-            sign = self.takes(r"\cdot", r"\times", "*", "/", r"\div", "⋅", "×")
-            if not sign and not self.begins():
-                return found
-            if divided:
-                raise self.odd("what `/` divides by can be read in two ways")
+            sign = self.take(r"\cdot", r"\times", "*", "/", r"\div", "⋅", "×")
+            if not sign and not self.begins_factor():
+                return product
+            if is_quotient:
+                raise self.not_understood("what `/` divides by can be read in two ways")
             start = self.at
             factor = self.unit() if not sign else None
             if factor is None:
-                minus = self.takes("-") if sign else ""
+                minus = self.take("-") if sign else ""
                 factor = self.power()
                 if minus:
                     factor = Expression("-", start, self.at, (factor,))
-                if not sign and (_begins_with_digit(factor) or _is_mixed(found, factor)):
+                if not sign and (_begins_with_digit(factor) or _is_mixed(product, factor)):
                     raise factor.not_understood("two numbers stand side by side")
-                if not sign and found.kind == "symbol" and self.tex[start] in "([":
+                if not sign and product.kind == "symbol" and self.tex[start] in "([":
                     _refuse_application(factor)
-            divided = sign in ("/", r"\div")
-            unit = self.unit() if divided else None
-            if unit is not None and found.has("unit"):  # `10 m/2 s`, and else `1/2 m`
+            is_quotient = sign in ("/", r"\div")
+            unit = self.unit() if is_quotient else None
+            if unit is not None and product.has("unit"):  # `10 m/2 s`, unlike `1/2 m`
                 factor, unit = Expression("*", start, self.at, (factor, unit)), None
-            found = Expression("/" if divided else "*", found.start, self.at, (found, factor))
+            kind = "/" if is_quotient else "*"
+            product = Expression(kind, product.start, self.at, (product, factor))
             if unit is not None:
-                found = Expression("*", found.start, self.at, (found, unit))
+                product = Expression("*", product.start, self.at, (product, unit))
 
-    def begins(self) -> bool:
-        """Whether a factor begins here, side by side with the one before."""
+    def begins_factor(self) -> bool:
+        """Whether another factor begins here, with no sign before it."""
         sign = self.peek()
         if not sign or self.match(_DIFFERENTIAL):
             return False
-        return sign not in _AFTER and (sign != "." or self.match(_NUMBER) is not None)
+        return sign not in _NO_FACTOR and (sign != "." or self.match(_NUMBER) is not None)
 
     def unit(self) -> Expression | None:
-        """The unit that stands here: an upright group that is no differential and no constant."""
+        """Parse a unit, if there is one: an upright group, but no differential and no constant."""
         self.peek()
         start = self.at
-        if self.takes(r"\%"):
+        if self.take(r"\%"):
             return Expression("unit", start, self.at, text="%")
-        found = self.match(_UPRIGHT)
-        if found is None:
+        upright = self.match(_UPRIGHT)
+        if upright is None:
             return None
-        self.at = found.end()
+        self.at = upright.end()
         text = self.raw()
         if text in ("d", "e"):
             self.at = start
             return None
-        power = ""
-        if self.takes("^"):
-            power = "^" + self.raw()
-        return Expression("unit", start, self.at, text=unit_text(text) + power)
+        exponent = ""
+        if self.take("^"):
+            exponent = "^" + self.raw()
+        return Expression("unit", start, self.at, text=unit_text(text) + exponent)
 
     def power(self) -> Expression:
-        """A base with what is raised behind it."""
-        found = self.base()
-        while self.takes("^"):
+        """Parse a base with its exponents."""
+        power = self.base()
+        while self.take("^"):
             if self.match(_DEGREES):
                 self.raw()
-                return self.degrees(found)
-            if self.peek() in ("*", "'", r"\prime", r"\top") or found.kind == "^":
-                raise self.odd()
+                return self.degrees(power)
+            if self.peek() in ("*", "'", r"\prime", r"\top") or power.kind == "^":
+                raise self.not_understood()
             exponent = self.group()
-            found = Expression("^", found.start, self.at, (found, exponent))
-        if self.takes("°"):
-            return self.degrees(found)
+            power = Expression("^", power.start, self.at, (power, exponent))
+        if self.take("°"):
+            return self.degrees(power)
         if self.peek() in ("!", "'", "_"):
-            raise self.odd()
-        return found
+            raise self.not_understood()
+        return power
 
     def degrees(self, number: Expression) -> Expression:
-        """A number of degrees, of which the sign was passed."""
+        """Return a number of degrees, whose sign has been consumed."""
         unit = Expression("unit", number.end, self.at, text="deg")
         return Expression("*", number.start, self.at, (number, unit))
 
     def base(self) -> Expression:
-        """A number, a symbol, a group, a fraction, a root or a function."""
+        """Parse a number, a symbol, a group, a fraction, a root or a function."""
         sign = self.peek()
         start = self.at
         self.count += 1
-        if self.count > _MOST:
-            raise self.odd("it is too long")
+        if self.count > _MAX_FACTORS:
+            raise self.not_understood("it is too long")
         if number := self.match(_NUMBER):
             self.at = number.end()
             digits = re.sub(r"[^0-9.]", "", number[0])
             return Expression("number", start, self.at, text=digits)
         if sign in _BRACKETS:
             self.at += len(sign)
-            found = self.bracket(_BRACKETS[sign])
-            bars = sign in ("|", r"\lvert")
-            parts = (found,) if bars else found.parts
-            return Expression("abs" if bars else found.kind, start, self.at, parts, found.text)
+            inner = self.bracket(_BRACKETS[sign])
+            if sign in ("|", r"\lvert"):
+                return Expression("abs", start, self.at, (inner,), inner.text)
+            return Expression(inner.kind, start, self.at, inner.parts, inner.text)
         self.at += len(sign)
         if sign in _FRACTIONS:
             return self.fraction(start)
         if sign == r"\sqrt":
-            index = self.bracket("]") if self.takes("[") else _TWO
+            index = self.bracket("]") if self.take("[") else _TWO
             root = Expression("/", start, start, (_ONE, index))
             return Expression("^", start, self.at, (self.group(), root))
         if sign in (r"\underbrace", r"\overbrace"):
-            found = self.group()
-            if self.takes("_", "^"):
+            inner = self.group()
+            if self.take("_", "^"):
                 self.raw()
-            return found
+            return inner
         if sign == r"\int":
             return self.integral(start)
         if sign.lstrip("\\") in _FUNCTIONS and sign != sign.lstrip("\\"):
@@ -262,14 +267,14 @@ class _Reader:
         return self.symbol(start)
 
     def bracket(self, end: str) -> Expression:
-        """What stands before the end of a bracket."""
-        found = self.sum()
-        if not self.takes(end):
-            raise self.odd()
-        return found
+        """Parse the rest of a bracket, up to its end."""
+        inner = self.sum()
+        if not self.take(end):
+            raise self.not_understood()
+        return inner
 
     def symbol(self, start: int) -> Expression:
-        """A letter with its accent and its subscript."""
+        """Parse a letter with its accent and its subscript."""
         sign = self.peek()
         name = sign.lstrip("\\")
         self.at += len(sign)
@@ -282,73 +287,73 @@ class _Reader:
             text = sign
         else:
             self.at = start
-            raise self.odd()
-        if self.takes("_"):
+            raise self.not_understood()
+        if self.take("_"):
             text += f"_{{{self.raw()}}}"
-        while self.takes("'"):
+        while self.take("'"):
             text += "'"
         if text == "e" and self.peek() == "^":
             text = r"\mathrm{e}"
         return Expression("symbol", start, self.at, text=text)
 
     def fraction(self, start: int) -> Expression:
-        """A fraction, or a derivative."""
-        mark = self.at
-        top_braced = self.takes("{")
+        """Parse a fraction or a derivative."""
+        numerator_start = self.at
+        has_brace = self.take("{")
         if self.match(_DIFFERENTIAL):
-            if not top_braced:
-                raise self.odd()
+            if not has_brace:
+                raise self.not_understood()
             return self.derivative(start)
-        self.at = mark
+        self.at = numerator_start
         return Expression("/", start, self.at, (self.group(), self.group()))
 
     def derivative(self, start: int) -> Expression:
-        """A derivative whose fraction was begun: of what its numerator has, or what follows."""
-        self.at = self.match(_DIFFERENTIAL).end()  # type: ignore[union-attr]  # it was seen
-        what = None if self.peek() == "}" else self.sum()
-        if not (self.takes("}") and self.takes("{") and (by := self.match(_DIFFERENTIAL))):
-            raise self.odd("only first derivatives are understood")
-        self.at = by.end()
+        """Parse the rest of a derivative, of a function in its numerator or after it."""
+        self.at = self.match(_DIFFERENTIAL).end()  # type: ignore[union-attr]  # it is the next token
+        function = None if self.peek() == "}" else self.sum()
+        if not (self.take("}") and self.take("{") and (denominator := self.match(_DIFFERENTIAL))):
+            raise self.not_understood("only first derivatives are understood")
+        self.at = denominator.end()
         self.peek()
         symbol = self.symbol(self.at)
-        if not self.takes("}"):
-            raise self.odd("only first derivatives are understood")
-        parts = (self.product() if what is None else what, symbol)
+        if not self.take("}"):
+            raise self.not_understood("only first derivatives are understood")
+        parts = (self.product() if function is None else function, symbol)
         return Expression("derivative", start, self.at, parts)
 
     def integral(self, start: int) -> Expression:
-        """An integral up to its differential."""
+        """Parse an integral up to its differential."""
         limits: dict[str, Expression] = {}
-        while sign := self.takes("_", "^"):
+        while sign := self.take("_", "^"):
             limits[sign] = self.group()
         if self.match(_DIFFERENTIAL):
-            raise self.odd("the differential stands before what is integrated")
-        what = self.sum()
-        by = self.match(_DIFFERENTIAL)
-        if by is None or len(limits) == 1:
-            raise self.odd("the integral has no differential, or no limits")
-        self.at = by.end()
+            raise self.not_understood("the differential stands before what is integrated")
+        integrand = self.sum()
+        differential = self.match(_DIFFERENTIAL)
+        if differential is None or len(limits) == 1:
+            raise self.not_understood("the integral has no differential, or no limits")
+        self.at = differential.end()
         self.peek()
         symbol = self.symbol(self.at)
         ends = (limits["_"], limits["^"]) if limits else ()
-        return Expression("integral", start, self.at, (what, symbol, *ends))
+        return Expression("integral", start, self.at, (integrand, symbol, *ends))
 
     def function(self, name: str, start: int) -> Expression:
-        """A function of a bracket, or of the factors that follow."""
+        """Parse a function of a bracket, or of the factors that follow."""
         exponent = None
-        if self.takes("^"):
+        if self.take("^"):
             exponent = self.group()
             if exponent.kind != "number":
                 raise exponent.not_understood("an inverse or a power can be meant")
-        alone = self.peek() in _BRACKETS
-        what = self.power()
-        while not alone and self.begins() and self.peek()[1:] not in _FUNCTIONS:
+        is_bracket = self.peek() in _BRACKETS
+        argument = self.power()
+        while not is_bracket and self.begins_factor() and self.peek()[1:] not in _FUNCTIONS:
             if self.peek() in _BRACKETS:
-                raise self.odd("it may be a factor of the function, or of what it is of")
+                raise self.not_understood("it may be a factor of the function, or of what it is of")
             factor = self.power()
-            what = Expression("*", what.start, self.at, (what, factor))
-        found = Expression(name, start, self.at, (what,))
-        return Expression("^", start, self.at, (found, exponent)) if exponent else found
+            argument = Expression("*", argument.start, self.at, (argument, factor))
+        value = Expression(name, start, self.at, (argument,))
+        return Expression("^", start, self.at, (value, exponent)) if exponent else value
 
 
 def _begins_with_digit(factor: Expression) -> bool:
@@ -358,21 +363,21 @@ def _begins_with_digit(factor: Expression) -> bool:
 
 
 def _is_mixed(left: Expression, right: Expression) -> bool:
-    """Whether a whole number stands before a fraction of numbers."""
-    plain = right.kind == "/" and all(part.kind == "number" for part in right.parts)
+    """Whether this is a mixed number: a number before a fraction of numbers."""
+    is_fraction = right.kind == "/" and all(part.kind == "number" for part in right.parts)
     while left.kind in ("*", "-") and left.parts:
         left = left.parts[-1]
-    return plain and left.kind == "number"
+    return is_fraction and left.kind == "number"
 
 
 def _refuse_application(factor: Expression) -> None:
-    """A symbol before a bracket may be a function of what is in it."""
+    """Raise where a symbol before a bracket can be a function of its content."""
     if factor.kind in ("symbol", "number", "/", "*"):
         raise factor.not_understood("it may be a product or a function of this")
 
 
 def unit_text(tex: str) -> str:
-    r"""A unit as text: `kg*m^2` for `kg\,m^2`."""
+    r"""Return a unit as text: `kg*m^2` for `kg\,m^2`."""
     text = re.sub(r"\\[,;: ]|\\cdot|~|·", "*", tex)
     text = text.replace(r"\mu", "µ").replace(r"\Omega", "Ω").replace(r"\%", "%")
     return re.sub(r"\^\{(-?\d+)\}", r"^\1", text).strip("*")

@@ -198,7 +198,7 @@ def _is_address(link: model.Link) -> bool:
 
 def _is_claim(side: FormulaSide, tex: str) -> bool:
     if not isinstance(side.expression, Expression):
-        return side.numeric or _DECIMAL.search(tex, side.start, side.end) is not None
+        return side.is_numeric or _DECIMAL.search(tex, side.start, side.end) is not None
     parts = tuple(side.expression.walk())
     numbers = [part.text for part in parts if part.kind == "number"]
     if any("." in number for number in numbers):
@@ -206,7 +206,7 @@ def _is_claim(side: FormulaSide, tex: str) -> bool:
     units = any(part.kind == "unit" for part in parts)
     powers = any(part.kind == "^" and part.parts[0].text == "10" for part in parts)
     large = any(int(number) > _COUNTS for number in numbers)
-    return bool(side.numeric and numbers and (units or powers or large))
+    return bool(side.is_numeric and numbers and (units or powers or large))
 
 
 def _trimmed(text: str, start: int, end: int) -> tuple[int, int]:

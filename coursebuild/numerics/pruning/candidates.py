@@ -254,7 +254,9 @@ def far_bodies(
     model, tree = text.model, text.model.body_treeid
     used_names = {name for inner in text.elements for name in _references(inner, code_names)}
     used_names |= set(code_names)
-    used_names |= {name.rstrip("0123456789") for name in used_names}  # what is repeated has a number
+    used_names |= {
+        name.rstrip("0123456789") for name in used_names
+    }  # what is repeated has a number
     ranks = dict.fromkeys(_moving_trees(model, runs), 3)
     roots: dict[Element, list[int]] = {}
     for element, ids in text.things("body"):

@@ -40,41 +40,41 @@ TOKENS = (
 
 
 def test_what_holds_is_passed_and_symbols_are_left_alone() -> None:
-    wrong = [
-        (tex, found)
-        for texts, passed in ((HOLDS, True), (SILENT, False))
+    failures = [
+        (tex, comparisons)
+        for texts, is_compared in ((HOLDS, True), (SILENT, False))
         for tex in texts.strip().splitlines()
-        for found in (check_arithmetic(tex),)
-        if bool(found) is not passed or any(one.kind != "holds" for one in found)
+        for comparisons in (check_arithmetic(tex),)
+        if bool(comparisons) is not is_compared or any(c.kind != "holds" for c in comparisons)
     ]
-    assert wrong == []
+    assert failures == []
 
 
 def test_sides_without_a_number_to_compare_are_held_against_each_other() -> None:
-    (found,) = check_arithmetic(r"\sqrt{2} = \sqrt{2.01}")
-    assert found.message == "1.414213562 and 1.417744688 are not the same"
+    (comparison,) = check_arithmetic(r"\sqrt{2} = \sqrt{2.01}")
+    assert comparison.message == "1.414213562 and 1.417744688 are not the same"
 
 
 @given(st.lists(st.decimals(-1000, 1000, places=4), min_size=1, max_size=6), st.integers(-9, 9))
 def test_a_sum_is_told_just_where_its_last_digit_is_wrong(terms: list[Decimal], off: int) -> None:
     result = sum(terms) + Decimal(off).scaleb(-4)
     tex = " + ".join(f"({term:f})" for term in terms) + f" = {result:f}"
-    (found,) = check_arithmetic(tex)
-    assert found.kind == ("wrong" if off else "holds")
+    (comparison,) = check_arithmetic(tex)
+    assert comparison.kind == ("wrong" if off else "holds")
     if off:
-        assert tex[found.start : found.end].strip("-") == f"{abs(result):f}"
+        assert tex[comparison.start : comparison.end].strip("-") == f"{abs(result):f}"
 
 
 @given(st.lists(st.sampled_from(TOKENS), max_size=40).map(" ".join) | st.text(max_size=60))
 def test_no_text_is_too_odd(tex: str) -> None:
-    for found in check_arithmetic(tex):
-        assert 0 <= found.start <= found.end <= len(tex)
+    for comparison in check_arithmetic(tex):
+        assert 0 <= comparison.start <= comparison.end <= len(tex)
 
 
 def test_what_nests_too_deep_is_not_understood() -> None:
     for tex in ("(" * 2400 + "1" + ")" * 2400, r"\sqrt" * 900 + "1", "1 + " * 1200 + "1"):
-        (found,) = check_arithmetic(tex + " = 1")
-        assert found.message == "it is too long"
+        (comparison,) = check_arithmetic(tex + " = 1")
+        assert comparison.message == "it is too long"
 
 
 IDENTITIES = r"""
@@ -88,5 +88,5 @@ IDENTITIES = r"""
 
 
 def test_identities_hold() -> None:
-    told = [list(check_identity(tex, {"x": ()})) for tex in IDENTITIES.strip().splitlines()]
-    assert told == [[]] * len(told)
+    failures = [list(check_identity(tex, {"x": ()})) for tex in IDENTITIES.strip().splitlines()]
+    assert failures == [[]] * len(failures)
