@@ -1,15 +1,15 @@
-"""The interface of features: how kinds of fences and pages, files of a site and exports enter.
+"""The interface of features: kinds of fences and pages, files of a site, exports, commands.
 
 Entry point: `Feature`, with `FenceKind`, `PageKind`, `ModelPart`, `PagePart`, `PageCopy`,
-`Trials`, `Exporter` and `Command`, which say what a feature has.
+`Trials`, `Exporter` and `Command`.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
-(`features = ["features/NAME.py"]`; see `registry.use_course_features`). All three are alike.
+(`features = ["features/NAME.py"]`; see `registry.use_course_features`). All three work alike.
 docs/how-to/features.md says how to write one.
 
-What the core asks of a block after it was parsed are the methods of `FeatureBlock`
-(`core.model`), so that a checked course can be looked at without its features being loaded.
+What the core asks of a parsed block are methods of `FeatureBlock` (`core.model`), so that a parsed
+course can be used without loading its features.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from coursebuild.core.model.results import (
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
 
-if TYPE_CHECKING:  # the layers above, of which a feature's functions take values
+if TYPE_CHECKING:  # types of the layers above, which functions of features take
     from coursebuild.core.pages.added_files import ExportContext, SiteContext
     from coursebuild.core.pages.assets import Assets
     from coursebuild.core.pages.context import PageContext
@@ -47,8 +47,8 @@ if TYPE_CHECKING:  # the layers above, of which a feature's functions take value
     from coursebuild.core.run.memory import Memory
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
-else:  # names alone, which `help` can show: nothing above is imported
-    for above in (
+else:  # names that `help` can show, without importing the layers above
+    for name in (
         "Assets",
         "ExportContext",
         "Fence",
@@ -62,31 +62,31 @@ else:  # names alone, which `help` can show: nothing above is imported
         "SiteContext",
         "TextParser",
     ):
-        globals()[above] = NewType(above, object)
+        globals()[name] = NewType(name, object)
 
 B = TypeVar("B", bound=FeatureBlock)
 
 Mathml: TypeAlias = Callable[[str, bool], str]
-"""Gives a formula, which stands on a line of its own or not; empty for one that cannot be set."""
+"""Typesets a formula, given whether on a line of its own; empty for one with an error."""
 
 
 class IndexReader(Protocol):
-    """Reads what the search finds of a block."""
+    """Collects what the search can find of a block."""
 
     def add(self, kind: Literal["text", "code", "formula", "output"], text: str) -> None:
-        """Read a text, unless there is nothing in it."""
+        """Add a text, unless it is blank."""
 
-    def also(self, name: str) -> None:
-        """Read a name by which the section is found as well."""
+    def add_name(self, name: str) -> None:
+        """Add a further name by which the section is found."""
 
     def blocks(self, blocks: Iterable[Block]) -> None:
-        """Read the blocks inside."""
+        """Add the blocks inside."""
 
     def text(self, inlines: Iterable[Inline]) -> str:
-        """A line of Markdown as text."""
+        """Inlines as text."""
 
-    def shown(self, block: FeatureBlock) -> Struct | None:
-        """The block's `values`, where its kind has some."""
+    def values(self, block: FeatureBlock) -> Struct | None:
+        """The result of `FenceKind.values` for the block, if its kind has that."""
 
 
 class MarkdownWriter(Protocol):
@@ -98,7 +98,7 @@ class MarkdownWriter(Protocol):
 
     @property
     def live(self) -> str:
-        """The address of that page, where what moves can be seen."""
+        """The address of that page, where moving things can be seen."""
 
     def blocks(self, blocks: tuple[Block, ...]) -> str:
         """Blocks as Markdown."""
@@ -116,14 +116,14 @@ class MarkdownWriter(Protocol):
         """The address of a link."""
 
     def locate(self, href: str) -> str:
-        """An address as the page has it, as the Markdown has it."""
+        """An address on the page, converted for the Markdown."""
 
     def folded(self, label: str, text: str) -> str:
-        """A text behind its label, which is shown on demand where that can be."""
+        """A text folded under its label, where folding is possible."""
 
 
 class Picture(Struct, frozen=True):
-    """A picture of a block, which leads to it."""
+    """A picture of a block that links to it."""
 
     path: str
     """Its site path."""
@@ -132,54 +132,54 @@ class Picture(Struct, frozen=True):
     height: int
     title: str
     anchor: str
-    """The block's, on its page."""
+    """The anchor of the block on its page."""
 
 
 class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
-    """A kind of fence, from its text to a page."""
+    """A kind of fence: its parsing, drawing and other forms."""
 
     name: str
     """The first word of its info string."""
     block: type[B]
     """What `parse` makes."""
     parse: Callable[[Fence, TextParser], Parsed[B | None]]
-    """The block, and what is wrong in it. Without a block the text is shown as code."""
+    """The block and its diagnostics. Without a block the text is shown as code."""
     nested: bool = False
-    """Whether it may stand in a text of another block, where no lines can be updated."""
+    """Whether it may be inside a text of another block, where `update` cannot edit lines."""
     values: Callable[[Library, Place, B], Struct] | None = None
-    """What its page shows of the course beside the block, as `page.shown.blocks` has it by the
-    block's offset: the page is drawn again where this is another."""
+    """What the page shows with the block of the rest of the course; found in `page.inputs.blocks`
+    under the block's offset. The page is drawn again when it changes."""
     draw: Callable[[PageContext, B], Markup]
-    """The block in a page."""
+    """The block on a page."""
     markdown: Callable[[MarkdownWriter, B], str]
     """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
-    picture: Callable[[B, Struct | None], Picture | None] = lambda block, shown: None
-    """A picture of the block for lists of lessons, made with what is shown of its trial."""
+    picture: Callable[[B, Struct | None], Picture | None] = lambda block, value: None
+    """A picture of the block for lists of lessons, given the published value of its trial."""
     wide: bool = True
-    """Whether it takes the whole width of the text, so that no docked block can stand beside it."""
+    """Whether it takes the whole width of the text, so that no block can be docked beside it."""
     index: Callable[[IndexReader, B], None] = lambda reader, block: None
-    """Gives the search what can be found of the block."""
+    """Adds what the search can find of the block."""
 
 
 class PageKind(Struct, frozen=True, kw_only=True):
     """A page that a feature adds to the site, at `NAME/index.html`.
 
-    The interface texts `NAME.title` and `NAME.description` are its title and what it is about.
+    The interface texts `NAME.title` and `NAME.description` are its title and description.
     """
 
     name: str
     values: Callable[[Library], Mapping[str, object]]
-    """All that the page shows of the course: it is drawn again where this is another."""
+    """Everything that the page shows of the course; it is drawn again when this changes."""
     draw: Callable[[Renderer, Mapping[str, Any]], Markup] | None = None
-    """What stands below the page's title. Without it the template `NAME.html` has the page."""
+    """The content below the page's title. Without it, the template `NAME.html` is used."""
     exists: Callable[[Library], bool] = lambda library: True
     """Whether a course has the page."""
     order: int = 100
-    """Its place among such pages in the foot of every page, the lowest first."""
+    """Its place in the foot of every page, the lowest first."""
     indexed: bool = True
     """Whether it is found by searches, and has a copy in Markdown."""
     form: bool = False
-    """Whether it has a form that asks for a page of the site."""
+    """Whether it has a form that leads to a page of the site."""
 
     @property
     def path(self) -> str:
@@ -191,66 +191,65 @@ class ModelPart(Struct, frozen=True, kw_only=True):
     """What a feature adds to the page of every model that compiles."""
 
     facts: Callable[[Library, MjcfModel], Iterable[tuple[str, str]]] = lambda library, model: ()
-    """More of what the model is, as pairs of words."""
+    """Further facts about the model, as pairs of label and value."""
     values: Callable[[Library, Place, MjcfModel], Struct | None]
-    """All else that it shows of the course: the page is drawn again where this is another. `None`:
-    nothing of this model."""
+    """Everything else that it shows of the course; the page is drawn again when this changes.
+    `None` if it shows nothing of this model."""
     draw: Callable[[Renderer, Any], Markup]
-    """What is made of these values."""
+    """The HTML made from these values."""
     opens: bool = False
-    """Whether that stands at the top of the page; if not, below the facts."""
+    """Whether it comes at the top of the page, and not below the facts."""
     picture: Callable[[Library, MjcfModel], Picture | None] = lambda library, model: None
     """A picture of the model, for lists of models."""
 
 
 class PageCopy(Struct, frozen=True, kw_only=True):
-    """A file beside a page that says the same in another form."""
+    """A file with the content of a page in another form."""
 
     ending: str
-    """In the place of `.html`: `.md`."""
+    """The ending that replaces `.html`, such as `.md`."""
     type: str
     """Its media type."""
     text: str
     """Key of the interface text by which a lesson links to it."""
     lessons: bool = False
-    """Whether only written lessons have it; if not, all pages but those that scripts fill in."""
+    """Whether only written lessons have it, and not all pages with text of their own."""
     download: bool = False
-    """Whether a browser saves it, and does not show it."""
+    """Whether a browser saves it instead of showing it."""
 
 
 class PagePart(Struct, frozen=True, kw_only=True):
-    """What a script brings to life in the pages that have it."""
+    """A script, and the pages that it is for."""
 
     mark: str
-    """A piece of HTML by which these pages are known, as `data-tabs`; no other part has it."""
+    """A piece of HTML that marks these pages, such as `data-tabs`; unique to this part."""
     code: str = ""
-    """The script, run when the page is parsed."""
+    """The script, which runs once the page is parsed."""
     bundled: str = ""
-    """The name of a script of coursebuild itself, in the place of `code`."""
+    """The name of a script of coursebuild itself, instead of `code`."""
     late: bool = False
-    """Whether the script of every page loads it, when a reader comes near."""
+    """Whether it is loaded only when a reader comes near."""
     kinds: tuple[str, ...] = ()
-    """Kinds of pages that have it, where not all do that have the mark."""
+    """The kinds of pages it is for, if not all with the mark."""
     texts: tuple[str, ...] = ()
-    """Keys of interface texts that the script asks for, or beginnings of such, which end in a dot.
-    """
+    """Keys of interface texts that the script uses, or prefixes of keys, which end in a dot."""
 
 
 class Exporter(Struct, frozen=True, kw_only=True):
-    """What `coursebuild export NAME` writes: a course in which nothing is wrong, as one file."""
+    """What `coursebuild export NAME` writes: a course without errors as one file."""
 
     name: str
     summary: str
-    """What it writes, in a few words for `coursebuild export --help`."""
+    """A few words on what it writes, for `coursebuild export --help`."""
     file: str
-    """What the file is called where the command does not say."""
+    """The default name of the file."""
     mark: str
-    """How the file of an earlier export is known, which may be replaced: a path in the archive, or
-    a text near the beginning of a single file."""
+    """The sign of an earlier export, which may be replaced: a path in the archive, or a text near
+    the beginning of a single file."""
     make: Callable[[ExportContext], Iterable[SiteFile | Diagnostic]]
-    """The files of the archive, and warnings of what it cannot hold."""
+    """The files of the archive, and warnings about what it cannot hold."""
     archive: bool = True
-    """Whether it is a ZIP archive; if not, `make` gives one file."""
+    """Whether it is a ZIP archive; otherwise `make` yields a single file."""
 
 
 class Command(Struct, frozen=True, kw_only=True):
@@ -258,15 +257,15 @@ class Command(Struct, frozen=True, kw_only=True):
 
     name: str
     summary: str
-    """What it does, in a few words for `coursebuild --help`."""
+    """A few words on what it does, for `coursebuild --help`."""
     module: str
-    """The module of its `declare(parser)`, which adds arguments, and of its `run(arguments)`, which
-    gives the exit status. It is imported when the command is given, and may import all of
-    coursebuild: a feature lies below the commands, and what it does for one above."""
+    """The module with `declare(parser)`, which adds arguments, and `run(arguments)`, which returns
+    the exit status. It is imported when the command is called, and may import all of coursebuild,
+    since commands are a layer above features."""
 
 
 class Trial(Struct, frozen=True):
-    """Something of a course that is tried when the course is verified."""
+    """Something in a course that is tried when the course is verified."""
 
     name: str
     """Unique in the course, as `4.2-lab-1`."""
@@ -276,57 +275,57 @@ class Trial(Struct, frozen=True):
 
 
 class TrialContext(Struct, frozen=True):
-    """What trials are given."""
+    """The context of trials."""
 
     root: Path
     """The course's folder."""
     course: Course
     models: Mapping[str, CompileResult]
-    """Of `models/`, by name."""
+    """The compiled models of `models/`, by name."""
     memory: Memory
-    """What is remembered of earlier trials, and where results are kept."""
-    wrong: Sequence[Diagnostic] = ()
-    """What is known to be wrong already: a block in which something is need not be tried."""
+    """The memory of earlier trials, which also keeps new results."""
+    diagnostics: Sequence[Diagnostic] = ()
+    """Diagnostics so far: a block with one need not be tried."""
     static: bool = False
-    """Whether pages are made of the results."""
+    """Whether pages will be made from the results."""
 
 
-Tried: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]
-"""What trials gave, and what is wrong."""
+TrialOutcome: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]
+"""The results of trials, and their diagnostics."""
 
 
 class TrialRun(Protocol):
-    """Trials that are under way in a thread."""
+    """Trials running in a thread."""
 
-    def run(self, trials: Sequence[Trial]) -> Tried:
+    def run(self, trials: Sequence[Trial]) -> TrialOutcome:
         """Try them in turn."""
 
     def stop(self) -> None:
-        """From another thread: end what runs, and let nothing begin."""
+        """Called from another thread: end the running trial, and start no other."""
 
 
 class PublishedTrials(Struct, frozen=True):
-    """What a site has of trials."""
+    """The results of trials as a site needs them."""
 
-    shown: Mapping[str, Struct] = {}
-    """What the page of a block shows, by the trial's name."""
+    values: Mapping[str, Struct] = {}
+    """The value that the page of a block shows, by the trial's name."""
     files: tuple[OutputFile, ...] = ()
 
 
 class Trials(Struct, frozen=True, kw_only=True):
-    """What a feature tries when a course is verified."""
+    """The trials of a feature when a course is verified."""
 
     find: Callable[[Course], Iterable[Trial]]
-    """All there are in a course, in order."""
+    """All trials of a course, in order."""
     start: Callable[[TrialContext], TrialRun]
     inputs: Callable[[Trial], Inputs | None]
-    """What a result depends on besides files; `None` for what is not run."""
+    """What a result depends on besides files; `None` for a trial that is not run."""
     publish: Callable[[Results, Assets], PublishedTrials]
-    """What a site needs of the results."""
+    """The parts of the results that a site needs."""
 
 
 class Feature(Struct, frozen=True, kw_only=True):
-    """What a lesson can hold or a site can offer. Everything but the name is optional."""
+    """Something a lesson can hold or a site can offer. Everything but the name is optional."""
 
     name: str
     needs: tuple[str, ...] = ()
@@ -334,39 +333,39 @@ class Feature(Struct, frozen=True, kw_only=True):
     fences: tuple[FenceKind[Any], ...] = ()
     pages: tuple[PageKind, ...] = ()
     summary: Callable[[Document, Mathml], Parsed[Struct | None]] | None = None
-    """What other pages show of a document, from all its text; nothing where that says nothing.
-    It goes with the document's summary (`Library.summaries`). And what is wrong in it."""
+    """What other pages show of a document, made from its whole text, with diagnostics. It is kept
+    with the document's summary (`Library.summaries`); `None` if there is nothing."""
     model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
-    """Mistakes that it can name, in addition to the catalogue (`coursebuild.core.text.rules`)."""
+    """Rules of its own, in addition to the catalogue (`coursebuild.core.text.rules`)."""
     check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
-    """What is wrong in some documents of the course, beside what parsing found."""
+    """The diagnostics about some documents of the course that parsing did not find."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
-    """What is wrong once the scripts have run."""
+    """The diagnostics about finished runs of scripts."""
     unproven: Callable[[Course], Iterable[Diagnostic | str]] | None = None
-    """What nothing in the course proves, and lines that sum it up, for `check --truth`."""
+    """What nothing in the course proves, and summary lines, for `check --truth`."""
     check_models: (
         Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
     ) = None
-    """What is wrong once models are compiled, given what is known of the model of a block."""
+    """The diagnostics that need compiled models; the function gives those of a block."""
     trials: Trials | None = None
     schemas: Mapping[str, tuple[type[Struct], str]] = {}
-    """JSON Schemas for editors, by the name that `coursebuild schema` takes: type and title."""
+    """JSON Schemas for editors by the name that `coursebuild schema` takes: type and title."""
     refine_schema: Callable[[dict[str, Any]], None] | None = None
-    """Adds to the definitions of a schema, by the name of the struct, what types cannot say."""
+    """Adds what types cannot say to the definitions of a schema, by the name of the struct."""
     texts: Mapping[str, str] = {}
-    """Interface texts by language, as TOML; those in English (`en`) stand for missing ones."""
+    """Interface texts by language, as TOML; English ones (`en`) stand in for missing ones."""
     style: str = ""
-    """CSS that every page of the site gets."""
+    """CSS for every page of the site."""
     parts: tuple[PagePart, ...] = ()
     copies: tuple[PageCopy, ...] = ()
-    """Those that `files` gives of pages."""
+    """The copies of pages among its `files`."""
     note: Callable[[PageInputs, PageContext | None, str], bytes] | None = None
-    """What `files` has to know of a page, from its inputs, the document on it and its HTML; it is
-    kept with the page. Nothing where that says nothing."""
+    """What `files` must know of a page, made from its inputs, its document and its HTML; it is kept
+    with the page. Empty if there is nothing."""
     files: Callable[[SiteContext], Iterable[SiteFile | FileList]] | None = None
     """Further files of the site."""
     exporters: tuple[Exporter, ...] = ()
-    """What `coursebuild export` can write."""
+    """Formats of `coursebuild export`."""
     commands: tuple[Command, ...] = ()
-    """Further commands, if it is installed: one that a course brings itself has none."""
+    """Further commands; only an installed feature can have some, not one of a course."""

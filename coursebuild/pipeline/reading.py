@@ -319,10 +319,12 @@ class PageReader:
         """A document with all its text, on its page."""
         from coursebuild.core.pages.context import PageContext
 
-        assert inputs.shown is not None, "a page with a document shows it"
+        assert inputs.document_inputs is not None, "a page with a document shows it"
         whole = self._whole(text)
         renderer = self._renderer_for(language, templates, whole)
-        return PageContext(renderer, inputs.shown, Place(inputs.head.path), whole.document)
+        return PageContext(
+            renderer, inputs.document_inputs, Place(inputs.head.path), whole.document
+        )
 
     def _renderer_for(self, language: str, own: Texts, whole: _Whole | None) -> Renderer:
         """Words and templates, with the formulas of a document."""

@@ -11,7 +11,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TypeVar
 
-from coursebuild.core.features import Trial, TrialContext, Trials, Tried
+from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
 from coursebuild.pipeline.progress import Progress
 
 T = TypeVar("T")
@@ -22,12 +22,12 @@ def run_with_trials(
     trials: Sequence[tuple[Trials, Trial]],
     context: TrialContext,
     progress: Progress,
-) -> tuple[T, Tried]:
+) -> tuple[T, TrialOutcome]:
     """What scripts gave, and what trials gave that went on in a thread meanwhile."""
     groups = groupby(trials, key=itemgetter(0))
     runs = [(kind.start(context), [trial for _, trial in group]) for kind, group in groups]
 
-    def try_all() -> Tried:
+    def try_all() -> TrialOutcome:
         tried = [run.run(those) for run, those in runs]
         results = tuple(result for found, _ in tried for result in found)
         return results, tuple(wrong for _, found in tried for wrong in found)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from coursebuild.core.features import TrialContext, Tried
+from coursebuild.core.features import TrialContext, TrialOutcome
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run.memory import Memory
@@ -57,7 +57,7 @@ def try_labs(
     wrong: Sequence[Diagnostic] = (),
     documents: frozenset[str] | None = None,
     seconds: float = SECONDS,
-) -> Tried:
+) -> TrialOutcome:
     """What comes of the labs of a course, or of some of its documents, without static forms."""
     memory = Memory(options.root, options.store)
     context = TrialContext(options.root, course, models or {}, memory, wrong)

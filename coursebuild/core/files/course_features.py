@@ -15,7 +15,7 @@ from coursebuild.core.features import Feature
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course, NamedPath
-from coursebuild.core.registry import clash, installed_features, use_course_features
+from coursebuild.core.registry import find_clash, installed_features, use_course_features
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 
@@ -39,7 +39,7 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
         feature = _run(entry.path, code)
         if isinstance(feature, str):
             tell(entry, feature)
-        elif reason := clash(feature, (*installed_features(), *features)):
+        elif reason := find_clash(feature, (*installed_features(), *features)):
             tell(entry, f"{entry.path}: {reason}")
         else:
             features.append(feature)

@@ -115,7 +115,7 @@ def callout(page: PageContext, block: Callout) -> Markup:
     return page.template(
         "blocks/callout.html",
         callout=block,
-        kind=page.shown.callouts[block.kind],
+        kind=page.inputs.callouts[block.kind],
         title=page.inlines(block.title),
         body=page.blocks(block.blocks),
     )
@@ -127,7 +127,7 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
         "blocks/mjcf.html",
         mjcf=block,
         html=page.highlight("xml", block.code.text.rstrip("\n")),
-        engine=page.shown.engine,
+        engine=page.inputs.engine,
     )
 
 
@@ -166,7 +166,7 @@ def _output(page: PageContext, block: Recording) -> ShownOutput:
 
 def output_receipt(page: PageContext, block: Recording) -> Receipt:
     """What can be said for a recorded output."""
-    words, shown = page.words, page.shown
+    words, shown = page.words, page.inputs
     verdict, run = shown.verdicts.get(block.span.start), shown.runs.get(block.script or "")
     versions = {"engine": shown.engine, "python": shown.python}
     if verdict is None or verdict.status == "unchecked":
@@ -218,7 +218,7 @@ def short(value: Decimal) -> str:
 
 def script_receipt(page: PageContext, block: Script) -> Receipt:
     """What can be said for a script without a recorded output."""
-    words, shown = page.words, page.shown
+    words, shown = page.words, page.inputs
     run = shown.runs.get(block.path)
     if run is not None and run.recorded:
         return Receipt("verified", words("receipt.once_ran", when=run.recorded))

@@ -39,7 +39,7 @@ from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import file_address
 from coursebuild.core.pages.equations import number_equations
 from coursebuild.core.pages.html_context import Context, OwnBlock
-from coursebuild.core.pages.page_inputs import ShownDocument
+from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.registry import kind_of_block
@@ -49,7 +49,7 @@ class PageContext(Context, Struct, frozen=True, dict=True):
     """One document on one page."""
 
     renderer: Renderer
-    shown: ShownDocument
+    inputs: DocumentInputs
     place: urls.Place
     document: Document
 
@@ -87,7 +87,7 @@ class PageContext(Context, Struct, frozen=True, dict=True):
 
     def href(self, target: Target) -> str:
         """The address of a link's target."""
-        return self.shown.hrefs[target]
+        return self.inputs.hrefs[target]
 
     def url(self, url: str) -> str:
         """An address as written, but a file of the course becomes its place in the site."""
@@ -115,7 +115,7 @@ class PageContext(Context, Struct, frozen=True, dict=True):
             here = (known.number for known in self.equations.values() if known.id == name)
             number = next(here, "")
             return f"({number})" if number else ""
-        return self.shown.equations.get(target, "")
+        return self.inputs.equations.get(target, "")
 
     def code(self, language: str, text: str) -> Markup:
         """A code block that is only shown."""

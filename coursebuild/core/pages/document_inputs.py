@@ -14,11 +14,13 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import ShownDocument, ShownRun, ShownVerdict
+from coursebuild.core.pages.page_inputs import DocumentInputs, ShownRun, ShownVerdict
 from coursebuild.core.registry import kind_of_block
 
 
-def document_inputs(library: Library, place: urls.Place, document: model.Document) -> ShownDocument:
+def document_inputs(
+    library: Library, place: urls.Place, document: model.Document
+) -> DocumentInputs:
     """All that the document's page shows besides what stands in the document.
 
     The summary of a document does as well as the document.
@@ -34,7 +36,7 @@ def document_inputs(library: Library, place: urls.Place, document: model.Documen
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((b.span.start, library.tried.get((b.span.path, b.span.start))) for b in ours)
     values = ((block, kind_of_block(block).values) for block in ours)
-    return ShownDocument(
+    return DocumentInputs(
         engine=library.results.engine,
         python=library.results.python,
         hrefs={target: address(library, place, path, target) for target in targets},

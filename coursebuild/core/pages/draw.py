@@ -17,8 +17,8 @@ from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.highlight import highlight_lines
 from coursebuild.core.pages.page_inputs import (
     AddedParts,
-    Graphed,
-    Highlighted,
+    HighlightedFile,
+    LessonGraph,
     PageHead,
     PageInputs,
 )
@@ -36,8 +36,8 @@ def draw(
     page: PageContext | None = None
     values = {name: _drawn(value, renderer) for name, value in inputs.values.items()}
     head = inputs.head
-    if document is not None and inputs.shown is not None:
-        page = PageContext(renderer, inputs.shown, urls.Place(head.path), document)
+    if document is not None and inputs.document_inputs is not None:
+        page = PageContext(renderer, inputs.document_inputs, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor
@@ -51,9 +51,9 @@ def draw(
 
 def _drawn(value: object, renderer: Renderer) -> object:
     match value:
-        case Highlighted():
+        case HighlightedFile():
             return numbered_lines(highlight_lines(value.language, value.text), value.path)
-        case Graphed():
+        case LessonGraph():
             return drawings(value, renderer.words)
         case AddedParts():
             parts = model_parts()

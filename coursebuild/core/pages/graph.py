@@ -22,7 +22,7 @@ from coursebuild.core.drawing.marks import markup_text, shorten_to_width, text_w
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import Graphed, GraphNode
+from coursebuild.core.pages.page_inputs import GraphNode, LessonGraph
 from coursebuild.core.pages.strings import Strings
 
 _BESIDE = 5
@@ -55,7 +55,7 @@ _EDGE = 2.0
 """Room for the lines around nodes at the edge of a drawing."""
 
 
-def neighbourhood(library: Library, place: urls.Place, lesson: Lesson) -> Graphed | None:
+def neighbourhood(library: Library, place: urls.Place, lesson: Lesson) -> LessonGraph | None:
     """What a lesson needs and leads to, and what comes before that; `None` for next to nothing."""
     # The last few in the order of the course: what comes right before counts most.
     needs = sorted(lesson.prerequisites, key=library.positions.__getitem__)[-_BESIDE:]
@@ -68,7 +68,7 @@ def neighbourhood(library: Library, place: urls.Place, lesson: Lesson) -> Graphe
     return _graph(library, place, shown, current=lesson.id) if len(shown) > 2 else None
 
 
-def of_level(library: Library, place: urls.Place, level: Level) -> Graphed | None:
+def of_level(library: Library, place: urls.Place, level: Level) -> LessonGraph | None:
     """The lessons of a level, and those of other levels that they need."""
     own = dict.fromkeys(lesson.id for lesson in level.lessons)
     if not 2 < len(own) <= _IN_LEVEL:
@@ -88,11 +88,11 @@ def _graph(
     *,
     current: str = "",
     level: str | None = None,
-) -> Graphed:
+) -> LessonGraph:
     lessons = [library.lessons[id] for id in sorted(shown, key=library.positions.__getitem__)]
     ids = [lesson.id for lesson in lessons]
     edges = transitive_reduction(ids, ((n, one.id) for one in lessons for n in one.prerequisites))
-    return Graphed(
+    return LessonGraph(
         tuple(
             GraphNode(
                 lesson.id,
@@ -111,7 +111,7 @@ def _graph(
 # --- drawing
 
 
-def drawings(graph: Graphed, words: Strings) -> tuple[Markup, Markup]:
+def drawings(graph: LessonGraph, words: Strings) -> tuple[Markup, Markup]:
     """The drawing with titles, and the one without; what is where is the same in both."""
     places = {node.id: str(number) for number, node in enumerate(graph.nodes)}
     layout = _layout(len(places), tuple((places[a], places[b]) for a, b in graph.edges))
@@ -124,7 +124,7 @@ def _layout(count: int, edges: tuple[tuple[str, str], ...]) -> Layout:
     return layered_layout([str(number) for number in range(count)], edges, 1.0, 0.0, _PASSING)
 
 
-def _drawing(graph: Graphed, layout: Layout, words: Strings, look: _Look) -> Markup:
+def _drawing(graph: LessonGraph, layout: Layout, words: Strings, look: _Look) -> Markup:
     longest = max(text_width(node.id, _SIZE) for node in graph.nodes)
     wide = max(look.width, longest + 26)
     unit = wide + look.gap

@@ -105,7 +105,7 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         "lesson.html",
         values,
         document=document.source.path,
-        shown=document_inputs(library, place, document),
+        document_inputs=document_inputs(library, place, document),
     )
 
 

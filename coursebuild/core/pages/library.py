@@ -226,9 +226,9 @@ class Library(Struct, frozen=True, dict=True):
 
 def _placed(course: Course, trials: PublishedTrials) -> dict[tuple[str, int], Struct]:
     """What is shown of trials, by the places of their blocks: one that moved stays the same."""
-    found = feature_trials(course) if trials.shown else {}
-    spans = {name: trial.block.span for name, (_, trial) in found.items() if name in trials.shown}
-    return {(span.path, span.start): trials.shown[name] for name, span in spans.items()}
+    found = feature_trials(course) if trials.values else {}
+    spans = {name: trial.block.span for name, (_, trial) in found.items() if name in trials.values}
+    return {(span.path, span.start): trials.values[name] for name, span in spans.items()}
 
 
 def links(course: Course, document: Document) -> Iterator[Target]:

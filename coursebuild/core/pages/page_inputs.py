@@ -1,11 +1,11 @@
-"""A page that is to be drawn, as a value: everything that it shows but the text of its document.
+"""The inputs of a page: everything that it shows except the text of its document, as a value.
 
 Entry point: `PageInputs`, with its `PageHead`.
 
 A page is drawn from its inputs, its document, and the tool's templates and words, and from nothing
-else: so it need be drawn again only when one of these is another. What inputs are made of are plain
-values (texts, numbers, tuples, mappings and data classes of them); what a page looks up in the
-course (where a link leads, what a script printed) stands in it as the answer.
+else, so it is drawn again only when one of these changes. Inputs are plain values (texts, numbers,
+tuples, mappings and structs of them). What a page needs from the course (where a link leads, what a
+script printed) has been looked up already.
 """
 
 from __future__ import annotations
@@ -21,63 +21,62 @@ from coursebuild.core.model.results import Outcome
 
 
 class ShownRun(Struct, frozen=True):
-    """What a page may say of the run of a script."""
+    """What a page shows of the run of a script."""
 
     outcome: Outcome
     missing: tuple[str, ...]
-    """Modules that are not there."""
+    """Required modules that are not installed."""
     lines: tuple[tuple[int, str | None], ...] = ()
-    """Lines that it printed, by number from 1, as far as questions of the page ask for them;
-    `None` where there is no such line."""
+    """The printed lines that the page quotes, by number from 1; `None` for a missing line."""
     recorded: str = ""
-    """When and where it was made, of a run that the course keeps."""
+    """When and where a run that the course keeps was made."""
 
 
 class ShownVerdict(Struct, frozen=True):
-    """What a page says of the comparison of an output."""
+    """What a page shows of the comparison of an output."""
 
     status: Literal["verified", "drift", "volatile", "unchecked"]
     comparison: Comparison
 
 
-class ShownDocument(Struct, frozen=True):
-    """What the page of a document shows of the rest of the course, and of what running it found.
+class DocumentInputs(Struct, frozen=True):
+    """What the page of a document shows of the rest of the course and of its results.
 
-    What stands at a place in the document goes by its offset there.
+    Integer keys are offsets in the document.
     """
 
     engine: str = ""
     """Version of MuJoCo."""
     python: str = ""
     hrefs: Mapping[Target, str] = field(default_factory=dict)
-    """Addresses of links, as seen from the page."""
+    """Addresses of links, relative to the page."""
     equations: Mapping[Target, str] = field(default_factory=dict)
-    """What links to formulas of other pages say, where they have no text."""
+    """The texts of links to formulas on other pages that have none of their own."""
     callouts: Mapping[str, CalloutKind] = field(default_factory=dict)
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
     """By path of the script."""
     verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
     trials: Mapping[int, Struct] = field(default_factory=dict)
-    """What features show of what was tried."""
+    """The values that features publish of trials."""
     blocks: Mapping[int, Struct] = field(default_factory=dict)
-    """What features show of the course beside their blocks."""
+    """The values that features show with their blocks (`FenceKind.values`)."""
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
     address: str = ""
-    """The page's full address; empty where nobody knows where the site will stand."""
+    """The page's full address; empty if the site's is not known."""
 
 
-class Highlighted(Struct, frozen=True):
-    """A file whose tokens are marked when the page is drawn."""
+class HighlightedFile(Struct, frozen=True):
+    """A file whose syntax is highlighted when the page is drawn."""
 
     language: str
     text: str
     path: str
-    """By which its lines are linked to."""
+    """Its path, which the anchors of its lines are made from."""
 
 
 class AddedParts(Struct, frozen=True):
-    """What features add to the page, drawn when the page is: by the name of the feature."""
+    """The parts that features add to the page, by feature; drawn when the page is drawn."""
 
     values: Mapping[str, Struct]
 
@@ -92,20 +91,20 @@ class GraphNode(Struct, frozen=True):
     current: bool
     """Whether it is the lesson of the page."""
     outside: bool
-    """Whether it is of another level than the page's."""
+    """Whether it belongs to another level than the page."""
 
 
-class Graphed(Struct, frozen=True):
-    """Which lessons build on which, drawn when the page is: for wide and narrow screens."""
+class LessonGraph(Struct, frozen=True):
+    """A graph of lessons that build on each other, drawn when the page is drawn."""
 
     nodes: tuple[GraphNode, ...]
     """In the order of the course."""
     edges: tuple[tuple[str, str], ...]
-    """Ids: what is needed, and what needs it."""
+    """Ids of a prerequisite and of the lesson that builds on it."""
 
 
 class PageHead(Struct, frozen=True):
-    """What the frame of a page shows of it."""
+    """What the frame of a page shows about it."""
 
     path: str
     """Its site path."""
@@ -119,12 +118,12 @@ class PageHead(Struct, frozen=True):
 
 
 class PageInputs(Struct, frozen=True):
-    """A page that is to be drawn."""
+    """The inputs of a page."""
 
     head: PageHead
     template: str
     values: Mapping[str, object]
-    """For the template; `Highlighted`, `AddedParts` and `Graphed` among them are drawn first."""
+    """Values for the template; each `HighlightedFile`, `AddedParts` or `LessonGraph` is drawn."""
     document: str | None = None
-    """The path of its document, whose text and contents the template gets as well."""
-    shown: ShownDocument | None = None
+    """The path of its document, whose text and contents the template also gets."""
+    document_inputs: DocumentInputs | None = None

@@ -20,7 +20,7 @@ from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import of_level
 from coursebuild.core.pages.lesson import LessonLink, edit_address, lesson_link, level_view
 from coursebuild.core.pages.library import Library, ModelUse
-from coursebuild.core.pages.page_inputs import AddedParts, Highlighted, PageHead, PageInputs
+from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.registry import model_parts
 
@@ -137,7 +137,7 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "title": title,
         "href": place.href(urls.model_file_path(model.name)),
         "facts": () if facts is None else (*_facts(library, facts), *more),
-        "code": Highlighted("xml", model.source.text.rstrip(), model.source.path),
+        "code": HighlightedFile("xml", model.source.text.rstrip(), model.source.path),
         "about": model.description,
         "opening": _added(parts, shown, opens=True),
         "added": _added(parts, shown, opens=False),
@@ -190,7 +190,7 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
         "page.html",
         {"title": page.title, "edit": edit_address(library, page.path)},
         document=document.source.path,
-        shown=document_inputs(library, place, document),
+        document_inputs=document_inputs(library, place, document),
     )
 
 

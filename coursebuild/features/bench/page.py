@@ -103,14 +103,14 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
 
 def index_bench(reader: IndexReader, block: Bench) -> None:
     """The model, and what happened to it."""
-    reader.also(block.model)
-    shown = reader.shown(block)
+    reader.add_name(block.model)
+    shown = reader.values(block)
     if isinstance(shown, ShownBench) and shown.report is not None:
         reader.add("text", shown.report.title or shown.report.name)
 
 
 def _shown(page: PageContext, block: Bench) -> ShownBench:
-    shown = page.shown.blocks[block.span.start]
+    shown = page.inputs.blocks[block.span.start]
     assert isinstance(shown, ShownBench)
     return shown
 

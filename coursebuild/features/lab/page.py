@@ -66,8 +66,8 @@ class LabView(Struct, frozen=True):
 def draw_lab(page: PageContext, block: Lab) -> Markup:
     """A lab in its static form."""
     view, words, address = page_view(page, block), page.renderer.words, ""
-    if view.key and page.shown.address:  # from paper to the lab, where its place is known
-        address = f"{page.shown.address}#{quote(view.key)}"
+    if view.key and page.inputs.address:  # from paper to the lab, where its place is known
+        address = f"{page.inputs.address}#{quote(view.key)}"
     return page.template(
         "lab/lab.html",
         lab=view,
@@ -84,9 +84,9 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
 
 def page_view(page: PageContext, block: Lab) -> LabView:
     """A lab of a document on its page."""
-    found, model = page.shown.trials.get(block.span.start), block.fields.model
+    found, model = page.inputs.trials.get(block.span.start), block.fields.model
     live = found if isinstance(found, ShownLab) else None
-    view = lab_view(page.renderer.words, page.place, block, live, page.shown.engine)
+    view = lab_view(page.renderer.words, page.place, block, live, page.inputs.engine)
     href = "" if model is None else page.href(ModelTarget(model))
     return replace(view, model_href=href, start=_start(page, block))
 
@@ -140,7 +140,7 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
     labels += [readout.label for readout in lab.fields.readouts]
     reader.add("text", ", ".join(filter(None, labels)))
     if lab.fields.model is not None:
-        reader.also(lab.fields.model)
+        reader.add_name(lab.fields.model)
     if lab.xml is not None:
         reader.add("code", lab.xml.text)
 
@@ -167,7 +167,7 @@ def _start(page: PageContext, block: Lab) -> str | None:
     key = block.fields.key
     if key is None or isinstance(key, str):
         return key
-    names = page.shown.keyframes.get(block.fields.model or "", ())
+    names = page.inputs.keyframes.get(block.fields.model or "", ())
     return (names[key] if 0 <= key < len(names) else "") or str(key)
 
 

@@ -25,7 +25,7 @@ from typing import Any, Self
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.features import Trial, TrialContext, Tried
+from coursebuild.core.features import Trial, TrialContext, TrialOutcome
 from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.run.child import MEMORY
 from coursebuild.core.run.mjcf import model_files
@@ -90,7 +90,7 @@ class LabTrials:
         self._context, self._seconds = context, seconds
         self._engines = engines or Engines(context.root, context.course.limits.memory)
 
-    def run(self, trials: Sequence[Trial]) -> Tried:
+    def run(self, trials: Sequence[Trial]) -> TrialOutcome:
         """Try them in turn, and end the engines."""
         results: list[TrialResult] = []
         found: list[Diagnostic] = []
@@ -104,7 +104,7 @@ class LabTrials:
     def _try(self, trial: Trial) -> tuple[TrialResult | None, list[Diagnostic]]:
         context, engines, lab = self._context, self._engines, trial.block
         assert isinstance(lab, Lab)
-        if any(lab.span.contains(diagnostic.span) for diagnostic in context.wrong):
+        if any(lab.span.contains(diagnostic.span) for diagnostic in context.diagnostics):
             return None, []
         if not (lab.is_of_text or context.static):
             return None, []  # which nothing is claimed of, and nobody looks at

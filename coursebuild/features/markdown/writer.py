@@ -88,14 +88,14 @@ class DocumentWriter(BlockWriter):
     # --- callouts, io, MJCF
 
     def _callout(self, block: model.Callout) -> str:
-        label = f"**{escaped(self.page.shown.callouts[block.kind].label)}**"
+        label = f"**{escaped(self.page.inputs.callouts[block.kind].label)}**"
         title = self.inlines(block.title)
         head = f"{label} {title}" if title else label
         inner = self.blocks(block.blocks)
         return quoted(f"{head}\n\n{inner}" if inner else head)
 
     def _mjcf(self, block: model.Mjcf) -> str:
-        shown = self.page.shown
+        shown = self.page.inputs
         label = (
             self.words("mjcf.fragment", element=block.fragment)
             if block.fragment

@@ -51,7 +51,7 @@ def note_cells(inputs: PageInputs, page: PageContext | None, body: str) -> bytes
     """The cells of a lesson as JSON; nothing for another page."""
     if page is None or inputs.head.kind != "lesson":
         return b""
-    words, address = page.renderer.words, page.shown.address
+    words, address = page.renderer.words, page.inputs.address
     locate = functools.partial(_whole, address)
     here = locate(page.place.href(inputs.head.path))
     writer = DocumentWriter(page, locate, here, notebook=True)
@@ -146,7 +146,7 @@ def _footnotes(writer: DocumentWriter) -> Iterator[Cell]:
 def _script_cells(writer: DocumentWriter, section: str, block: Script) -> Iterator[Cell]:
     """A script, and what is to be said of its outputs."""
     recordings = writer.page.joined.get(block.span.start, ())
-    run = writer.page.shown.runs.get(block.path)
+    run = writer.page.inputs.runs.get(block.path)
     ran = run is not None and run.outcome is Outcome.OK
     output = None
     remarks: list[str] = []

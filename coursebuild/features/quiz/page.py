@@ -128,7 +128,7 @@ def _compared(page: PageContext, script: str) -> str:
     """How the numbers in the output of a script are compared, for the page's script."""
     for block in document_blocks(page.document):
         if isinstance(block, Recording) and block.script == script:
-            verdict = page.shown.verdicts.get(block.span.start)
+            verdict = page.inputs.verdicts.get(block.span.start)
             if verdict is not None:
                 return _rule(verdict.comparison)
     return _rule(Comparison(Mode.DIGITS))
@@ -168,7 +168,7 @@ def letter(index: int) -> str:
 
 def output_line(page: PageContext, question: OutputQuestion) -> str | None:
     """The line of the output that is asked for; `None` where the script did not run to its end."""
-    run = page.shown.runs.get(question.script)
+    run = page.inputs.runs.get(question.script)
     if run is None or run.outcome is not Outcome.OK:
         return None
     return dict(run.lines)[question.line]

@@ -13,7 +13,7 @@ from coursebuild.core.model import Document
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.lesson import LessonLink
-from coursebuild.core.pages.page_inputs import Highlighted, PageInputs, ShownDocument
+from coursebuild.core.pages.page_inputs import DocumentInputs, HighlightedFile, PageInputs
 from coursebuild.features.search.sections import (
     Section,
     SectionPiece,
@@ -65,10 +65,10 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
     if isinstance(head, LessonLink):
         lead += (", ".join(head.aliases), *head.objectives)
     if document is not None:
-        known = inputs.shown or ShownDocument()
+        known = inputs.document_inputs or DocumentInputs()
         labels = {kind: shown.label for kind, shown in known.callouts.items()}
         return document_sections(document, lead, labels, known.blocks)
-    code = [v.text for v in inputs.values.values() if isinstance(v, Highlighted)]
+    code = [v.text for v in inputs.values.values() if isinstance(v, HighlightedFile)]
     pieces = [SectionPiece("text", text) for text in lead if text]
     pieces += [SectionPiece("code", text) for text in code if text]
     drawn = () if inputs.head.kind in _LEADS else drawn_sections(body)

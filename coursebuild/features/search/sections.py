@@ -95,11 +95,11 @@ class SectionReader:
         if text:
             self._pieces.append(SectionPiece(kind, text))
 
-    def also(self, name: str) -> None:
+    def add_name(self, name: str) -> None:
         """A name by which the section is found as well."""
         self._also[name] = None
 
-    def shown(self, block: model.FeatureBlock) -> Struct | None:
+    def values(self, block: model.FeatureBlock) -> Struct | None:
         """What its page shows of the course beside a block."""
         return self._shown.get(block.span.start)
 

@@ -66,7 +66,7 @@ def values(library: Library, place: urls.Place, block: TruthTable) -> TruthRows:
 
 
 def _table(page: PageContext, block: TruthTable) -> Table:
-    shown = page.shown.blocks[block.span.start]
+    shown = page.inputs.blocks[block.span.start]
     assert isinstance(shown, TruthRows)
 
     def cell(inline: Inline) -> Cell:
