@@ -84,9 +84,9 @@ file = "content/pages/about.md"
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_a_complete_map(newline: str) -> None:
-    parsed = parse(COMPLETE.replace("\n", newline))
-    assert parsed.diagnostics == ()
-    course = parsed.value
+    parsed_map = parse(COMPLETE.replace("\n", newline))
+    assert parsed_map.diagnostics == ()
+    course = parsed_map.value
     assert course is not None
     assert (course.title, course.summary) == (
         "Simulation with MuJoCo",
@@ -164,7 +164,7 @@ def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
         | st.text(max_size=3)
     )
     mutated = COMPLETE[:at] + piece + COMPLETE[at + data.draw(st.integers(0, 20)) :]
-    parsed = parse(mutated)
-    assert parsed.value is not None or parsed.diagnostics
-    orders = [d.order for d in parsed.diagnostics]
+    parsed_map = parse(mutated)
+    assert parsed_map.value is not None or parsed_map.diagnostics
+    orders = [d.order for d in parsed_map.diagnostics]
     assert orders == sorted(orders)

@@ -41,7 +41,7 @@ class Plate(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", t
 
 
 class Part(Struct, frozen=True):
-    """A struct that takes whatever else stands there."""
+    """A struct that takes unknown fields."""
 
     name: Text
 
@@ -70,9 +70,9 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 
 def read(text: str) -> Decoding[Body]:
     source = Source("lesson.md", text)
-    parsed = parse_json(Excerpt.of_span(source.span()), source.span())
-    assert parsed.value is not None
-    return decode(parsed.value, Body, "the body", JSON)
+    parsed_json = parse_json(Excerpt.of_span(source.span()), source.span())
+    assert parsed_json.value is not None
+    return decode(parsed_json.value, Body, "the body", JSON)
 
 
 def test_a_clean_value() -> None:
@@ -111,9 +111,11 @@ def test_markdown_is_found_in_the_order_of_the_text() -> None:
 
 
 def test_toml_has_other_nouns() -> None:
-    parsed = parse_toml(Source("x.toml", 'name = 2024-01-01\nshape = 3\n[parts]\nname = "x"\n'))
-    assert parsed.value is not None
-    decoding = decode(parsed.value, Body, "the body", TOML)
+    parsed_toml = parse_toml(
+        Source("x.toml", 'name = 2024-01-01\nshape = 3\n[parts]\nname = "x"\n')
+    )
+    assert parsed_toml.value is not None
+    decoding = decode(parsed_toml.value, Body, "the body", TOML)
     assert shown(decoding.diagnostics) == [
         "1:8-18 field-type: `name` must be a string, not a date or time"
         ' [put it between quotes: `"2024-01-01"`]',
@@ -144,8 +146,8 @@ DOCUMENTS = st.dictionaries(
 ).map(lambda value: {"name": "x", **value})
 
 
-def accepted(text: str) -> Body | None:
-    """What msgspec itself makes of it, as far as it checks the same."""
+def msgspec_value(text: str) -> Body | None:
+    """The value that msgspec itself decodes; `None` for one that it refuses."""
     try:
         return msgspec.json.decode(text, type=Body)
     except msgspec.ValidationError:
@@ -156,15 +158,15 @@ def accepted(text: str) -> Body | None:
 def test_decoding_agrees_with_msgspec(value: object) -> None:
     text = json.dumps(value)
     decoding = read(text)
-    expected = accepted(text)
+    expected = msgspec_value(text)
     if expected is not None:
         assert decoding.value == expected
         assert decoding.diagnostics == ()
     elif not decoding.diagnostics:
-        # a tag that msgspec demands and that may be left out here
+        # msgspec requires a tag that may be left out here
         shape = decoding.value.shape if decoding.value is not None else None
         assert isinstance(shape, Disc)
-        assert accepted(json.dumps({**json.loads(text), "shape": msgspec.to_builtins(shape)}))
+        assert msgspec_value(json.dumps({**json.loads(text), "shape": msgspec.to_builtins(shape)}))
 
 
 # ---------------------------------------------------------------------------------------- schemas
@@ -186,5 +188,5 @@ def test_schemas_say_what_the_declarations_say(name: str, root: type[Struct]) ->
     assert set(main["properties"]) == set(root.__struct_fields__)
     assert main["additionalProperties"] is False
 
-    described = [key for key, item in definitions.items() if not item.get("description")]
-    assert described == []
+    without_description = [key for key, item in definitions.items() if not item.get("description")]
+    assert without_description == []

@@ -1,4 +1,4 @@
-"""What a document becomes, and what its author is told: the fixture files, case by case.
+"""The documents and diagnostics of the fixture files, case by case.
 
 A file in `tests/fixtures/syntax/` whose name begins with `page` is parsed as a page, all others as
 lessons. `pytest tests/core/syntax --rewrite-fixtures` writes the expected parts anew.
@@ -21,7 +21,7 @@ FILES = sorted(FOLDER.glob("*.md"))
 KINDS = frozenset(kind.name for kind in CALLOUTS)
 
 
-def dumped(path: Path, case: Case) -> str:
+def dump_document(path: Path, case: Case) -> str:
     source = Source("content/lessons/1.1-x.md", case.input)
     return dump(parse_document(source, KINDS, lesson=not path.stem.startswith("page")))
 
@@ -33,4 +33,4 @@ def test_every_file_of_the_folder_is_read() -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_documents_are_as_their_fixtures_say(path: Path, rewriting: bool) -> None:
-    check_cases(path, lambda case: dumped(path, case), rewriting=rewriting)
+    check_cases(path, lambda case: dump_document(path, case), rewriting=rewriting)

@@ -47,41 +47,41 @@ from support.plain_html import plain_html
 from support.random_lessons import KINDS, markdown
 
 
-def parsed(text: str, lesson: bool = True) -> Parsed[Document]:
+def parse(text: str, lesson: bool = True) -> Parsed[Document]:
     return parse_document(Source("x.md", text), KINDS, lesson=lesson)
 
 
 @settings(max_examples=250)
 @given(markdown(), st.booleans())
 def test_parsing_never_raises_and_every_node_stands_where_it_says(text: str, lesson: bool) -> None:
-    result = parsed(text, lesson)
+    result = parse(text, lesson)
     document = result.value
     plain_html(document)
     for diagnostic in result.diagnostics:
         assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
         assert diagnostic.message and not diagnostic.message.endswith(".")
-    siblings(document.blocks)
+    check_order(document.blocks)
     for block in document_blocks(document):
-        within(block.span, Span(document.source, 0, len(text)))
+        check_within(block.span, Span(document.source, 0, len(text)))
         for child in child_blocks(block):
-            within(child.span, block.span)
+            check_within(child.span, block.span)
         if isinstance(block, ListBlock):
             for item in block.items:
-                within(item.span, block.span)
+                check_within(item.span, block.span)
         if isinstance(block, Heading | Paragraph | HtmlFlow):
-            inlines_within(block.children, block.span)
+            check_inlines(block.children, block.span)
     for block in own_blocks(document):
-        slices_back_to_its_text(block, text)
+        check_block_text(block, text)
 
 
-def slices_back_to_its_text(block: Block, text: str) -> None:
+def check_block_text(block: Block, text: str) -> None:
     for excerpt in excerpts(block):
-        faithful(excerpt, text)
+        check_characters(excerpt, text)
     for inline in walk_inlines(block_inlines(block)):
         if isinstance(inline, Math):
-            faithful(inline.tex, text)
+            check_characters(inline.tex, text)
         if not isinstance(block, Table | HtmlFlow):
-            slices_back(inline)
+            check_marks(inline)
     if isinstance(block, Script) or (
         isinstance(block, Recording) and isinstance(block.body, Excerpt)
     ):
@@ -93,26 +93,26 @@ def slices_back_to_its_text(block: Block, text: str) -> None:
 
 @given(st.binary(max_size=200))
 def test_decoded_bytes_never_raise(data: bytes) -> None:
-    parsed(data.decode("utf-8", "replace"))
-    parsed(data.decode("latin-1"))
+    parse(data.decode("utf-8", "replace"))
+    parse(data.decode("latin-1"))
 
 
-def within(inner: Span, outer: Span) -> None:
+def check_within(inner: Span, outer: Span) -> None:
     assert outer.start <= inner.start <= inner.end <= outer.end
 
 
-def siblings(nodes: tuple[Block, ...]) -> None:
+def check_order(nodes: tuple[Block, ...]) -> None:
     for first, second in pairwise(nodes):
         assert first.span.end <= second.span.start
 
 
-def inlines_within(inlines: tuple[Inline, ...], outer: Span) -> None:
+def check_inlines(inlines: tuple[Inline, ...], outer: Span) -> None:
     for first, second in pairwise(inlines):
         assert first.span.end <= second.span.start
     for inline in inlines:
-        within(inline.span, outer)
+        check_within(inline.span, outer)
         if isinstance(inline, Emphasis | Strong | Strikethrough | Link):
-            inlines_within(inline.children, inline.span)
+            check_inlines(inline.children, inline.span)
 
 
 def own_blocks(document: Document) -> Iterator[Block]:
@@ -137,32 +137,32 @@ def excerpts(block: Block) -> Iterator[Excerpt]:
         yield from (cell.text for row in (block.header, *block.rows) for cell in row)
 
 
-def faithful(excerpt: Excerpt, text: str) -> None:
-    """Each character stands at its offset, but for line ends, NUL and the spaces of a tab."""
+def check_characters(excerpt: Excerpt, text: str) -> None:
+    """Each character stands at its offset, except line ends, NUL and the spaces of a tab."""
     for i, char in enumerate(excerpt.text):
         at = excerpt.offset(i)
-        there = text[at : at + 1]
+        source_char = text[at : at + 1]
         assert (
-            there == char
-            or (char == "\n" and there in ("\r", "\n", ""))
-            or (char == " " and there == "\t")
-            or (char == "\ufffd" and there == "\0")
-        ), (i, char, there)
+            source_char == char
+            or (char == "\n" and source_char in ("\r", "\n", ""))
+            or (char == " " and source_char == "\t")
+            or (char == "\ufffd" and source_char == "\0")
+        ), (i, char, source_char)
 
 
-def slices_back(inline: Inline) -> None:
+def check_marks(inline: Inline) -> None:
     text = inline.span.text
     match inline:
         case Text() if not {"\0", "\r"} & set(text) and "&#" not in text:
-            decoded = unescapeAll(text)
+            unescaped = unescapeAll(text)
             autolink = ":" in inline.text or "@" in inline.text
-            assert decoded == inline.text or autolink or "\n" in text
+            assert unescaped == inline.text or autolink or "\n" in text
         case CodeSpan():
             assert text[0] == text[-1] == "`"
         case NumberBinding():
             assert text[0] == "`" and text[-1] == "}"
-            same = inline.text_span.text == inline.text
-            assert same or {"\n", "\r", "\0"} & set(inline.text_span.text)
+            is_same = inline.text_span.text == inline.text
+            assert is_same or {"\n", "\r", "\0"} & set(inline.text_span.text)
         case Math():
             assert text[0] == text[-1] == "$"
         case Emphasis():

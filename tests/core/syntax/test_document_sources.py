@@ -1,4 +1,4 @@
-"""What a file can be besides its Markdown: line ends, a byte order mark, NUL, extremes of size."""
+"""Properties of a file besides its Markdown: line ends, a byte order mark, NUL, extreme sizes."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ $$
 """
 
 
-def parsed(text: str, *rules: str) -> Document:
+def parse(text: str, *rules: str) -> Document:
     result = parse_document(Source("x.md", text), KINDS, lesson=True)
-    assert tuple(found.rule for found in result.diagnostics) == rules
+    assert tuple(diagnostic.rule for diagnostic in result.diagnostics) == rules
     return result.value
 
 
 @pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
 def test_line_ends(line_end: str) -> None:
     text = LESSON.replace("\n", line_end)
-    document = parsed(text)
+    document = parse(text)
     callout = document.blocks[1]
     assert isinstance(callout, Callout)
     script, recording = callout.blocks
@@ -70,18 +70,18 @@ def test_line_ends(line_end: str) -> None:
     assert recording.body_span.text == f"> 1{line_end}> 2{line_end}"
     assert recording.prefix == "> "
     assert recording.span.line == 10
-    assert plain_html(document) == plain_html(parsed(LESSON))
+    assert plain_html(document) == plain_html(parse(LESSON))
 
 
 def test_a_byte_order_mark_is_skipped() -> None:
-    document = parsed("\ufeff## A\n")
+    document = parse("\ufeff## A\n")
     heading = document.blocks[0]
     assert isinstance(heading, Heading) and heading.anchor == "a"
     assert (heading.span.start, heading.span.end) == (1, 5)
 
 
 def test_nul_is_a_replacement_character() -> None:
-    assert plain_html(parsed("a\0b `c\0`")) == "<p>a\ufffdb <code>c\ufffd</code></p>\n"
+    assert plain_html(parse("a\0b `c\0`")) == "<p>a\ufffdb <code>c\ufffd</code></p>\n"
 
 
 def test_an_unclosed_fence_without_final_line_end_has_one() -> None:
@@ -92,7 +92,7 @@ def test_an_unclosed_fence_without_final_line_end_has_one() -> None:
 
 
 def test_deep_nesting_becomes_paragraphs_and_loses_nothing() -> None:
-    document = parsed(">" * 300 + " a", "nesting-deep")
+    document = parse(">" * 300 + " a", "nesting-deep")
     blocks = list(document_blocks(document))
     assert sum(isinstance(block, BlockQuote) for block in blocks) == 60
     assert blocks[-1].span.text == ">" * 240 + " a"
@@ -100,9 +100,9 @@ def test_deep_nesting_becomes_paragraphs_and_loses_nothing() -> None:
 
 def test_deep_emphasis_loses_its_marks_and_no_text() -> None:
     text = "*a " * 200 + "b*" * 200
-    inlines = list(document_inlines(parsed(text)))
+    inlines = list(document_inlines(parse(text)))
     assert sum(isinstance(inline, Emphasis) for inline in inlines) == 60
-    assert str(plain_html(parsed(text))).count("a ") == 200
+    assert str(plain_html(parse(text))).count("a ") == 200
 
 
 REPEATED = [
@@ -120,14 +120,14 @@ REPEATED = [
 
 
 def calls(text: str) -> int:
-    """How many functions parsing and rendering call: a measure of time that is always the same."""
+    """How many functions parsing and rendering call: a repeatable measure of the work."""
     count = 0
 
-    def counted(frame: FrameType, event: str, argument: object) -> None:
+    def count_call(frame: FrameType, event: str, argument: object) -> None:
         nonlocal count
         count += 1
 
-    sys.setprofile(counted)
+    sys.setprofile(count_call)
     try:
         plain_html(parse_document(Source("x.md", text), KINDS, lesson=True).value)
     finally:
@@ -140,20 +140,20 @@ NESTED = [("[", "]"), ("[", "](u)"), ("![", "](u)"), ("*a ", "b*")]
 
 @pytest.mark.site
 def test_work_grows_in_proportion_to_repeated_pieces() -> None:
-    faster = []
+    failures = []
     for piece in REPEATED:
         size = 300 // len(piece)
         calls(piece)
         once, twice = calls(piece * size), calls(piece * (2 * size))
         if twice >= 2.2 * once + 500:
-            faster.append(f"{piece!r}: {once} and {twice} calls")
-    assert faster == []
+            failures.append(f"{piece!r}: {once} and {twice} calls")
+    assert failures == []
 
 
 def test_work_grows_in_proportion_to_nested_brackets() -> None:
-    faster = []
+    failures = []
     for left, right in NESTED:
         once, twice = (calls(left * n + "x" + right * n) for n in (150, 300))
         if twice >= 2.3 * once + 500:
-            faster.append(f"{left!r} and {right!r}: {once} and {twice} calls")
-    assert faster == []
+            failures.append(f"{left!r} and {right!r}: {once} and {twice} calls")
+    assert failures == []

@@ -29,10 +29,10 @@ def test_each_character_of_a_string_knows_its_place() -> None:
     body = Excerpt.join([line.slice(2) for line in source.excerpt().lines()], "\n")
     node = parse_json(body, source.span(0, 0)).value
     assert isinstance(node, ArrayNode)
-    escaped, simple, empty = node.items
-    assert isinstance(escaped, StringNode) and isinstance(simple, StringNode)
+    with_escapes, simple, empty = node.items
+    assert isinstance(with_escapes, StringNode) and isinstance(simple, StringNode)
     assert isinstance(empty, StringNode)
-    excerpt = escaped.excerpt
+    excerpt = with_escapes.excerpt
     assert excerpt.text == "a\n\u00e9\U0001f600\\x"
     places = [excerpt.offset(i) for i in range(len(excerpt.text))]
     assert [text[p : p + 2] for p in places] == ["a\\", "\\n", "\\u", "\\u", "\\\\", 'x"']
@@ -73,9 +73,9 @@ def test_valid_json_is_read_as_the_standard_library_reads_it_and_knows_its_place
     value: object, indent: int | None, ascii_only: bool
 ) -> None:
     text = json.dumps(value, indent=indent, ensure_ascii=ascii_only).replace("Infinity", "1e999")
-    parsed = parse(text)
-    assert [d for d in parsed.diagnostics if d.rule != "field-value"] == []
-    root = parsed.value
+    parsed_json = parse(text)
+    assert [d for d in parsed_json.diagnostics if d.rule != "field-value"] == []
+    root = parsed_json.value
     assert root is not None
     assert repr(plain(root)) == repr(json.loads(text))
     for node in walk(root):
@@ -86,8 +86,8 @@ def test_valid_json_is_read_as_the_standard_library_reads_it_and_knows_its_place
             excerpt = node.excerpt
             assert excerpt.text == node.value
             for i, char in enumerate(excerpt.text):
-                there = text[excerpt.offset(i)]
-                assert there in (char, "\\")
+                source_char = text[excerpt.offset(i)]
+                assert source_char in (char, "\\")
                 assert node.span.start < excerpt.offset(i) < node.span.end - 1
 
 
@@ -104,7 +104,7 @@ def is_json(text: str) -> bool:
 
 
 @st.composite
-def edited(draw: st.DrawFn) -> str:
+def edit(draw: st.DrawFn) -> str:
     """JSON with a piece in the place of some characters."""
     text = json.dumps(draw(VALUES), indent=1)
     at = draw(st.integers(0, len(text)))
@@ -112,14 +112,14 @@ def edited(draw: st.DrawFn) -> str:
 
 
 @settings(max_examples=200)
-@given(st.lists(PIECES, max_size=16).map("".join) | st.text(max_size=20) | edited())
+@given(st.lists(PIECES, max_size=16).map("".join) | st.text(max_size=20) | edit())
 @example('{"a":1}{')
 @example("[1]]")
 @example('["\\u')
 def test_any_text_is_json_or_told_why_not(text: str) -> None:
-    parsed = parse(text)
-    syntax = [d for d in parsed.diagnostics if d.rule == "json-syntax"]
+    parsed_json = parse(text)
+    syntax = [d for d in parsed_json.diagnostics if d.rule == "json-syntax"]
     assert is_json(text) == (not syntax)
-    for diagnostic in parsed.diagnostics:
+    for diagnostic in parsed_json.diagnostics:
         assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
-    assert syntax or parsed.value is not None
+    assert syntax or parsed_json.value is not None

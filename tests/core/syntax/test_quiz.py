@@ -42,24 +42,29 @@ COMPLETE = r"""{"id": "4.2-check", "title": "Knowledge check", "questions": [
 
 @pytest.mark.parametrize(("prefix", "newline"), [("", "\n"), ("> ", "\n"), ("  ", "\r\n")])
 def test_a_complete_quiz(prefix: str, newline: str) -> None:
-    parsed = parse(COMPLETE, prefix, newline)
-    assert parsed.diagnostics == ()
-    quiz = parsed.value
+    parsed_quiz = parse(COMPLETE, prefix, newline)
+    assert parsed_quiz.diagnostics == ()
+    quiz = parsed_quiz.value
     assert quiz is not None
     assert (quiz.id, quiz.title) == ("4.2-check", "Knowledge check")
     assert quiz.id_span.text == '"4.2-check"'
     assert quiz.span.text.startswith("```quiz") and quiz.span.text.endswith("```")
-    one, several, exact, rough, zero, predict, open_, output, order = quiz.questions
-    assert isinstance(one, ChoiceQuestion)
-    assert [html(o.feedback) for o in one.options] == ["<p>no</p>", "", "<p>yes</p>"]
-    assert [o.span.text for o in one.options] == ['"a"', '"b $x$"', '"c"']
-    assert (one.answers, one.several, one.predict, one.sim) == ((2,), False, False, None)
-    assert (one.label, html(one.text)) == ("first", "<p>Which?</p>")
-    assert [html(hint) for hint in one.hints] == ["<p>one</p>", "<p>two</p>"]
+    choice, several, exact, rough, zero, predict, open_, output, order = quiz.questions
+    assert isinstance(choice, ChoiceQuestion)
+    assert [html(o.feedback) for o in choice.options] == ["<p>no</p>", "", "<p>yes</p>"]
+    assert [o.span.text for o in choice.options] == ['"a"', '"b $x$"', '"c"']
+    assert (choice.answers, choice.several, choice.predict, choice.sim) == (
+        (2,),
+        False,
+        False,
+        None,
+    )
+    assert (choice.label, html(choice.text)) == ("first", "<p>Which?</p>")
+    assert [html(hint) for hint in choice.hints] == ["<p>one</p>", "<p>two</p>"]
     math = r'<span class="math">\(I_1 &lt; I_2\)</span>'
-    assert html(one.explain) == f"<p>since {math}</p>"
-    assert one.span.text.startswith('{"kind": "mcq"') and one.span.text.endswith('"yes"]}')
-    assert one.span.line == 4
+    assert html(choice.explain) == f"<p>since {math}</p>"
+    assert choice.span.text.startswith('{"kind": "mcq"') and choice.span.text.endswith('"yes"]}')
+    assert choice.span.line == 4
     assert isinstance(several, ChoiceQuestion)
     assert (several.answers, several.several, several.options[0].feedback) == ((0, 2), True, ())
     assert isinstance(exact, NumericQuestion) and isinstance(rough, NumericQuestion)
@@ -94,29 +99,29 @@ WHY = '{"kind": "open", "q": "Why is it?", "reference": "R"}'
 
 
 def test_the_key_of_a_question_is_its_id_or_comes_from_its_kind_and_text() -> None:
-    hashed = hashlib.sha256(b"open\nWhy is it?").hexdigest()[:8]
-    assert keys(WHY) == [hashed]
-    assert keys(WHY.replace('"R"', '"Another"').replace("is it", "\\n is   it")) == [hashed]
+    key = hashlib.sha256(b"open\nWhy is it?").hexdigest()[:8]
+    assert keys(WHY) == [key]
+    assert keys(WHY.replace('"R"', '"Another"').replace("is it", "\\n is   it")) == [key]
     assert keys(WHY.replace('"open"', '"open", "id": "own"')) == ["own"]
-    assert keys(WHY.replace("Why", "How")) != [hashed]
+    assert keys(WHY.replace("Why", "How")) != [key]
     output = WHY.replace("open", "output").replace('"reference": "R"', '"of": "a.py", "line": 1')
-    assert keys(output) != [hashed]
+    assert keys(output) != [key]
     # Others of the quiz are no matter, wherever they stand.
-    assert keys(MCQ % '"answer": 0', WHY)[1] == keys(WHY, MCQ % '"answer": 1')[0] == hashed
+    assert keys(MCQ % '"answer": 0', WHY)[1] == keys(WHY, MCQ % '"answer": 1')[0] == key
 
 
 def test_keys_of_a_quiz_are_never_the_same() -> None:
-    hashed = keys(WHY)[0]
-    taken = WHY.replace('"open"', f'"open", "id": "{hashed}-2"')
-    assert keys(WHY, WHY, WHY, taken) == [hashed, f"{hashed}-3", f"{hashed}-4", f"{hashed}-2"]
+    key = keys(WHY)[0]
+    with_used_id = WHY.replace('"open"', f'"open", "id": "{key}-2"')
+    assert keys(WHY, WHY, WHY, with_used_id) == [key, f"{key}-3", f"{key}-4", f"{key}-2"]
 
 
 def test_options_and_items_have_keys_of_their_texts_alone() -> None:
     def options(*texts: str) -> tuple[str, ...]:
-        listed = json.dumps(texts)
-        one = f'{{"kind": "mcq", "q": "Q", "options": {listed}, "answer": 0}}'
-        two = f'{{"kind": "order", "q": "Q", "items": {listed}}}'
-        quiz = parse('{"id": "x", "questions": [' + one + "," + two + "]}").value
+        texts_json = json.dumps(texts)
+        choice_json = f'{{"kind": "mcq", "q": "Q", "options": {texts_json}, "answer": 0}}'
+        order_json = f'{{"kind": "order", "q": "Q", "items": {texts_json}}}'
+        quiz = parse('{"id": "x", "questions": [' + choice_json + "," + order_json + "]}").value
         assert quiz is not None
         choice, order = quiz.questions
         assert isinstance(choice, ChoiceQuestion) and isinstance(order, OrderQuestion)
@@ -141,7 +146,7 @@ def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
         | st.text(max_size=3)
     )
     mutated = COMPLETE[:at] + piece + COMPLETE[at + data.draw(st.integers(0, 12)) :]
-    parsed = parse(mutated.replace("\r", ""))
-    assert parsed.value is not None or parsed.diagnostics
-    orders = [d.order for d in parsed.diagnostics]
+    parsed_quiz = parse(mutated.replace("\r", ""))
+    assert parsed_quiz.value is not None or parsed_quiz.diagnostics
+    orders = [d.order for d in parsed_quiz.diagnostics]
     assert orders == sorted(orders)

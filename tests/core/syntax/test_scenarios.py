@@ -61,47 +61,50 @@ def parse(text: str) -> Parsed[Declarations | None]:
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_everything_that_a_file_can_say(newline: str) -> None:
-    parsed = parse(COMPLETE.replace("\n", newline))
-    assert not parsed.diagnostics
-    declared = parsed.value
-    assert declared is not None
-    assert declared.model == "arms/arm"
-    assert (declared.bench.visible, declared.bench.visible_angle) == (0.02, 2.0)
-    reach, rest, other = declared.scenarios
-    assert (reach.name, reach.title, reach.keyframe) == ("reach", "A reach", "home")
-    assert (reach.qpos, reach.qvel) == ((0.0, 1.5), (0.5, 0.0))
-    assert (reach.duration, reach.sample, reach.hold) == (2.0, 0.1, 0.5)
-    assert reach.controls == ((0.5, 0.3), (-0.5, 1.0), (0.0, 0.0))
-    assert reach.observable == Observable("site", "tip of it")
-    assert (reach.reference, reach.closed_form, reach.conserved) == ("ode", "", ())
-    assert reach.timesteps == (0.001, 0.05)
-    assert reach.place("keyframe").text == '"home"'
-    assert reach.place("nothing").text == "[[scenario]]"
-    assert (rest.keyframe, rest.closed_form) == (0, "damped-spring-0.1")
-    assert rest.conserved == ("energy", "angular-momentum")
-    assert (rest.duration, rest.sample, rest.hold, rest.measure) == (None, None, None, None)
-    assert (other.title, other.keyframe, other.reference) == (None, None, "self")
-    assert other.conserved is None
-    (sweep,) = declared.sweeps
+    parsed_file = parse(COMPLETE.replace("\n", newline))
+    assert not parsed_file.diagnostics
+    declarations = parsed_file.value
+    assert declarations is not None
+    assert declarations.model == "arms/arm"
+    assert (declarations.bench.visible, declarations.bench.visible_angle) == (0.02, 2.0)
+    first, second, third = declarations.scenarios
+    assert (first.name, first.title, first.keyframe) == ("reach", "A reach", "home")
+    assert (first.qpos, first.qvel) == ((0.0, 1.5), (0.5, 0.0))
+    assert (first.duration, first.sample, first.hold) == (2.0, 0.1, 0.5)
+    assert first.controls == ((0.5, 0.3), (-0.5, 1.0), (0.0, 0.0))
+    assert first.observable == Observable("site", "tip of it")
+    assert (first.reference, first.closed_form, first.conserved) == ("ode", "", ())
+    assert first.timesteps == (0.001, 0.05)
+    assert first.place("keyframe").text == '"home"'
+    assert first.place("nothing").text == "[[scenario]]"
+    assert (second.keyframe, second.closed_form) == (0, "damped-spring-0.1")
+    assert second.conserved == ("energy", "angular-momentum")
+    assert (second.duration, second.sample, second.hold, second.measure) == (None, None, None, None)
+    assert (third.title, third.keyframe, third.reference) == (None, None, "self")
+    assert third.conserved is None
+    (sweep,) = declarations.sweeps
     assert (sweep.name, sweep.scenario, sweep.show) == ("soft", "rest", ("penetration",))
-    assert [(one.parameter, one.values, one.relative) for one in sweep.variations] == [
+    assert [
+        (variation.parameter, variation.values, variation.relative)
+        for variation in sweep.variations
+    ] == [
         ("geom:a b.solref", ((0.1, 1.0),), False),
         ("option.cone", ("elliptic",), False),
         ("body.mass", (0.975, 1.025), True),
     ]
     assert sweep.variations[0].span.text == '"geom:a b.solref"'
-    (keep,) = declared.keep
+    (keep,) = declarations.keep
     assert (keep.finding, keep.reason) == ("sensor-unread tip", "lesson 5.2 reads it")
     assert keep.finding_span.text == '"sensor-unread tip"'
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "[bench]\n"])
 def test_a_file_may_say_nothing(text: str) -> None:
-    parsed = parse(text)
-    assert parsed.diagnostics == ()
-    assert parsed.value is not None
-    assert (parsed.value.scenarios, parsed.value.keep) == ((), ())
-    assert (parsed.value.bench.visible, parsed.value.bench.visible_angle) == (0.01, 1.0)
+    parsed_file = parse(text)
+    assert parsed_file.diagnostics == ()
+    assert parsed_file.value is not None
+    assert (parsed_file.value.scenarios, parsed_file.value.keep) == ((), ())
+    assert (parsed_file.value.bench.visible, parsed_file.value.bench.visible_angle) == (0.01, 1.0)
 
 
 @settings(max_examples=60)

@@ -1,7 +1,7 @@
-"""What an author is told of wrong JSON, TOML, course maps, files beside models, labs and quizzes.
+"""The diagnostics of wrong JSON, TOML, course maps, files beside models, labs and quizzes.
 
-The cases are `tests/fixtures/texts/`; `pytest tests/core/syntax --rewrite-fixtures` writes what is
-expected anew.
+The cases are `tests/fixtures/texts/`; `pytest tests/core/syntax --rewrite-fixtures` writes their
+expected parts anew.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ def read_toml(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
 
 
 def read_map(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
-    parsed = parse_course_map(Source("content/course.toml", text))
-    return parsed.value, parsed.diagnostics
+    parsed_map = parse_course_map(Source("content/course.toml", text))
+    return parsed_map.value, parsed_map.diagnostics
 
 
 def read_model(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
-    parsed = parse_declarations(Source("models/arms/arm.toml", text))
-    return parsed.value, parsed.diagnostics
+    parsed_file = parse_declarations(Source("models/arms/arm.toml", text))
+    return parsed_file.value, parsed_file.diagnostics
 
 
 def read_lab(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
-    parsed = lab_fences.parse(text)
-    return parsed.value, parsed.diagnostics
+    parsed_lab = lab_fences.parse(text)
+    return parsed_lab.value, parsed_lab.diagnostics
 
 
 READERS: dict[str, Reader] = {
@@ -76,13 +76,13 @@ def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
 
 
 def test_what_is_too_deep_or_too_long_is_told() -> None:
-    wrong = [
+    diagnostics = [
         *parse("[" * 100_000).diagnostics,
         *parse('{"a":' * 100_000).diagnostics,
         *parse("[" + "9" * 5000 + "]").diagnostics,
         *read_toml("a = " + "[" * 9_999)[1],
     ]
-    assert [(one.span.start, one.message) for one in wrong] == [
+    assert [(d.span.start, d.message) for d in diagnostics] == [
         (64, DEEP),
         (320, DEEP),
         (1, "a number of 5000 digits is too long"),

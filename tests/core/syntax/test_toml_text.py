@@ -1,4 +1,4 @@
-"""TOML with places: values are tomllib's, places are the author's, mistakes are told there."""
+"""TOML with places: its values are those of tomllib, its places those of the text."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ DATES = (datetime.date, datetime.time)
 
 
 def root_of(text: str) -> ObjectNode:
-    parsed = parse_toml(Source("content/course.toml", text))
-    assert parsed.diagnostics == ()
-    assert parsed.value is not None
-    return parsed.value
+    parsed_toml = parse_toml(Source("content/course.toml", text))
+    assert parsed_toml.diagnostics == ()
+    assert parsed_toml.value is not None
+    return parsed_toml.value
 
 
-def dated(value: object) -> object:
-    """A value of tomllib as `plain` gives it."""
+def replace_dates(value: object) -> object:
+    """A value of tomllib with dates as `plain` gives them."""
     if isinstance(value, dict):
-        return {key: dated(inner) for key, inner in value.items()}
+        return {key: replace_dates(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [dated(inner) for inner in value]
+        return [replace_dates(inner) for inner in value]
     return "a date" if isinstance(value, DATES) else value
 
 
@@ -79,7 +79,7 @@ x = false
 def test_every_kind_of_statement_and_its_place(newline: str) -> None:
     text = ALL.replace("\n", newline)
     root = root_of(text)
-    assert repr(plain(root)) == repr(dated(tomllib.loads(text)))
+    assert repr(plain(root)) == repr(replace_dates(tomllib.loads(text)))
 
     def at(*path: str | int) -> str:
         node: Node | None = root
@@ -138,36 +138,36 @@ PIECES = st.sampled_from(
 
 
 @st.composite
-def edited(draw: st.DrawFn, text: str) -> str:
+def edit(draw: st.DrawFn, text: str) -> str:
     """A text with a piece in the place of some characters."""
     at = draw(st.integers(0, len(text)))
     return text[:at] + draw(PIECES) + text[at + draw(st.integers(0, 3)) :]
 
 
 @settings(max_examples=200)
-@given(st.lists(PIECES, max_size=14).map("".join) | st.text(max_size=20) | edited(ALL))
+@given(st.lists(PIECES, max_size=14).map("".join) | st.text(max_size=20) | edit(ALL))
 @example("a=[]\na.b=1\n")
 @example("[a.b.c]\n[a]\nb.x=1\n")
 @example("[x]\na.b=1\n[x.a.c]\n")
 @example('a="""""" \n')
 @example("\r\r\n")
 def test_values_and_validity_are_those_of_tomllib(text: str) -> None:
-    parsed = parse_toml(Source("x.toml", text))
+    parsed_toml = parse_toml(Source("x.toml", text))
     try:
-        expected = dated(tomllib.loads(text))
+        expected = replace_dates(tomllib.loads(text))
     except ValueError:
-        assert parsed.value is None
-        assert len(parsed.diagnostics) == 1
+        assert parsed_toml.value is None
+        assert len(parsed_toml.diagnostics) == 1
     else:
-        assert parsed.value is not None
-        assert repr(plain(parsed.value)) == repr(expected)
-        check_places(parsed.value, text)
-    for diagnostic in parsed.diagnostics:
+        assert parsed_toml.value is not None
+        assert repr(plain(parsed_toml.value)) == repr(expected)
+        check_places(parsed_toml.value, text)
+    for diagnostic in parsed_toml.diagnostics:
         assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
 
 
 def check_places(node: Node, text: str) -> None:
-    """A node holds its mark, and where the text has no headers, all that is in it."""
+    """Check that a node contains its mark and, if the text has no headers, its child nodes."""
     inner: list[Node] = []
     if isinstance(node, ObjectNode):
         inner = [n for member in node.members for n in (member.key, member.value)]
