@@ -185,7 +185,7 @@ def _with_costs(
     timings = costs(basis.model, scene, settings, baseline, clock, quick=quick)
     timed_rows = list(rows)
     for index, timing in zip(usable, timings, strict=True):
-        seconds = timing.nanoseconds.scaled(1e-9 / scene.scenario.duration)
+        seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
     return tuple(timed_rows)
 
@@ -204,7 +204,8 @@ def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRo
         runs = [
             (row.setting.timestep, row)
             for row in rows
-            if (row.setting.integrator, row.setting.solving) == (integrator.value, baseline.solving)
+            if (row.setting.integrator, row.setting.solver_settings)
+            == (integrator.value, baseline.solver_settings)
         ]
         orders.append(fit_orders(integrator.value, runs, reference.floor, extent))
     return tuple(orders)

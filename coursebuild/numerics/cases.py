@@ -119,7 +119,7 @@ def _costs(
             counts.append(round(problem.scenario.duration / step))
     timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
     return tuple(
-        StepCost(name, line.nanoseconds.scaled(1e-9 / count))
+        StepCost(name, line.nanoseconds.scale(1e-9 / count))
         for name, count, line in zip(names, counts, timings, strict=True)
     )
 

@@ -15,7 +15,7 @@ from coursebuild.core.drawing.marks import text_width
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.plot import plot_svg, work_precision
-from coursebuild.numerics.reports.text import quantities, telling
+from coursebuild.numerics.reports.text import main_quantity, quantities
 from support.bench_reports import lost, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
@@ -164,10 +164,10 @@ def test_steps_stand_in_for_times_that_are_not_there() -> None:
 
 def test_which_error_is_shown() -> None:
     still = [row(position=(1e-11, 1e-11), attitude=(1e-3, 1e-3))]
-    assert telling(scenario(still)).name == "attitude"
+    assert main_quantity(scenario(still)).name == "attitude"
     report = scenario([row(figure=(1.0, 1.0))], figure="energy (J)")
     assert [one.name for one in quantities(report)] == ["figure", "position", "velocity"]
-    assert telling(report).label == "energy (J)"
+    assert main_quantity(report).label == "energy (J)"
     assert "error: energy (J)" in texts(drawn(report))
 
 

@@ -24,8 +24,8 @@ def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[Scenar
 
 
 def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisionRow:
-    assert report.own is not None
-    like = replace(report.own, integrator=integrator, timestep=timestep)
+    assert report.own_setting is not None
+    like = replace(report.own_setting, integrator=integrator, timestep=timestep)
     (found,) = (one for one in report.rows if one.setting == like)
     return found
 

@@ -118,7 +118,7 @@ def measured_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str],
 
 
 def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
-    open_ones = sum(one.counts for one in diet.findings)
+    open_ones = sum(one.is_fault for one in diet.findings)
     summary = words("measured.diet_open", n=open_ones) if open_ones else words("measured.slim")
     lost = [f"{one.name}: {'; '.join(one.reasons)}" for one in diet.scenarios if one.status != "ok"]
     if lost:

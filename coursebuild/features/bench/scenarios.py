@@ -105,7 +105,7 @@ def _about(words: Strings, report: ScenarioReport) -> list[str]:
             told.append(said(words, "measured.chaotic", first=first, last=last, rate=rate))
     if report.hold:
         told.append(words("measured.hold", time=seconds_text(report.hold)))
-    parts = [] if report.own is None else solving_parts(report.own)
+    parts = [] if report.own_setting is None else solving_parts(report.own_setting)
     if parts:
         told.append(words("measured.usual", setting=", ".join(parts)))
     reference, floor = f"measured.reference_{report.reference}", power(report.floor, 1)
@@ -121,17 +121,20 @@ def _settings(words: Strings, report: ScenarioReport) -> Grid:
     rows = report.rows
 
     def error(quantity: Quantity) -> tuple[str, list[str]]:
-        found: list[str] = [bounded(quantity.of(row), quantity.least) for row in rows]
+        found: list[str] = [bounded(quantity.value_of(row), quantity.least) for row in rows]
         key = _QUANTITIES.get(quantity.name)
         return quantity.label if key is None else words(key), found
 
     remarks, speed, time = map(words, ("measured.remark", "measured.realtime", "measured.seconds"))
     columns: list[tuple[str, list[str]]] = [
-        (words("measured.setting"), [setting_text(row.setting, report.own) for row in rows]),
+        (
+            words("measured.setting"),
+            [setting_text(row.setting, report.own_setting) for row in rows],
+        ),
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
-        *(error(quantity) for quantity in quantities(report) if quantity.tells(rows)),
+        *(error(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
         (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
@@ -160,8 +163,8 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
 
 def _notes(words: Strings, report: ScenarioReport) -> list[str]:
     """Why runs were lost, and which are of another model."""
-    notes = lost_runs((setting_text(row.setting, report.own), row) for row in report.rows)
-    softened = [setting_text(row.setting, report.own) for row in report.rows if row.refsafe]
+    notes = lost_runs((setting_text(row.setting, report.own_setting), row) for row in report.rows)
+    softened = [setting_text(row.setting, report.own_setting) for row in report.rows if row.refsafe]
     if softened:
         notes.append(words("measured.refsafe", settings="; ".join(softened)))
     return notes
@@ -177,7 +180,7 @@ def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
 
 
 def _orders(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
-    shown = [one for one in orders if one.there]
+    shown = [one for one in orders if one.has_orders]
     if not shown:
         return None
     columns = [(words("measured.integrator"), [one.integrator for one in shown])]

@@ -40,11 +40,11 @@ from coursebuild.numerics.reports.cases import (
     Cells,
     FigureLine,
     course_cases,
-    merged,
+    merge_rows,
 )
 from coursebuild.numerics.reports.plot import case_quantities, case_svg
 from coursebuild.numerics.reports.records import STABILITY
-from coursebuild.numerics.reports.text import KNOWN, Quantity, seconds_text, status_text
+from coursebuild.numerics.reports.text import INTEGRATORS, Quantity, seconds_text, status_text
 
 _RIGHT = 1e-3
 """m or rad: the error that costs are compared at."""
@@ -100,7 +100,7 @@ def numerics_values(library: Library) -> dict[str, object]:
             _group(words, place, number, tuple(found))
             for number, found in groupby(cases, key=attrgetter("case"))
         ),
-        "integrators": KNOWN,
+        "integrators": INTEGRATORS,
         "where": dict.fromkeys(where(words, one.machine) for one in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
         "command": STABILITY.command(),
@@ -121,11 +121,11 @@ def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
     part = None if shown is None or shown.name == "energy_drift" else shown.name
     fits = {one.integrator: getattr(one, part) for one in report.orders} if part else {}
     limits = {one.integrator: one for one in report.boundaries}
-    orders = (fits.get(one) for one in KNOWN)
-    costs = (report.cost_to(one, _RIGHT) for one in KNOWN)
+    orders = (fits.get(one) for one in INTEGRATORS)
+    costs = (report.cost_to(one, _RIGHT) for one in INTEGRATORS)
     return (
         tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
-        tuple(_limit(words, limits.get(one)) for one in KNOWN),
+        tuple(_limit(words, limits.get(one)) for one in INTEGRATORS),
         tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
     )
 
@@ -158,7 +158,9 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
 
 
 def _about(words: Strings, report: CaseReport, shown: Sequence[Quantity]) -> Iterator[str]:
-    costs = [(cost, one) for one in KNOWN if (cost := report.cost_to(one, _RIGHT)) is not None]
+    costs = [
+        (cost, one) for one in INTEGRATORS if (cost := report.cost_to(one, _RIGHT)) is not None
+    ]
     if costs:
         (least, best), (most, worst) = min(costs), max(costs)
         key = "cheapest" if most > 1.05 * least else "alike"
@@ -176,7 +178,7 @@ def _grid(
 ) -> Grid | None:
     if not rows:
         return None
-    found = merged(rows)
+    found = merge_rows(rows)
     columns = [(words("measured.integrator"), list(found.values()))]
     columns += [(title, [row[n] for row in found]) for n, title in enumerate(titles)]
     return grid(label, columns, words=(left,))
@@ -212,7 +214,7 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
     parts: list[FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):
         lines = [line for line in report.figures if line.name == name]
-        rows = merged((line.integrator, _figure(words, line)) for line in lines)
+        rows = merge_rows((line.integrator, _figure(words, line)) for line in lines)
         names += rows.values()
         cells += rows
         unit, sources = lines[0].unit, dict.fromkeys(one.source for one in lines if one.source)
@@ -238,7 +240,7 @@ def _orders(words: Strings, report: CaseReport) -> Grid | None:
     rows: _Rows = []
     for one in report.orders:
         fits = (one.position, one.attitude, one.velocity)
-        if one.there:
+        if one.has_orders:
             rows.append((one.integrator, tuple("" if fit is None else fit.text for fit in fits)))
     titles = [words(key) for _, key in ORDERS]
     return _grid(words, words("numerics.orders", title=report.title), titles, rows)

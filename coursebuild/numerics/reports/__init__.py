@@ -1,9 +1,9 @@
-"""What was measured, as values: it is kept, printed and drawn, and shown on pages.
+"""The results of measurements as values, to be recorded, printed, drawn, and shown on pages.
 
 Entry points: `Reports`, those that a course's pages may show. `bench`: speed against error of a
 model; `sweep`: its parameters at other values; `cases`: the hard cases; `diet`: what a model can be
-without. `records`: reports as files; `departures`: how two differ; `text`: what is shown, and in
-which words; `plot` and `sweep_plot`: charts. Nothing here measures.
+without. `records`: reports as files; `departures`: how two differ; `text`: which errors are shown,
+and texts; `plot` and `sweep_plot`: charts. Nothing here measures.
 """
 
 from __future__ import annotations
@@ -21,22 +21,21 @@ if TYPE_CHECKING:  # a course without reports needs none of it
 
 
 class Record(Struct, frozen=True, forbid_unknown_fields=True):
-    """A part of a report, which can be kept as JSON.
+    """A part of a report, which can be stored as JSON.
 
-    No number is infinite or missing by a code of its own: `None` stands for what is not there, and
-    a field beside it says why.
+    No number is infinite or NaN: `None` stands for a missing value, and a field beside it says why.
     """
 
 
 class Interval(Record, frozen=True):
-    """A figure that varies from measurement to measurement, and its 95 % interval."""
+    """A figure that varies between measurements, with its 95 % interval."""
 
     value: float
     low: float
     high: float
 
-    def scaled(self, factor: float) -> Interval:
-        """In another unit."""
+    def scale(self, factor: float) -> Interval:
+        """The interval in another unit."""
         return Interval(factor * self.value, factor * self.low, factor * self.high)
 
     @property
@@ -46,7 +45,7 @@ class Interval(Record, frozen=True):
 
 
 class Reports(Struct, frozen=True):
-    """What was recorded of a course, and fits it as it is."""
+    """The recorded reports of a course that fit its present state."""
 
     scenes: Mapping[str, SceneReport] = field(default_factory=dict)
     """By the model's name, as `diets`."""

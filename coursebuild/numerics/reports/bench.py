@@ -1,4 +1,4 @@
-"""What was measured on a model: speed against error in each of its scenarios.
+"""The report on a model: speed against error in each of its scenarios.
 
 Entry point: `SceneReport`.
 """
@@ -10,7 +10,7 @@ from coursebuild.numerics.reports import Interval, Record
 from coursebuild.numerics.reports.sweep import SweepReport
 
 FLOORS = 10.0
-"""No error below so many floors of the reference is given."""
+"""Errors below this many floors of the reference are not given."""
 
 
 class MeasuredSetting(Record, frozen=True):
@@ -28,7 +28,7 @@ class MeasuredSetting(Record, frozen=True):
     """As MJCF names it; empty where nothing can touch."""
 
     @property
-    def solving(self) -> tuple[str, int, str]:
+    def solver_settings(self) -> tuple[str, int, str]:
         """All but integrator and timestep."""
         return self.solver, self.iterations, self.cone
 
@@ -81,7 +81,7 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     seconds: Interval | None
     """Processor time for a simulated second on this machine, s; `None` where it was not timed."""
     growth: float | None
-    """By what velocities were multiplied in a step, where they grew."""
+    """The factor by which velocities grew in a step; `None` where they did not."""
     own: bool
     """Whether it is the scene's own setting."""
     front: bool
@@ -103,7 +103,7 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
 
 
 class FittedOrder(Record, frozen=True):
-    """The power of the timestep that errors follow."""
+    """The power of the timestep that errors are proportional to."""
 
     value: float
     uncertainty: float
@@ -126,9 +126,9 @@ class OrderRow(Record, frozen=True):
     velocity: FittedOrder | None
 
     @property
-    def there(self) -> bool:
-        """Whether there is any."""
-        return any(one is not None for one in (self.position, self.attitude, self.velocity))
+    def has_orders(self) -> bool:
+        """Whether an order is known for any of the errors."""
+        return any(order is not None for order in (self.position, self.attitude, self.velocity))
 
 
 class StableRow(Record, frozen=True):
@@ -140,7 +140,7 @@ class StableRow(Record, frozen=True):
     searched: tuple[float, float]
     """The shortest and the longest timestep that was tried, s."""
     islands: tuple[float, float] | None
-    """Between which some beyond the largest are stable all the same, s; `None` where none is."""
+    """The shortest and longest stable timesteps beyond the largest, s; `None` where none is."""
     duration: float
     """Simulated time of each run, s."""
     steps: int
@@ -181,7 +181,7 @@ class ScenarioReport(Record, frozen=True):
     duration: float
     """s."""
     horizon: float
-    """s: to where errors of trajectories mean something; less than the duration in chaos."""
+    """s: how long errors of trajectories mean something; less than the duration in chaos."""
     hold: float
     """Seconds for which a command holds; 0 where nothing is commanded."""
     reference: str
@@ -189,8 +189,8 @@ class ScenarioReport(Record, frozen=True):
     source: str
     """Where the reference comes from."""
     floor: float
-    """What places and attitudes may be wrong by, m or rad; no error is given below ten times as
-    much. So it is for velocities, with a floor of their own."""
+    """How far the reference may be off in places and attitudes, m or rad; no error is given below
+    ten times as much. Velocities have a floor of their own."""
     second: str
     """The source of the second reference; empty where there is none."""
     agreement: float | None
@@ -198,29 +198,29 @@ class ScenarioReport(Record, frozen=True):
     lyapunov: float | None
     """Largest Lyapunov exponent, 1/s; `None` where the scenario is not chaotic."""
     figure: str
-    """What is measured beside coordinates, with its unit in brackets; empty where nothing is."""
+    """The declared quantity, with its unit in brackets; empty without one."""
     rows: tuple[WorkPrecisionRow, ...]
     orders: tuple[OrderRow, ...]
     stable: tuple[StableRow, ...]
     verdict: RowVerdict
     velocity_floor: float = 0.0
-    """As `floor`, of velocities: around an impact they are known far worse than places."""
+    """As `floor`, for velocities: around an impact they are known far worse than places."""
     smooth: bool = True
     """Whether accelerations are a smooth function of the state; else there are no orders."""
     notes: tuple[str, ...] = ()
-    """What to know when reading the figures, in words."""
+    """Remarks for reading the figures."""
     horizons: tuple[float, float] | None = None
     """s: the shortest and the longest of runs whose beginnings were nudged in different ways;
     `None` where the scenario is not chaotic."""
 
     @property
-    def own(self) -> MeasuredSetting | None:
+    def own_setting(self) -> MeasuredSetting | None:
         """The scene's own setting; `None` where there are no rows."""
         return next((row.setting for row in self.rows if row.own), None)
 
 
 class SceneCard(Record, frozen=True):
-    """What a model is made of, and how fast the browser's engine runs it."""
+    """The size of a model, and how fast the browser's engine runs it."""
 
     bodies: int
     """Without the world."""
@@ -246,7 +246,7 @@ class SceneReport(Record, frozen=True):
     model: str
     """Its file below `models/`, without suffix, POSIX."""
     digest: str
-    """Of all that the figures depend on in the course: the MJCF with its files and scenarios."""
+    """The digest of what the figures depend on in the course: the MJCF, its files and scenarios."""
     quick: bool
     """Whether only a part was measured, and in less time."""
     machine: Machine

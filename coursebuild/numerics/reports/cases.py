@@ -1,7 +1,8 @@
-"""What was measured on a hard case.
+"""The report on a hard case.
 
-Entry points: `CaseReport`; `merged`, integrators of which the same is said; `course_cases(report)`,
-the hard cases of a course's own: scenarios of models whose exact motion stands in `exact_file`.
+Entry points: `CaseReport`; `merge_rows`, to join integrators with the same cells;
+`course_cases(report)`, the hard cases of a course's own: scenarios of models whose exact motion
+stands in `exact_file`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from coursebuild.numerics.reports.bench import (
 
 
 class BoundaryLine(StableRow, frozen=True):
-    """The largest stable timestep of an integrator, beside theory."""
+    """The largest stable timestep of an integrator, compared with theory."""
 
     theory: float | None
     """s, as `largest`; `None` also where there is no theory and so no formula."""
@@ -35,9 +36,9 @@ class BoundaryLine(StableRow, frozen=True):
     difference: float | None
     """Measured against theory, relative."""
     beyond: str
-    """How the first unstable one tried went."""
+    """The status of the run with the shortest unstable timestep that was tried."""
     growth: float | None
-    """By what the velocities were multiplied in a step there, where they stayed finite."""
+    """The factor by which velocities grew in a step of that run, where they stayed finite."""
 
 
 class FigureLine(Record, frozen=True):
@@ -52,11 +53,11 @@ class FigureLine(Record, frozen=True):
     """`None` where theory does not say it."""
     source: str
     spread: tuple[float, float] | None = None
-    """Of an ensemble, between what eight tenths of it lie; `measured` is the middle one then."""
+    """Of an ensemble, the range of its middle eight tenths; `measured` is the median then."""
 
 
 class StepCost(Record, frozen=True):
-    """What a step of an integrator takes."""
+    """The time of a step of an integrator."""
 
     integrator: str
     seconds: Interval
@@ -72,7 +73,7 @@ class ErrorLine(MeasuredRun, frozen=True):
 
 
 class ReferenceLine(Record, frozen=True):
-    """What the errors were measured against."""
+    """The reference that errors were measured against."""
 
     kind: str
     """`closed` or `ode`."""
@@ -80,7 +81,7 @@ class ReferenceLine(Record, frozen=True):
     second: str
     """The source of the second reference."""
     position: float
-    """How far the two are apart, m or rad: no more is known."""
+    """How far the two references are apart, m or rad; the motion is known no better."""
     attitude: float
     """rad."""
     velocity: float
@@ -105,14 +106,15 @@ class CaseReport(Record, frozen=True):
 
     def cost(self, line: ErrorLine) -> Interval | None:
         """Processor time for a simulated second, s; `None` where the integrator was not timed."""
-        found = (one.seconds for one in self.costs if one.integrator == line.integrator)
-        step = next(found, None)
-        return None if step is None else step.scaled(1 / line.timestep)
+        step_costs = (cost.seconds for cost in self.costs if cost.integrator == line.integrator)
+        step = next(step_costs, None)
+        return None if step is None else step.scale(1 / line.timestep)
 
     def cost_to(self, integrator: str, error: float) -> float | None:
-        """The same for what is right to an error, m or rad; `None` where no run is.
+        """The same for the timestep with a given error, m or rad; `None` where no run is as good.
 
-        Between two runs it goes by powers. No timestep longer than those tried is thought of.
+        Between two runs the cost follows a power of the error. Beyond the longest timestep nothing
+        is extrapolated.
         """
         runs = sorted(
             (cost.value, max(pair[0] for pair in places))
@@ -122,40 +124,46 @@ class CaseReport(Record, frozen=True):
         )
         if runs and runs[0][1] <= error:
             return runs[0][0]
-        for (little, much), (more, less) in pairwise(runs):
-            if less <= error < much:
-                part = math.log(much / error) / math.log(much / less)
-                return float(little * (more / little) ** part)
+        for (low_cost, high_error), (high_cost, low_error) in pairwise(runs):
+            if low_error <= error < high_error:
+                part = math.log(high_error / error) / math.log(high_error / low_error)
+                return float(low_cost * (high_cost / low_cost) ** part)
         return None
 
 
 Cells: TypeAlias = tuple[str, ...]
 
 
-def merged(rows: Iterable[tuple[str, Cells]]) -> dict[Cells, str]:
-    """What is said of integrators, and the names of those of which it is said."""
-    together: dict[Cells, list[str]] = {}
+def merge_rows(rows: Iterable[tuple[str, Cells]]) -> dict[Cells, str]:
+    """Join rows with the same cells: the cells, and the names of their integrators."""
+    names_by_cells: dict[Cells, list[str]] = {}
     for integrator, cells in rows:
-        together.setdefault(cells, []).append(integrator)
-    return {cells: ", ".join(names) for cells, names in together.items()}
+        names_by_cells.setdefault(cells, []).append(integrator)
+    return {cells: ", ".join(names) for cells, names in names_by_cells.items()}
 
 
 def exact_file(model: str) -> str:
-    """Where a course says the exact motion of a model, if it knows it."""
+    """The file in which a course may give the exact motion of a model."""
     return f"models/{model}.exact.py"
 
 
 def course_cases(report: SceneReport) -> tuple[CaseReport, ...]:
-    """The scenarios of a model whose exact motion the course says in its `exact.py`."""
-    known = (one for one in report.scenarios if one.source == exact_file(report.model))
-    return tuple(_course_case(report, one) for one in known)
+    """The scenarios of a model whose exact motion the course gives."""
+    exact_scenarios = (
+        scenario for scenario in report.scenarios if scenario.source == exact_file(report.model)
+    )
+    return tuple(_course_case(report, scenario) for scenario in exact_scenarios)
 
 
 def _course_case(report: SceneReport, scenario: ScenarioReport) -> CaseReport:
-    own = scenario.own
-    rows = [row for row in scenario.rows if own and row.setting.solving == own.solving]
+    baseline = scenario.own_setting
+    rows = [
+        row
+        for row in scenario.rows
+        if baseline and row.setting.solver_settings == baseline.solver_settings
+    ]
     steps = {
-        row.setting.integrator: row.seconds.scaled(row.setting.timestep)
+        row.setting.integrator: row.seconds.scale(row.setting.timestep)
         for row in reversed(rows)
         if row.seconds is not None
     }
@@ -182,5 +190,5 @@ def _boundary(row: StableRow) -> BoundaryLine:
 
 
 def _error_line(row: WorkPrecisionRow) -> ErrorLine:
-    measured = {name: getattr(row, name) for name in MeasuredRun.__struct_fields__}
-    return ErrorLine(integrator=row.setting.integrator, timestep=row.setting.timestep, **measured)
+    fields = {name: getattr(row, name) for name in MeasuredRun.__struct_fields__}
+    return ErrorLine(integrator=row.setting.integrator, timestep=row.setting.timestep, **fields)

@@ -4,11 +4,11 @@ Entry point: `chart_svg(chart, …)`.
 
 1. A line has a colour, a mark and a dash of its own; its name stands in the key, or at its end
    where there is no key. Bars are intervals.
-2. Crosses at the upper edge are runs that were lost.
-3. A band below shows what is not known.
+2. Crosses at the upper edge are lost runs.
+3. A band at the bottom covers errors that the reference cannot resolve.
 
-Colours are variables of the page's style sheet with a value of their own to fall back on, set as
-attributes, since pages allow no styles inside of them. The same chart gives the same bytes.
+Colours are variables of the page's style sheet with a fallback, set as attributes, since pages
+allow no inline styles. The same chart gives the same bytes.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ from coursebuild.numerics.reports.strokes import (
 )
 
 WIDE, NARROW, BESIDE = (620.0, 320.0), (350.0, 260.0), (430.0, 236.0)
-"""How wide a chart is, and how high between its axes: for wide screens, for narrow ones, and for
+"""The width of a chart and the height between its axes: for wide screens, for narrow ones, and for
 charts beside each other."""
 _TOP = 16.0
-"""Above it, for what was lost."""
+"""Space above, for lost runs."""
 _NAMES = 90.0
-"""At the right, for names at the ends of lines."""
+"""Space at the right, for names at the ends of lines."""
 _NAME = 15.0
-"""From one name to the next."""
+"""The distance from one name to the next."""
 
 
 class Point(Struct, frozen=True):
@@ -68,7 +68,7 @@ class Point(Struct, frozen=True):
     y: float | None
     """`None` for a run that was lost."""
     title: str
-    """What it says when it is pointed at."""
+    """The tooltip."""
     full: bool = True
     """Whether its mark is filled."""
     small: bool = False
@@ -77,34 +77,34 @@ class Point(Struct, frozen=True):
 
 
 class Line(Struct, frozen=True):
-    """Points that are joined in their order, but for small and lost ones."""
+    """Points joined in their order, except for small and lost ones."""
 
     name: str
     number: int
-    """Which colour, dash and mark."""
+    """Selects colour, dash and mark."""
     points: tuple[Point, ...]
 
     @property
-    def drawn(self) -> list[Point]:
+    def visible_points(self) -> list[Point]:
         """The points that were not lost."""
         return [point for point in self.points if point.y is not None]
 
 
 class Chart(Struct, frozen=True):
-    """What is drawn."""
+    """The content of a chart."""
 
     title: str
     text: str
-    """What is to be seen, for who cannot see it."""
+    """The description for readers who cannot see the chart."""
     axes: tuple[str, str]
-    """What stands below, and at the left."""
+    """The titles of the horizontal and the vertical axis."""
     lines: tuple[Line, ...]
     least: float = 0.0
-    """Nothing below is known."""
-    one: str = ""
-    """What it means to be 1, if anything."""
+    """Errors below are not resolved."""
+    unit_label: str = ""
+    """The meaning of the value 1, if it has one."""
     marks: tuple[Entry, ...] = ()
-    """What the key says after the lines; without it there is no key."""
+    """Entries of the key after the lines; without them there is no key."""
 
 
 def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
@@ -112,18 +112,18 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
 
     Args:
         chart: what to draw.
-        name: unlike those of all other drawings on the page: what describes it has an id.
+        name: unique among the drawings on the page, as ids are made from it.
         size: one of those above.
     """
-    if not any(line.drawn for line in chart.lines):
+    if not any(line.visible_points for line in chart.lines):
         return ""
     x, y = _scales(chart, size)
     body, height = "".join(_parts(chart, x, y)), y.start + 48
     if chart.marks:
         lines = (Entry("line", line.name, line.number) for line in chart.lines)
         left = 6.0 if size == NARROW else x.start
-        below, height = key((*lines, *chart.marks), left, y.start + 62, size[0])
-        body += below
+        key_svg, height = key((*lines, *chart.marks), left, y.start + 62, size[0])
+        body += key_svg
     return svg(body, (size[0], height), name, (chart.title, chart.text))
 
 
@@ -135,7 +135,7 @@ def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:
     pad = max(0.06 * (max(xs) - min(xs)), 0.12)
     floor = log(chart.least)
     bottom, top = min(ys, default=floor), max(ys, default=floor + 1)
-    if chart.one and bottom - 1 <= 0 <= top + 1:
+    if chart.unit_label and bottom - 1 <= 0 <= top + 1:
         bottom, top = min(bottom, 0.0), max(top, 0.0)
     if floor > bottom - 1.5:  # the band, with room for what it says
         bottom = min(bottom, floor) - 0.07 * max(top - bottom, 1.0)
@@ -148,7 +148,7 @@ def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:
 
 
 def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    """All parts, what lies below first."""
+    """All parts of the drawing, the lowest layer first."""
     lines, texts = _grid(x, y, chart.axes)
     yield from _levels(chart, x, y)
     yield path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"')
@@ -156,19 +156,19 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
     yield path(edge, 'stroke="currentColor" stroke-opacity="0.7"')
     yield from texts
     for line in chart.lines:
-        joined = [_place(point, x, y) for point in line.drawn if not point.small]
-        if len(joined) > 1:
-            d = "M" + "L".join(f"{across:.1f} {down:.1f}" for across, down in joined)
+        places = [_place(point, x, y) for point in line.visible_points if not point.small]
+        if len(places) > 1:
+            d = "M" + "L".join(f"{right:.1f} {down:.1f}" for right, down in places)
             yield path(d, line_look(line.number))
     for line in chart.lines:
         yield from _marks(line, x, y)
-        yield from (ring(*_place(one, x, y), RING) for one in line.points if one.ringed)
+        yield from (ring(*_place(point, x, y), RING) for point in line.points if point.ringed)
     if not chart.marks:
         yield from _names(chart, x, y)
 
 
 def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    """What is not known, and what it means to be 1."""
+    """The band that is not resolved, and the line at 1."""
     if chart.least > 0 and log(chart.least) > y.low:
         top = y(chart.least)
         d = f"M{x.start:.1f} {top:.1f}H{x.end:.1f}V{y.start:.1f}H{x.start:.1f}Z"
@@ -176,14 +176,14 @@ def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
         text = f"under {number_text(chart.least)}: not resolved by the reference"
         at = (top + y.start) / 2 + 4 if y.start - top >= 16 else top - 5
         yield label(x.end - 6, at, text, f'text-anchor="end" {FINE} {HALO}')
-    if chart.one and y.low < 0 < y.high:
+    if chart.unit_label and y.low < 0 < y.high:
         look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
         yield path(f"M{x.start:.1f} {y(1.0):.1f}H{x.end:.1f}", look)
-        yield label(x.start + 6, y(1.0) - 4, chart.one, f"{FINE} {HALO}")
+        yield label(x.start + 6, y(1.0) - 4, chart.unit_label, f"{FINE} {HALO}")
 
 
 def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
-    """Where a run is; at the upper edge where it was lost."""
+    """The place of a run; at the upper edge if it was lost."""
     return x(point.x.value), y.end - 6 if point.y is None else y(point.y)
 
 
@@ -191,27 +191,27 @@ def _marks(line: Line, x: Scale, y: Scale) -> Iterator[str]:
     """The runs of a line with their intervals."""
     paint, bars, marks = colour(line.number), "", []
     for point in sorted(line.points, key=lambda point: point.small):
-        across, down = _place(point, x, y)
+        right, down = _place(point, x, y)
         if point.y is None:
-            yield cross(across, down, paint, point.title)
+            yield cross(right, down, paint, point.title)
             continue
         if point.x.high > point.x.low:
             bars += bar(x(point.x.low), x(point.x.high), down)
         size = SMALL if point.small else MARK
-        marks.append(symbol(line.number, across, down, size, full=point.full, title=point.title))
+        marks.append(symbol(line.number, right, down, size, full=point.full, title=point.title))
     yield path(bars, f'stroke="{paint}"') if bars else ""
     yield symbols(line.number, marks)
 
 
 def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    """At the right, in the order in which the lines end, and none on another."""
-    lines = [line for line in chart.lines if line.drawn]
-    ends = [(_place(line.drawn[-1], x, y), line) for line in lines]
+    """The names at the right, in the order in which the lines end, without overlap."""
+    lines = [line for line in chart.lines if line.visible_points]
+    ends = [(_place(line.visible_points[-1], x, y), line) for line in lines]
     ends.sort(key=lambda end: end[0][1])
     places = separate_labels([down for (_, down), _ in ends], _NAME, y.end, y.start)
-    for ((across, down), line), at in zip(ends, places, strict=True):
+    for ((right, down), line), at in zip(ends, places, strict=True):
         paint = colour(line.number)
-        lead = f"M{across + 5:.1f} {down:.1f}L{x.end + 6:.1f} {at:.1f}"
+        lead = f"M{right + 5:.1f} {down:.1f}L{x.end + 6:.1f} {at:.1f}"
         yield path(lead, f'stroke="{paint}" stroke-opacity="0.5" stroke-width="0.8"')
         look = f'fill="{paint}" font-weight="600" {FINE} {HALO}'
         yield label(x.end + 9, at + 4, line.name, look)
@@ -224,19 +224,19 @@ def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[
     for at, text in _ticks_y(y):
         texts.append(label(x.start - 7, at + 4, text, f'text-anchor="end" {FINE}'))
         lines.append(f"M{x.start:.1f} {at:.1f}h-4")
-    shown = _ticks_x(x)
-    for at in _decades(x) or [at for at, _ in shown]:
+    x_ticks = _ticks_x(x)
+    for at in _decades(x) or [at for at, _ in x_ticks]:
         lines.append(f"M{at:.1f} {y.end:.1f}V{y.start:.1f}")
-    for at, text in shown:
+    for at, text in x_ticks:
         lines.append(f"M{at:.1f} {y.start:.1f}v5")
         texts.append(label(at, y.start + 18, text, f'text-anchor="middle" {FINE}'))
-    below, beside = titles
-    beside = shorten_to_width(beside, y.start - y.end, SIZE)
+    x_title, y_title = titles
+    y_title = shorten_to_width(y_title, y.start - y.end, SIZE)
     texts.append(
         f'<text transform="translate(14 {(y.start + y.end) / 2:.1f}) rotate(-90)" '
-        f'text-anchor="middle">{markup_text(beside)}</text>'
+        f'text-anchor="middle">{markup_text(y_title)}</text>'
     )
-    texts.append(label((x.start + x.end) / 2, y.start + 37, below, 'text-anchor="middle"'))
+    texts.append(label((x.start + x.end) / 2, y.start + 37, x_title, 'text-anchor="middle"'))
     return lines, texts
 
 
@@ -251,10 +251,10 @@ def _ticks_y(y: Scale) -> list[tuple[float, str]]:
 
 
 def _ticks_x(x: Scale) -> list[tuple[float, str]]:
-    """So many that their texts do not touch."""
+    """As many ticks as fit without their texts touching."""
     for most in (9, 7, 5, 4, 3, 2):
-        found = x.ticks(most)
-        wide = [(at, text_width(text, TICK_SIZE)) for at, text in found]
+        ticks = x.ticks(most)
+        wide = [(at, text_width(text, TICK_SIZE)) for at, text in ticks]
         if all(b - a >= (w + v) / 2 + 8 for (a, w), (b, v) in pairwise(wide)):
-            return found
-    return found[:1]
+            return ticks
+    return ticks[:1]

@@ -1,4 +1,4 @@
-"""What a model holds that its scenarios do not need.
+"""The report on what a model holds that its scenarios do not need.
 
 Entry point: `DietReport`.
 """
@@ -11,28 +11,28 @@ from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Record
 
 PROVED = "proved"
-"""Without it every bit is the same in every state, for a reason that is stated."""
+"""The label of a finding without which every bit is the same in every state, by a stated proof."""
 SAME = "the same in what was run"
-"""Without it scenarios, scripts and labs gave the same; nothing says that it must be so."""
+"""The label of a finding without which scenarios, scripts and labs gave the same, unproved."""
 
 
 _NAMES = 6
-"""That a message lists."""
+"""The most names that a message lists."""
 
 
 def name_list(names: Sequence[str]) -> str:
     """Names in a message, and how many more there are."""
-    more = len(names) - _NAMES
-    return ", ".join(names[:_NAMES]) + (f" and {more} more" if more > 0 else "")
+    extra = len(names) - _NAMES
+    return ", ".join(names[:_NAMES]) + (f" and {extra} more" if extra > 0 else "")
 
 
 class ModelPlace(Record, frozen=True):
     """An element of the model."""
 
     name: str
-    """What it is called, or its way from the root."""
+    """Its name, or its path from the root."""
     element: str
-    """The way to it from the root, such as `mujoco/worldbody/body[@name="arm"]/geom[2]`."""
+    """Its path from the root, such as `mujoco/worldbody/body[@name="arm"]/geom[2]`."""
     path: str
     """The file, POSIX, from the course's root."""
     line: int
@@ -62,7 +62,7 @@ class Saving(Record, frozen=True):
     spread: float | None
     """The standard error of the ratio, relative."""
     certain: bool
-    """Whether the ratio is another than 1 beyond what can be told."""
+    """Whether the ratio differs from 1 by more than the measurement's uncertainty."""
     memory: int
     """Bytes of the compiled model (an MJB file)."""
     text: int
@@ -70,10 +70,10 @@ class Saving(Record, frozen=True):
 
 
 class Finding(Record, frozen=True):
-    """What a model could be without."""
+    """Something that a model could be without."""
 
     kind: str
-    """By which it is kept, such as `sensor-unread`."""
+    """The key in `[[keep]]`, such as `sensor-unread`."""
     message: str
     places: tuple[ModelPlace, ...]
     """Empty where it is about the model as a whole."""
@@ -83,36 +83,36 @@ class Finding(Record, frozen=True):
     """The largest within 50 ms, relative to a number's size where that is over 1; 0 where all bits
     are the same."""
     scenarios: tuple[str, ...]
-    """In which it was tried."""
+    """The scenarios in which it was tried."""
     proof: str
-    """Why it holds whatever happens; empty where only runs speak for it."""
+    """Why it holds in every state; empty where only runs speak for it."""
     saving: Saving
     edits: tuple[TextEdit, ...]
     fixable: bool
     """Whether `--fix` makes the change."""
     unfixed: str
-    """Why it does not; empty where it does."""
+    """Why `--fix` does not make it; empty where it does."""
     kept: str
-    """The reason for which it stays; empty where there is none."""
+    """The author's reason to keep it; empty without one."""
     doubt: str
-    """Which code may notice, of what only runs speak for; empty where none can."""
+    """The code that may notice, where only runs speak for it; empty where none can."""
 
     @property
-    def counts(self) -> bool:
-        """Whether it is a fault of the model: it is proved, and nothing explains it."""
+    def is_fault(self) -> bool:
+        """Whether it is a fault of the model: proved, and not kept by the author."""
         return self.label == PROVED and not self.kept
 
 
 class RejectedTrial(Record, frozen=True):
-    """What could be left out and is no finding: it is needed, or saves no time."""
+    """A candidate that is no finding: it is needed, or saves no time."""
 
     kind: str
     message: str
     places: tuple[str, ...]
     difference: float | None
-    """As of a finding; `None` where the changed run was lost, or there was none."""
+    """As of a finding; `None` where the run without it was lost, or there was none."""
     reason: str
-    """Why it was not run; empty where it was, and changed the result."""
+    """Why it was rejected."""
 
 
 class DietScenario(Record, frozen=True):
@@ -121,7 +121,7 @@ class DietScenario(Record, frozen=True):
     name: str
     steps: int
     status: str
-    """`ok`, or how the run of the model as it is was lost: then nothing is claimed from it."""
+    """`ok`, or how the run of the unchanged model was lost: then nothing is concluded from it."""
     reasons: tuple[str, ...]
 
 
@@ -135,12 +135,12 @@ class StaleKeep(Record, frozen=True):
 
 
 class DietReport(Record, frozen=True):
-    """Everything that was found in a model."""
+    """All findings about a model."""
 
     model: str
     """Its file below `models/`, without suffix, POSIX."""
     digest: str
-    """Of all in the course that it depends on: the model with its files, and who reads it."""
+    """The digest of all that it depends on in the course: the model's files and its readers."""
     quick: bool
     machine: Machine
     readers: tuple[str, ...]
@@ -149,15 +149,15 @@ class DietReport(Record, frozen=True):
     findings: tuple[Finding, ...]
     tried: tuple[RejectedTrial, ...]
     fixed: Saving | None
-    """What all that `--fix` changes saves together; `None` where it changes nothing."""
+    """The saving of all changes by `--fix` together; `None` where it changes nothing."""
     slim: Saving | None
-    """What all findings save together that are no settings and are not kept."""
+    """The saving of all findings that are not kept, together."""
     slim_difference: float | None
-    """How far the model without all of them is from the model as it is."""
+    """The largest difference of the model without all of them."""
     stale: tuple[StaleKeep, ...]
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is to be done."""
-        lost = any(one.status != "ok" for one in self.scenarios)
-        return not (lost or self.stale or any(one.counts for one in self.findings))
+        """Whether there is nothing to do."""
+        lost = any(scenario.status != "ok" for scenario in self.scenarios)
+        return not (lost or self.stale or any(finding.is_fault for finding in self.findings))

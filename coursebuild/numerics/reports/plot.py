@@ -1,14 +1,14 @@
 """The work–precision plot of a scenario or a hard case as SVG: error against cost.
 
-Entry points: `plot_svg(report, …)`; `work_precision(report)`, what it shows; of a hard case
-`case_quantities(report)`, what can be drawn, and `case_svg(report, quantity, name)`.
+Entry points: `plot_svg(report, …)`, of a scenario, from `work_precision(report)`; of a hard case
+`case_quantities(report)`, the errors to draw, and `case_svg(report, quantity, name)`.
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
    scene's own solver, iterations and cone; the rows with others are small marks beside it.
 2. A mark is filled where the setting is on the Pareto front, and hollow where another one is
    better. A ring is around the scene's own setting. Bars are the intervals of the costs.
-3. A row that was not timed is put where its number of steps says: time goes by steps. Where nothing
-   at all was timed, the number of steps stands in for the cost.
+3. The cost of a row that was not timed is estimated from its number of steps. Where nothing at all
+   was timed, the number of steps stands in for the cost.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.chart import BESIDE, NARROW, WIDE, Chart, Line, Point, chart_svg
 from coursebuild.numerics.reports.strokes import Entry
 from coursebuild.numerics.reports.text import (
-    KNOWN,
+    INTEGRATORS,
     Quantity,
     interval_text,
+    main_quantity,
     seconds_text,
     setting_text,
     status_text,
-    telling,
 )
 
 
@@ -37,7 +37,7 @@ def plot_svg(report: ScenarioReport, *, name: str, narrow: bool = False) -> str:
 
     Args:
         report: of the scenario.
-        name: unlike those of all other plots on the page: what describes it has an id.
+        name: unique among the plots on the page, as ids are made from it.
         narrow: for narrow screens: the text has the same size there.
     """
     chart = work_precision(report)
@@ -45,26 +45,28 @@ def plot_svg(report: ScenarioReport, *, name: str, narrow: bool = False) -> str:
 
 
 def work_precision(report: ScenarioReport) -> Chart | None:
-    """What is drawn; `None` where no row has an error."""
-    quantity = telling(report)
+    """The chart of error against cost; `None` where no row has an error."""
+    quantity = main_quantity(report)
     if quantity is None:
         return None
     timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
-    measured = {row.setting.integrator for row in report.rows}
-    lines = tuple(_line(report, quantity, timed, name) for name in KNOWN if name in measured)
+    integrators = {row.setting.integrator for row in report.rows}
+    lines = tuple(
+        _line(report, quantity, timed, name) for name in INTEGRATORS if name in integrators
+    )
     return Chart(
         title=(
             f"{report.title or report.name}: error of {quantity.label} "
             f"against {'cost' if timed else 'steps'}"
         ),
-        text=" ".join(_said(report, quantity, lines)),
+        text=" ".join(_describe(report, quantity, lines)),
         axes=(
             "cost, relative to the scene’s own setting" if timed else "steps",
             f"error: {quantity.label}",
         ),
         lines=lines,
         least=quantity.least,
-        one="just visible" if quantity.name == "seen" else "",
+        unit_label="just visible" if quantity.name == "seen" else "",
         marks=tuple(_marks(report, lines)),
     )
 
@@ -76,59 +78,60 @@ def _line(
     name: str,
 ) -> Line:
     """The rows of an integrator."""
-    own = report.own
+    baseline = report.own_setting
     points = []
     rows = [row for row in report.rows if row.setting.integrator == name]
     for row in sorted(rows, key=lambda row: -row.setting.timestep):
-        error = quantity.of(row) if row.status == "ok" else None
+        error = quantity.value_of(row) if row.status == "ok" else None
         points.append(
             Point(
                 _cost(row, timed),
                 error,
-                " · ".join(_told(report, row, error, timed=bool(timed))),
+                " · ".join(_point_title(report, row, error, timed=bool(timed))),
                 full=row.front,
-                small=own is not None and row.setting.solving != own.solving,
+                small=baseline is not None
+                and row.setting.solver_settings != baseline.solver_settings,
                 ringed=row.own,
             )
         )
-    return Line(name, KNOWN.index(name), tuple(points))
+    return Line(name, INTEGRATORS.index(name), tuple(points))
 
 
 def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
-    """What a row costs; of one that was not timed, what its number of steps says."""
+    """The cost of a row; estimated from its number of steps where it was not timed."""
     if row in timed and row.cost is not None:
         return row.cost
-    like = [one for one in timed if one.setting.integrator == row.setting.integrator] or timed
-    rates = [one.cost.value / max(one.steps, 1) for one in like if one.cost is not None]
+    peers = [peer for peer in timed if peer.setting.integrator == row.setting.integrator] or timed
+    rates = [peer.cost.value / max(peer.steps, 1) for peer in peers if peer.cost is not None]
     value = max(row.steps, 1) * (statistics.median(rates) if rates else 1.0)
     return Interval(value, value, value)
 
 
 def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
-    """What marks mean: only those that there are."""
+    """The entries of the key, for the kinds of marks that occur."""
     points = [point for line in lines for point in line.points]
-    drawn = [point for line in lines for point in line.drawn]
-    if any(point.full for point in drawn):
+    visible = [point for line in lines for point in line.visible_points]
+    if any(point.full for point in visible):
         yield Entry("front", "on the Pareto front")
-    if not all(point.full for point in drawn):
+    if not all(point.full for point in visible):
         yield Entry("beaten", "another is better")
-    if any(point.small for point in drawn):
+    if any(point.small for point in visible):
         yield Entry("other", "other solver, iterations or cone")
     for row in report.rows:
         if row.own:
             yield Entry("own", f"the scene’s own: {setting_text(row.setting, row.setting)}")
-    if len(drawn) < len(points):
+    if len(visible) < len(points):
         yield Entry("lost", "run lost")
 
 
-def _said(report: ScenarioReport, quantity: Quantity, lines: Sequence[Line]) -> Iterator[str]:
-    """What is to be seen."""
+def _describe(report: ScenarioReport, quantity: Quantity, lines: Sequence[Line]) -> Iterator[str]:
+    """Describe the plot in sentences."""
     for line in lines:
-        if line.drawn:
-            errors = _range([point.y or 0.0 for point in line.drawn], 2, "{1} to {0}")
-            costs = _range([point.x.value for point in line.drawn], 3, "{0} to {1}")
+        if line.visible_points:
+            errors = _range([point.y or 0.0 for point in line.visible_points], 2, "{1} to {0}")
+            costs = _range([point.x.value for point in line.visible_points], 3, "{0} to {1}")
             yield f"{line.name}: errors {errors} at costs of {costs}."
-    lost = [line.name for line in lines if len(line.drawn) < len(line.points)]
+    lost = [line.name for line in lines if len(line.visible_points) < len(line.points)]
     if lost:
         yield f"Runs were lost under {', '.join(lost)}."
     for row in report.rows:
@@ -142,14 +145,14 @@ def _said(report: ScenarioReport, quantity: Quantity, lines: Sequence[Line]) -> 
 
 def _range(values: Sequence[float], digits: int, words: str) -> str:
     """The least and the largest of values."""
-    least, largest = (f"{one:.{digits}g}" for one in (min(values), max(values)))
+    least, largest = (f"{value:.{digits}g}" for value in (min(values), max(values)))
     return words.format(least, largest) if max(values) > min(values) else least
 
 
-def _told(
+def _point_title(
     report: ScenarioReport, row: WorkPrecisionRow, error: float | None, *, timed: bool
 ) -> Iterator[str]:
-    """What a point says when it is pointed at."""
+    """The parts of a point's tooltip."""
     yield setting_text(row.setting)
     if error is None:
         yield "; ".join((status_text(row.status), *row.reasons))
@@ -170,31 +173,34 @@ def _told(
 
 
 def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
-    """The error that says most, and energy drift where energy is conserved."""
-    known = report.reference
+    """The first error that is resolved, and energy drift where energy is conserved."""
+    reference = report.reference
     errors = (
-        Quantity("position", "error of position (m or rad)", FLOORS * known.position),
-        Quantity("attitude", "error of attitude (rad)", FLOORS * known.attitude),
-        Quantity("velocity", "error of velocity (m/s or rad/s)", FLOORS * known.velocity),
+        Quantity("position", "error of position (m or rad)", FLOORS * reference.position),
+        Quantity("attitude", "error of attitude (rad)", FLOORS * reference.attitude),
+        Quantity("velocity", "error of velocity (m/s or rad/s)", FLOORS * reference.velocity),
     )
     drift = Quantity("energy_drift", "energy drift, relative")
     runs = [line for line in report.errors if line.status == "ok"]
-    return (*[one for one in errors if one.tells(runs)][:1], *[drift] * drift.tells(runs))
+    return (
+        *[quantity for quantity in errors if quantity.is_resolved(runs)][:1],
+        *[drift] * drift.is_resolved(runs),
+    )
 
 
 def case_svg(report: CaseReport, quantity: Quantity, name: str) -> str:
     """The plot as an `svg` element; empty where nothing was timed.
 
-    `name` is unlike those of all other plots on the page.
+    `name` is unique among the plots on the page.
     """
     lines = tuple(
         Line(integrator, number, tuple(points))
-        for number, integrator in enumerate(KNOWN)
+        for number, integrator in enumerate(INTEGRATORS)
         if (points := [*_case_points(report, quantity, integrator)])
     )
     chart = Chart(
         title=f"{report.title}: {quantity.label} against processor time",
-        text=" ".join(_case_range(line) for line in lines if line.drawn),
+        text=" ".join(_case_range(line) for line in lines if line.visible_points),
         axes=("processor time for a simulated second (s)", quantity.label),
         lines=lines,
         least=quantity.least,
@@ -203,18 +209,20 @@ def case_svg(report: CaseReport, quantity: Quantity, name: str) -> str:
 
 
 def _case_points(report: CaseReport, quantity: Quantity, integrator: str) -> Iterator[Point]:
-    """By timestep; without runs of which nothing is off, for which there is no place."""
+    """The runs of an integrator as points; those without an error have no place in the plot."""
     for run in report.errors:
         cost = report.cost(run)
         if run.integrator != integrator or cost is None:
             continue
         if run.status != "ok":
-            told = f"{integrator} at {seconds_text(run.timestep)}: {status_text(run.status)}"
-            yield Point(cost, None, told)
-        elif error := quantity.of(run):
+            title = f"{integrator} at {seconds_text(run.timestep)}: {status_text(run.status)}"
+            yield Point(cost, None, title)
+        elif error := quantity.value_of(run):
             yield Point(cost, error, f"{integrator}: {error:.3g} at {seconds_text(cost.value, 3)}")
 
 
 def _case_range(line: Line) -> str:
-    (x0, y0), *_, (x1, y1) = [(p.x.value, p.y) for p in (*line.drawn, line.drawn[-1])]
+    (x0, y0), *_, (x1, y1) = [
+        (p.x.value, p.y) for p in (*line.visible_points, line.visible_points[-1])
+    ]
     return f"{line.name}: {y0:.2g} at {seconds_text(x0, 2)}, {y1:.2g} at {seconds_text(x1, 2)}."

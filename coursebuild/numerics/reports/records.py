@@ -1,13 +1,13 @@
 """Reports as files of the course, `content/reports/…`: written by authors, committed, read again.
 
 Entry points: `BENCH`, `DIET` and `STABILITY`, each a `ReportKind` that encodes and decodes its
-files; `RecordError`, why a file is none.
+files; `RecordError`, for files that are no report.
 
-1. A file says first what it is and which form it has: `{"holds": …, "form": …, …}`.
+1. A file begins with its kind and the version of its format: `{"holds": …, "form": …, …}`.
 2. Keys are sorted, and every measured row is a line, so that a difference between two versions of a
    file says what changed. The same report gives the same bytes.
-3. Reading is strict: what does not have every field, or has one more, or points at a row that is
-   not there, was not written by this tool.
+3. Reading is strict: a file that lacks a field, has one more, or points at a row that is not there
+   was not written by this tool.
 """
 
 from __future__ import annotations
@@ -49,19 +49,19 @@ class ReportKind(Struct, Generic[_T], frozen=True):
     name: str
     """Of the command that makes it."""
     field: str
-    """Under which a file holds the report."""
+    """The key of the report in its file."""
     type: type[_T]
     suffix: str
     flaw: Callable[[_T, str], str]
-    """What is wrong with a report that has every field, if anything; the second is the model that
-    it should be of."""
+    """What is wrong with a report that has every field, or ""; the second argument is the model
+    that it should be about."""
 
     def path(self, model: str = "") -> str:
         """The file, from the course's folder; of all hard cases there is one."""
         return f"{FOLDER}/{model or self.name}{self.suffix}"
 
     def command(self, model: str = "") -> str:
-        """What to type to have it recorded."""
+        """The command that records the report."""
         names = [shlex.quote(model)] if model else []
         return " ".join(["coursebuild", self.name, *names, "--record"])
 
@@ -71,14 +71,14 @@ class ReportKind(Struct, Generic[_T], frozen=True):
         return (_text(msgspec.to_builtins(value, order="sorted"), 0, 0) + "\n").encode()
 
     def decode(self, data: bytes, model: str = "") -> _T:
-        """What a file says; of this model, if one is named.
+        """Read a file; the report must be about this model, if one is named.
 
         Raises:
             RecordError: it holds no such report.
         """
         fields = [("holds", str), ("form", int), (self.field, self.type)]
         file = msgspec.defstruct("File", fields, forbid_unknown_fields=True)
-        report: _T = getattr(_decoded(data, f"coursebuild {self.name}", file), self.field)
+        report: _T = getattr(_decode(data, f"coursebuild {self.name}", file), self.field)
         flaw = self.flaw(report, model)
         if flaw:
             raise RecordError(flaw)
@@ -86,7 +86,7 @@ class ReportKind(Struct, Generic[_T], frozen=True):
 
 
 def _model_flaw(kind: str, report: SceneReport | DietReport, model: str) -> str:
-    """Why a report is not the whole one of a model; empty where it is, or none is named."""
+    """Why a report is not a complete one of this model; empty where it is, or none is named."""
     if model and report.model != model:
         return f"holds a report of the model `{report.model}`"
     if model and report.quick:
@@ -117,7 +117,7 @@ STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
 )
 
 
-def _decoded(data: bytes, holds: str, kind: type[_T]) -> _T:
+def _decode(data: bytes, holds: str, kind: type[_T]) -> _T:
     try:
         value = msgspec.json.decode(data)
         head = value if isinstance(value, dict) else {}
@@ -133,12 +133,12 @@ def _decoded(data: bytes, holds: str, kind: type[_T]) -> _T:
 
 
 def _text(value: Any, indent: int, lists: int) -> str:
-    """A value over several lines; small ones and rows on one."""
+    """A value as JSON over several lines; small values and rows take one."""
     inner = " " * (indent + 1)
     if isinstance(value, dict) and value and not _is_row(value, lists):
         items = [f"{_flat(key)}: {_text(value[key], indent + 1, lists)}" for key in sorted(value)]
-    elif isinstance(value, list | tuple) and any(isinstance(one, dict) for one in value):
-        items = [_text(one, indent + 1, lists + 1) for one in value]
+    elif isinstance(value, list | tuple) and any(isinstance(part, dict) for part in value):
+        items = [_text(part, indent + 1, lists + 1) for part in value]
     else:
         return _flat(value)
     left, right = "{}" if isinstance(value, dict) else "[]"
@@ -149,7 +149,7 @@ def _is_row(value: dict[str, Any], lists: int) -> bool:
     """Whether an object is a line of a table."""
     if lists >= 2:
         return True
-    return not any(isinstance(one, dict | list | tuple) and one for one in value.values()) and (
+    return not any(isinstance(item, dict | list | tuple) and item for item in value.values()) and (
         len(_flat(value)) <= 80
     )
 

@@ -1,4 +1,4 @@
-"""What charts are drawn with: marks, dashes, rings, lines, letters, a key, and the element itself.
+"""The primitives of charts: marks, dashes, rings, lines, texts, the key, and the `svg` element.
 
 Entry points: `path`, `area`, `label`, `symbol`, `bar`, `cross`, `ring`; `colour`, `line_look`;
 `key`, `svg`.
@@ -34,27 +34,27 @@ _FONT = "var(--sans, system-ui, sans-serif)"
 
 
 class Entry(NamedTuple):
-    """What a mark or a line means."""
+    """An entry of the key: the meaning of a mark or a line."""
 
     kind: str
     """`line`, `front`, `beaten`, `other`, `own` or `lost`."""
     text: str
     number: int | None = None
-    """Of a line."""
+    """The number of a line."""
 
 
 def path(d: str, look: str) -> str:
-    """A line."""
+    """A line without filling."""
     return f'<path d="{d}" fill="none" {look}/>'
 
 
 def area(d: str, look: str) -> str:
-    """What is filled."""
+    """A filled area."""
     return f'<path d="{d}" {look}/>'
 
 
 def label(x: float, y: float, text: str, look: str = "") -> str:
-    """Words at a place."""
+    """A text at a place."""
     return f'<text x="{x:.1f}" y="{y:.1f}"{look and f" {look}"}>{markup_text(text)}</text>'
 
 
@@ -88,7 +88,7 @@ def mark(number: int, x: float, y: float, size: float) -> str:
 
 
 def cross(x: float, y: float, paint: str, title: str = "") -> str:
-    """What stands for a run that was lost."""
+    """The mark of a lost run."""
     s = 3.6
     d = f"M{x - s:.1f} {y - s:.1f}l{2 * s:g} {2 * s:g}m0 {-2 * s:g}l{-2 * s:g} {2 * s:g}"
     return f'<path d="{d}" fill="none" stroke="{paint}" stroke-width="1.8">{_title(title)}</path>'
@@ -116,24 +116,24 @@ def bar(low: float, high: float, y: float) -> str:
 
 
 def ring(x: float, y: float, radius: float) -> str:
-    """What is around the scene's own setting."""
+    """The ring around the scene's own setting."""
     look = f'fill="none" stroke="{OWN}" stroke-width="1.8"'
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" {look}/>'
 
 
 def key(entries: Iterable[Entry], left: float, top: float, width: float) -> tuple[str, float]:
-    """Marks and what they mean, in rows; and where the rows end."""
-    found: list[str] = []
+    """The key, in rows, and the place where it ends."""
+    parts: list[str] = []
     x, y = left, top
     for entry in entries:
         text = shorten_to_width(entry.text, width - left - 40, TICK_SIZE)
         wide = 30 + text_width(text, TICK_SIZE) + 10
         if x > left and x + wide > width:
             x, y = left, y + ROW
-        found += _key_mark(entry, x + 14, y - 4)
-        found.append(label(x + 30, y, text, FINE))
+        parts += _key_mark(entry, x + 14, y - 4)
+        parts.append(label(x + 30, y, text, FINE))
         x += wide
-    return "".join(found), y + 6
+    return "".join(parts), y + 6
 
 
 def _key_mark(entry: Entry, x: float, y: float) -> Iterator[str]:
@@ -151,10 +151,10 @@ def _key_mark(entry: Entry, x: float, y: float) -> Iterator[str]:
         yield area(mark(0, x, y, SMALL if entry.kind == "other" else MARK), look)
 
 
-def svg(body: str, size: tuple[float, float], name: str, said: tuple[str, str]) -> str:
-    """A drawing as an element; `said` is its title and its text for who cannot see it."""
+def svg(body: str, size: tuple[float, float], name: str, texts: tuple[str, str]) -> str:
+    """A drawing as an element; `texts`: its title, and its description for screen readers."""
     key = markup_text(name.replace("/", "-"))  # a name in XML has no slash
-    title, text = map(markup_text, said)
+    title, text = map(markup_text, texts)
     return (
         f'<svg class="work-precision" viewBox="0 0 {size[0]:g} {size[1]:g}" '
         f'role="img" aria-labelledby="{key}-title {key}-text" fill="currentColor" '

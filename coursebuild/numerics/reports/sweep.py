@@ -1,6 +1,7 @@
-"""What a model does with one of its parameters at other values: the result table of a sweep.
+"""The result table of a sweep: a model with one of its parameters at other values.
 
-Entry points: `SweepReport`; `shown_figures(sweep)`, `cell(row, figure)`, `interval` and `FIGURES`.
+Entry points: `SweepReport`; `shown_figures(sweep)`, `cell(row, figure)`, `figure_interval` and
+`FIGURES`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ FIGURES = {
     "cost": "cost",
     "throughput": "× real time",
 }
-"""What is measured of every value, and how it is called."""
+"""The figures that are measured for every value, with their labels."""
 
 
 class SweepRow(Record, frozen=True):
@@ -55,13 +56,13 @@ class SweepRow(Record, frozen=True):
 
 
 class SweepReport(Record, frozen=True):
-    """All values that were tried."""
+    """All rows of a sweep."""
 
     name: str
     title: str
     scenario: str
     show: tuple[str, ...]
-    """The figures that it is about; empty: those that differ."""
+    """The figures to show; empty: those that differ."""
     rows: tuple[SweepRow, ...]
 
 
@@ -69,21 +70,23 @@ def shown_figures(sweep: SweepReport) -> tuple[str, ...]:
     """The figures that a reader is shown."""
     if sweep.show:
         return sweep.show
-    found = {name: [interval(row, name) for row in sweep.rows] for name in FIGURES}
-    known = {name: [one.value for one in row if one] for name, row in found.items()}
-    return tuple(name for name, row in known.items() if row and max(row) > 1.01 * min(row))
+    intervals = {name: [figure_interval(row, name) for row in sweep.rows] for name in FIGURES}
+    values = {
+        name: [interval.value for interval in row if interval] for name, row in intervals.items()
+    }
+    return tuple(name for name, row in values.items() if row and max(row) > 1.01 * min(row))
 
 
-def interval(row: SweepRow, figure: str) -> Interval | None:
-    """A figure; without a width where it is the same each time."""
-    found: float | Interval | None = getattr(row, figure)
-    return Interval(found, found, found) if isinstance(found, float) else found
+def figure_interval(row: SweepRow, figure: str) -> Interval | None:
+    """A figure of a row; an interval without width where repeated runs give the same."""
+    value: float | Interval | None = getattr(row, figure)
+    return Interval(value, value, value) if isinstance(value, float) else value
 
 
 def cell(row: SweepRow, figure: str) -> str:
     """A figure in three digits; with half its interval in per cent, where it has one."""
-    found = interval(row, figure)
-    if found is None:
+    interval = figure_interval(row, figure)
+    if interval is None:
         return ""
-    text = tick_texts([float(f"{found.value:.3g}")])[0]
-    return f"{text} ± {100 * found.half_width:.2g} %" if found.high > found.low else text
+    text = tick_texts([float(f"{interval.value:.3g}")])[0]
+    return f"{text} ± {100 * interval.half_width:.2g} %" if interval.high > interval.low else text

@@ -1,6 +1,6 @@
-"""What is shown of reports, and in which words: errors, settings, times.
+"""Which errors of reports are shown, and the texts of settings, times and statuses.
 
-Entry points: `quantities(report)`, `telling`; `setting_text`, `seconds_text`, `status_text`.
+Entry points: `quantities(report)`, `main_quantity`; `setting_text`, `seconds_text`, `status_text`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from msgspec import Struct
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import FLOORS, MeasuredRun, MeasuredSetting, ScenarioReport
 
-KNOWN = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
-"""Integrators in the order in which they are told, and keep their colour and mark."""
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
+"""Integrators in the order in which they are shown, which also sets their colour and mark."""
 FEWEST_STEPS = 20
-"""Steps of a scenario at the longest timestep of which it is tried whether it is stable."""
+"""Steps of a scenario at the longest timestep that is tried for stability."""
 
 
 class Quantity(Struct, frozen=True):
@@ -27,45 +27,52 @@ class Quantity(Struct, frozen=True):
     label: str
     """What it is, with its unit."""
     least: float = 0.0
-    """Nothing below is known."""
+    """The floor of the reference: smaller errors mean nothing."""
 
-    def of(self, row: MeasuredRun) -> float | None:
-        """The largest over the horizon; `None` where the row has none."""
-        found: tuple[float, float] | float | None = getattr(row, self.name)
-        value = found[0] if isinstance(found, tuple) else found
+    def value_of(self, row: MeasuredRun) -> float | None:
+        """The largest error of a row over the horizon; `None` where the row has none."""
+        error: tuple[float, float] | float | None = getattr(row, self.name)
+        value = error[0] if isinstance(error, tuple) else error
         return None if value is None or not math.isfinite(value) else abs(value)
 
-    def tells(self, rows: Iterable[MeasuredRun]) -> bool:
-        """Whether any of the rows has more than what is not known."""
-        found = (self.of(row) for row in rows)
-        return any(one is not None and one > self.least * (1 + 1e-9) for one in found)
+    def is_resolved(self, rows: Iterable[MeasuredRun]) -> bool:
+        """Whether any of the rows has an error above the floor."""
+        errors = (self.value_of(row) for row in rows)
+        return any(error is not None and error > self.least * (1 + 1e-9) for error in errors)
 
 
 def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
     """The errors that some row has, what the scenario declares to be measured first."""
-    known = (
+    candidates = (
         Quantity("figure", report.figure or "figure"),
         Quantity("seen", "what is seen (1: just visible)"),
         Quantity("position", "position (m or rad)", FLOORS * report.floor),
         Quantity("attitude", "attitude (rad)", FLOORS * report.floor),
         Quantity("velocity", "velocity (m/s or rad/s)", FLOORS * report.velocity_floor),
     )
-    return tuple(one for one in known if any(one.of(row) is not None for row in report.rows))
+    return tuple(
+        quantity
+        for quantity in candidates
+        if any(quantity.value_of(row) is not None for row in report.rows)
+    )
 
 
-def telling(report: ScenarioReport) -> Quantity | None:
-    """The error to show where only one is: that of the front, else the first beyond its floor.
+def main_quantity(report: ScenarioReport) -> Quantity | None:
+    """The error to show where only one is shown: the first that is resolved, else the first.
 
-    `None` where there is none at all.
+    `None` where no row has an error.
     """
-    found = quantities(report)
-    return next((one for one in found if one.tells(report.rows)), next(iter(found), None))
+    present = quantities(report)
+    return next(
+        (quantity for quantity in present if quantity.is_resolved(report.rows)),
+        next(iter(present), None),
+    )
 
 
 def is_cut_short(report: ScenarioReport) -> bool:
-    """Whether it is the duration that ended the search for stable timesteps."""
+    """Whether the search for stable timesteps ended because of the scenario's duration."""
     longest = report.duration / FEWEST_STEPS
-    return any(math.isclose(one.searched[1], longest, rel_tol=1e-9) for one in report.stable)
+    return any(math.isclose(row.searched[1], longest, rel_tol=1e-9) for row in report.stable)
 
 
 def seconds_text(value: float, digits: int = 6) -> str:
@@ -85,7 +92,7 @@ def interval_text(value: Interval) -> str:
 def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:
     """A setting in words; solver, iterations and cone only where they differ from those of `like`.
 
-    All that there is where nothing is given.
+    Without `like` all of them are given.
     """
     parts = [f"{setting.integrator} at {seconds_text(setting.timestep)}"]
     return ", ".join([*parts, *solving_parts(setting, like)])

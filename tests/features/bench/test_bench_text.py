@@ -20,14 +20,14 @@ from coursebuild.features.bench.commands.measurement import (
 )
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import RowVerdict
-from coursebuild.numerics.reports.departures import Checked, Departure
+from coursebuild.numerics.reports.departures import Departure, RecordCheck
 from coursebuild.report import Style
 from coursebuild.report.terminal import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene
 from support.fixture_cases import check_text
 
 HERE = Path(__file__).parent
-CHECKED = Checked(
+CHECKED = RecordCheck(
     "arm",
     "content/reports/arm.bench.json",
     (

@@ -29,7 +29,7 @@ def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> N
     rest = '<actuator><motor name="push" joint="pivot"/></actuator>'
     survey = tried(scene(rest=rest), has_commands=True)
     finding = found(survey)["actuator-idle"]
-    assert finding.counts and not finding.fixable
+    assert finding.is_fault and not finding.fixable
     assert finding.unfixed.startswith("scenarios give commands by number")
     assert fixed(survey) == scene(rest=rest)
 
@@ -66,7 +66,7 @@ def test_what_only_did_not_touch_is_told_and_left() -> None:
     world = PENDULUM + '<geom name="near" size=".1" pos="0 0 1.35"/>'
     survey = tried(scene(world))
     finding = found(survey)["contact-idle"]
-    assert finding.label == SAME and not finding.fixable and not finding.counts
+    assert finding.label == SAME and not finding.fixable and not finding.is_fault
     assert fixed(survey) == scene(world)
 
 
@@ -101,7 +101,7 @@ def test_all_of_a_field_of_rubble_goes_and_the_arm_stays() -> None:
     survey = tried(field(3, 40).replace("</worldbody>", posts + "</worldbody>"))
     far = found(survey)["far-body"]
     assert len(names(far)) == 40 and far.label == SAME and far.difference < 1e-9
-    assert not far.fixable and not far.counts and far.doubt == ""
+    assert not far.fixable and not far.is_fault and far.doubt == ""
     posts = {f"mujoco/worldbody/geom[{number}]" for number in range(2, 62)}
     assert set(names(found(survey)["collision-idle"])) >= posts
     assert fixed(survey).count("<freejoint/>") == 40

@@ -81,7 +81,7 @@ def test_no_hostile_script_loses_a_part() -> None:
         kind, _, name = part.partition(" ")
         assert any(kind in one for one in whole), kind
         survey = tried(MODEL, lesson=HEAD + script, declared=GO)
-        counted = [one for one in survey.report.findings if one.counts and kind in one.kind]
+        counted = [one for one in survey.report.findings if one.is_fault and kind in one.kind]
         lost += [(title, one.kind) for one in counted if not name or name in names(one)]
     assert lost == []
 
@@ -98,7 +98,7 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
         print("the spare cube and spin are in the prose only")
     """)
     survey = tried(MODEL, lesson=HEAD + script, declared=GO)
-    found = {one.kind: names(one) for one in survey.report.findings if one.counts}
+    found = {one.kind: names(one) for one in survey.report.findings if one.is_fault}
     assert found.pop("contact-off") == []
     assert found == {
         "energy-flag": ["energy"],

@@ -57,7 +57,7 @@ def test_a_texture_of_a_kept_material_is_used() -> None:
     survey = tried(text, keeps={"unused-material curtain": "for the next lesson"})
     seen = found(survey)
     assert seen["unused-material"].kept == "for the next lesson"
-    assert not seen["unused-material"].fixable and not seen["unused-material"].counts
+    assert not seen["unused-material"].fixable and not seen["unused-material"].is_fault
     assert "unused-texture" not in seen and survey.report.stale == ()
 
 

@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 from msgspec import Struct
 
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.numerics.reports.departures import Checked, Departure
+from coursebuild.numerics.reports.departures import Departure, RecordCheck
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.report.terminal import (
     BOLD,
@@ -38,7 +38,7 @@ class Measurement(Struct, Generic[_T], frozen=True):
     diagnostics: tuple[Diagnostic, ...] = ()
     """Of models and what is declared for them."""
     failures: tuple[ReportFailure, ...] = ()
-    checked: tuple[Checked, ...] = ()
+    checked: tuple[RecordCheck, ...] = ()
     remarks: tuple[str, ...] = ()
 
     @property
@@ -71,12 +71,12 @@ def failure_text(failure: ReportFailure, style: Style) -> str:
     return text + (f"  help: {visible(failure.help)}\n" if failure.help else "")
 
 
-def checked_text(checked: Sequence[Checked], style: Style) -> str:
+def checked_text(checked: Sequence[RecordCheck], style: Style) -> str:
     """Each recorded report: as it was recorded, or all that left its band."""
     return "\n".join(_checked(one, style) for one in checked)
 
 
-def _checked(one: Checked, style: Style) -> str:
+def _checked(one: RecordCheck, style: Style) -> str:
     if one.departures:
         many = plural(len(one.departures), "figure")
         said = style.paint(f"{many} not as recorded in {visible(one.path)}", RED)

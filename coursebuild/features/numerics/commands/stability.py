@@ -24,7 +24,7 @@ from coursebuild.core.text.diagnostics import nearest
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, with_records
 from coursebuild.numerics.reports.cases import CaseReport
-from coursebuild.numerics.reports.departures import Checked, case_departures
+from coursebuild.numerics.reports.departures import RecordCheck, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.shown_reports import read_record
@@ -83,7 +83,9 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     others = sorted({case.machine.engine for case in old} - {here})
     remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in others)
     departures = case_departures(old, found.reports)
-    return replace(found, checked=(Checked("stability", STABILITY.path(), departures, remarks),))
+    return replace(
+        found, checked=(RecordCheck("stability", STABILITY.path(), departures, remarks),)
+    )
 
 
 class _CaseRun(MeasuringRun):

@@ -41,7 +41,7 @@ def _errors(report: CaseReport) -> list[str]:
     steps = sorted({step for step, _ in runs}, reverse=True)
 
     def cell(run: ErrorLine | None) -> str:
-        error = None if run is None else shown.of(run)
+        error = None if run is None else shown.value_of(run)
         if run is None or error is None:
             return "" if run is None else status_text(run.status)
         return f"<{shown.least:.1e}" if error <= shown.least * (1 + 1e-9) else f"{error:.2e}"

@@ -24,7 +24,7 @@ from coursebuild.features.bench.commands.bench import measuring
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, with_records
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
-from coursebuild.numerics.reports.departures import Checked, scene_departures
+from coursebuild.numerics.reports.departures import RecordCheck, scene_departures
 from coursebuild.numerics.reports.records import BENCH, ReportFailure
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.pipeline.options import Options
@@ -96,7 +96,7 @@ def check(
     return replace(found, checked=tuple(checked))
 
 
-def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -> Checked:
+def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -> RecordCheck:
     remarks = []
     if recorded.digest != measured.digest:
         remarks.append("the model or its scenarios have changed since it was recorded")
@@ -110,7 +110,7 @@ def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -
         if before != now:
             remarks.append(f"recorded with {what}{before}, measured with {now}")
     departures = scene_departures(recorded, measured, scene.declared.bench)
-    return Checked(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
+    return RecordCheck(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
 
 
 class SceneRun(MeasuringRun):

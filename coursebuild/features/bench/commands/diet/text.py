@@ -60,7 +60,7 @@ def _model(report: DietReport, style: Style) -> str:
 
 
 def _summary(report: DietReport, style: Style) -> list[str]:
-    open_ones = [one for one in report.findings if one.counts]
+    open_ones = [one for one in report.findings if one.is_fault]
     fixable = [one for one in open_ones if one.fixable]
     lines: list[str] = []
     if not report.ok:
@@ -98,7 +98,7 @@ def _keep(report: DietReport, found: Sequence[Finding]) -> str:
 
 
 def _finding(one: Finding, style: Style) -> list[str]:
-    colour = FAINT if one.kept else RED if one.counts else YELLOW
+    colour = FAINT if one.kept else RED if one.is_fault else YELLOW
     lines = style.wrap(f"{one.kind}: {one.message}", "  ")
     lines[0] = lines[0].replace(one.kind, style.paint(one.kind, colour), 1)
     label = one.label
@@ -115,7 +115,7 @@ def _finding(one: Finding, style: Style) -> list[str]:
         lines.append(f"    … and {len(one.edits) - _EDITS} more changes")
     if one.doubt:
         lines += style.wrap(f"no fault, as {one.doubt}", "    ")
-    elif one.unfixed and one.counts:
+    elif one.unfixed and one.is_fault:
         lines += style.wrap(f"not for --fix: {one.unfixed}", "    ")
     return lines
 
