@@ -1,9 +1,9 @@
 """Search over the whole course: a page with a form, and the index that browsers load.
 
-1. `sections` cuts a page into sections of text, code and formulas.
-2. `words` makes terms of them, as `site/js/search/words.js` makes terms of what a reader types.
+1. `sections` splits a page into sections of text, code and formulas.
+2. `words` turns them into terms, by the rules that `site/js/search/words.js` has for queries.
 3. `page` packs the text for the reader's browser, and the terms for the index.
-4. `index` sorts the terms of all pages into small files, of which a query loads a few.
+4. `index` sorts the terms of all pages into small files; a query loads a few of them.
 """
 
 from coursebuild.core.features import Feature, PageKind, PagePart

@@ -3,16 +3,16 @@
 Entry point: `search_files(site)`: the list of pages, the shards of the index, the text of each
 page.
 
-A query loads the file of each of its words, and no other. Terms that begin alike stand in one file,
-so that the beginning of a word finds it. A third kind of file has the terms alone: by these a
-misspelt word is set right.
+A query loads only the file of each of its words. Terms that begin alike are in one file, so that
+the beginning of a word finds it. A third kind of file has terms only: they serve to correct
+misspelt words.
 
-1. The terms of some pages after each other are sorted into the shards of the index; what one shard
-   gets of them is a slice. Slices are kept from build to build.
-2. A shard is put together from its slices and named by a hash of them. An edit sorts some pages
-   anew, and makes those shards of which a slice is another.
-3. `search/index.js` lists pages and names; it has the one name that is always the same, so that a
-   page need not change with the index.
+1. The terms of a few consecutive pages are sorted into the shards of the index; the part for one
+   shard is a slice. Slices are cached from build to build.
+2. A shard is joined from its slices and named by a hash of them. After an edit a few pages are
+   sorted again, and the shards with a changed slice are written.
+3. `search/index.js` lists the pages and the names of shards. Its own name never changes, so that
+   pages need not change with the index.
 """
 
 from __future__ import annotations
@@ -26,38 +26,38 @@ from msgspec import Struct
 
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage, SiteContext
-from coursebuild.features.search.page import call, text_and_terms
+from coursebuild.features.search.page import script, text_and_terms
 from coursebuild.features.search.words import is_fuzzy, shelf_of
 
 LIST = "search/index.js"
 _FOLDER = "assets/search"
 _FORMAT = 1
-"""Of the files; part of every name."""
-_TOGETHER = 16
-"""Pages that are sorted together: the number of one among them is a digit."""
-_PAGES_A_SHARD = 8
-_MOST_SHARDS = 1024
-_DIGIT = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
+"""The version of the files' format; part of every name."""
+_BATCH = 16
+"""Pages that are sorted together: the number of a page in its batch is one hexadecimal digit."""
+_PAGES_PER_SHARD = 8
+_MAX_SHARDS = 1024
+_DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
 _LIVE = "search.live."
-"""What interface texts begin with that a page carries only with its search."""
+"""The prefix of interface texts that only the search script needs."""
 
 
 class IndexPlan(Struct, frozen=True):
-    """How many shards an index has: by the number of pages alone. All are powers of two."""
+    """The numbers of shards, powers of two, which depend only on the number of pages."""
 
     terms: int
     """Shards of terms with their pages."""
     words: int
-    """Shards of terms alone, which come after these."""
+    """Shards of terms only, which follow after those."""
 
     @classmethod
     def of(cls, pages: int) -> IndexPlan:
-        """For a number of pages."""
-        terms = min(_MOST_SHARDS, _power_below(pages // _PAGES_A_SHARD))
+        """Return the plan for a number of pages."""
+        terms = min(_MAX_SHARDS, _power_below(pages // _PAGES_PER_SHARD))
         return cls(terms, _power_below(terms // 8))
 
     def places(self, term: str) -> tuple[int, ...]:
-        """Numbers of the shards that have a term."""
+        """Return the numbers of the shards that have a term."""
         first = _hash(shelf_of(term)) & (self.terms - 1)
         if not is_fuzzy(term):
             return (first,)
@@ -65,13 +65,13 @@ class IndexPlan(Struct, frozen=True):
 
 
 def _power_below(number: int) -> int:
-    """The largest power of two that is no larger, and at least one."""
+    """Return the largest power of two that is not above a number; at least one."""
     return 1 << max(0, number.bit_length() - 1)
 
 
 @functools.lru_cache(maxsize=1 << 14)
 def _hash(text: str) -> int:
-    """FNV-1a of the text in UTF-8, 32 bits, as the browser computes it."""
+    """Return the FNV-1a hash of the text in UTF-8, 32 bits, as the browser computes it."""
     value = 0x811C9DC5
     for byte in text.encode("utf-8", "surrogatepass"):
         value = (value ^ byte) * 0x01000193 & 0xFFFFFFFF
@@ -79,28 +79,29 @@ def _hash(text: str) -> int:
 
 
 def search_files(site: SiteContext) -> Iterator[CachedFile]:
-    """All files of the search."""
+    """Yield all files of the search."""
     plan = IndexPlan.of(len(site.pages))
-    starts = range(0, max(1, len(site.pages)), _TOGETHER)
-    slices = [_slices(site, plan, site.pages[at : at + _TOGETHER]) for at in starts]
+    starts = range(0, max(1, len(site.pages)), _BATCH)
+    slices = [_sorted_slices(site, plan, site.pages[start : start + _BATCH]) for start in starts]
     shards = list(zip(*slices, strict=True))
     names = [_digest(b"\0".join(parts))[:8] for parts in shards]
-    listing = call("index", "", _listing(site, plan, "".join(names)))
+    listing = script("index", "", _listing(site, plan, "".join(names)))
     yield CachedFile(LIST, _digest(listing), lambda: listing)
     for number, (name, parts) in enumerate(zip(names, shards, strict=True)):
         path = f"{_FOLDER}/{number:04x}.{name}.js"
-        yield CachedFile(path, f"search-{number}-{name}", functools.partial(_shard, number, parts))
+        make = functools.partial(_shard_script, number, parts)
+        yield CachedFile(path, f"search-{number}-{name}", make)
     for page in site.pages:
-        make = functools.partial(_text, site, page.path)
+        make = functools.partial(_page_text, site, page.path)
         yield CachedFile(_text_path(page), f"search-{page.digest}", make)
 
 
-def _text(site: SiteContext, path: str) -> bytes:
+def _page_text(site: SiteContext, path: str) -> bytes:
     return text_and_terms(site.note(path))[0]
 
 
 def _text_path(page: NotedPage) -> str:
-    """By the page's path too, since two pages may be alike."""
+    """Return the path of a page's text; it depends on the page's path, as two can be the same."""
     return f"{_FOLDER}/{_digest(f'{page.digest} {page.path}'.encode())[:10]}.js"
 
 
@@ -109,7 +110,7 @@ def _digest(data: bytes) -> str:
 
 
 def _listing(site: SiteContext, plan: IndexPlan, names: str) -> dict[str, object]:
-    """What a browser has to know before the first query."""
+    """Return what a browser has to know before the first query."""
     kinds = sorted({page.kind for page in site.pages})
     return {
         "format": _FORMAT,
@@ -135,8 +136,8 @@ def _listing(site: SiteContext, plan: IndexPlan, names: str) -> dict[str, object
     }
 
 
-def _slices(site: SiteContext, plan: IndexPlan, pages: Sequence[NotedPage]) -> list[bytes]:
-    """What some pages give to each shard."""
+def _sorted_slices(site: SiteContext, plan: IndexPlan, pages: Sequence[NotedPage]) -> list[bytes]:
+    """Return the slice of each shard for a batch of pages; cached."""
     key = _digest(repr((plan.terms, plan.words, [page.digest for page in pages])).encode())
 
     def make() -> bytes:
@@ -148,57 +149,57 @@ def _slices(site: SiteContext, plan: IndexPlan, pages: Sequence[NotedPage]) -> l
 def sort_terms(plan: IndexPlan, pages: Iterable[bytes]) -> list[bytes]:
     """Sort the terms of some pages, given in the order of the course, into slices.
 
-    A slice has lines of a term and, after a blank, two hexadecimal digits for each page that has
-    it: the page's number here, and the weight.
+    A line of a slice has a term and, after a blank, two hexadecimal digits for each page that has
+    it: the page's number in the batch, and the weight.
     """
-    having: defaultdict[str, str] = defaultdict(str)
+    pages_by_term: defaultdict[str, str] = defaultdict(str)
     for number, data in enumerate(pages):
         digit = f"{number:x}"
         for line in data.decode().split("\n") if data else ():
-            having[line[1:]] += digit + line[0]
-    found: list[list[str]] = [[] for _ in range(plan.terms + plan.words)]
-    for term in sorted(having):
-        first, *others = plan.places(term)
-        found[first].append(f"{term} {having[term]}")
-        for place in others:
-            found[place].append(f"{term} ")
-    return ["\n".join(lines).encode() for lines in found]
+            pages_by_term[line[1:]] += digit + line[0]
+    slices: list[list[str]] = [[] for _ in range(plan.terms + plan.words)]
+    for term in sorted(pages_by_term):
+        term_shard, *word_shards = plan.places(term)
+        slices[term_shard].append(f"{term} {pages_by_term[term]}")
+        for word_shard in word_shards:
+            slices[word_shard].append(f"{term} ")
+    return ["\n".join(lines).encode() for lines in slices]
 
 
-def _shard(number: int, slices: Iterable[bytes]) -> bytes:
-    return call("shard", f"{number}", shard(slices))
+def _shard_script(number: int, slices: Iterable[bytes]) -> bytes:
+    return script("shard", f"{number}", join_slices(slices))
 
 
-def shard(slices: Iterable[bytes]) -> str:
-    """A shard as the browser reads it, from its slices in the order of their pages.
+def join_slices(slices: Iterable[bytes]) -> str:
+    """Return a shard as the browser reads it, from its slices in the order of their pages.
 
-    It has lines of a term and, after a blank, its pages: rising numbers as differences to the one
-    before, times 16 and with the weight, each in digits of five bits, the lowest first.
+    A line has a term and, after a blank, its pages: rising numbers as differences from the previous
+    one, times 16 and with the weight, each in digits of five bits, the lowest first.
     """
-    found: defaultdict[str, list[int]] = defaultdict(list)
+    pages_by_term: defaultdict[str, list[int]] = defaultdict(list)
     for number, part in enumerate(slices):
-        first = number * _TOGETHER << 4
+        first = number * _BATCH << 4
         for line in part.decode().split("\n") if part else ():
             term, _, pages = line.partition(" ")
-            found[term] += [first + page for page in bytes.fromhex(pages)]
-    return "\n".join([_line(term, found[term]) for term in sorted(found)])
+            pages_by_term[term] += [first + page for page in bytes.fromhex(pages)]
+    return "\n".join([_shard_line(term, pages_by_term[term]) for term in sorted(pages_by_term)])
 
 
-def _line(term: str, pages: list[int]) -> str:
+def _shard_line(term: str, pages: list[int]) -> str:
     if not pages:
         return term
-    said, before = [f"{term} "], 0
+    parts, previous = [f"{term} "], 0
     for page in pages:
-        said.append(_digits(page - before))
-        before = page & ~15
-    return "".join(said)
+        parts.append(_encode(page - previous))
+        previous = page & ~15
+    return "".join(parts)
 
 
 @functools.lru_cache(maxsize=1 << 14)
-def _digits(value: int) -> str:
-    """A number in digits of five bits, the lowest first; all but the last have the sixth bit."""
-    said = ""
+def _encode(value: int) -> str:
+    """Write a number in digits of five bits, lowest first; a sixth bit marks all but the last."""
+    digits = ""
     while value > 31:
-        said += _DIGIT[value & 31 | 32]
+        digits += _DIGITS[value & 31 | 32]
         value >>= 5
-    return said + _DIGIT[value]
+    return digits + _DIGITS[value]

@@ -1,9 +1,9 @@
-"""A page as sections that are searched.
+"""Splits a page into the sections that are searched.
 
-Entry points: `document_sections`, of a page that shows a document; `drawn_sections`, of another.
+Entry points: `document_sections`, for a page that shows a document; `html_sections`, for others.
 
-1. The blocks are walked in order, what stands in containers included; a heading begins a section.
-2. Formulas become lines of plain text (`tex`); the names of their commands are kept beside.
+1. The blocks are walked in order, those in containers too; a heading begins a section.
+2. Formulas become lines of plain text (`tex`); the section is also found by their commands.
 3. Answers and explanations of quizzes are left out: a search must not give them away.
 """
 
@@ -31,16 +31,16 @@ class SectionPiece(Struct, frozen=True):
 
 
 class Section(Struct, frozen=True):
-    """What stands between a heading and the next."""
+    """A heading with the content up to the next heading."""
 
     anchor: str
-    """Of its heading; empty for what stands before the first."""
+    """The anchor of its heading; empty before the first heading."""
     heading: str
     level: int
-    """Of its heading, from 1; 0 where there is none."""
+    """The level of its heading, from 1; 0 where there is none."""
     pieces: tuple[SectionPiece, ...]
-    also: tuple[str, ...] = ()
-    """Texts that it is found by and that are not shown: names of TeX commands, of files."""
+    names: tuple[str, ...] = ()
+    """Names that it is found by and that are not shown: of TeX commands, of files."""
 
 
 _TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
@@ -50,61 +50,62 @@ def document_sections(
     document: model.Document,
     lead: Iterable[str],
     labels: Mapping[str, str],
-    shown: Mapping[int, Struct],
+    block_values: Mapping[int, Struct],
 ) -> tuple[Section, ...]:
-    """The sections of a document.
+    """Return the sections of a document.
 
     Args:
-        document: with its prose, not its summary.
-        lead: paragraphs that stand above the document on its page.
-        labels: of the kinds of callouts, by name.
-        shown: what features show of the course beside their blocks, by their offset.
+        document: the full document, not its summary.
+        lead: paragraphs above the document on its page.
+        labels: the labels of the kinds of callouts, by name.
+        block_values: the values of features' blocks, by the block's offset.
     """
-    reader = SectionReader(labels, shown)
+    reader = SectionReader(labels, block_values)
     for text in lead:
         reader.add("text", text)
     reader.blocks(document.blocks)
     for footnote in document.footnotes:
         reader.blocks(footnote.blocks)
-    return reader.ended()
+    return reader.end()
 
 
 class SectionReader:
     """Collects the sections of a document."""
 
-    def __init__(self, labels: Mapping[str, str], shown: Mapping[int, Struct]) -> None:
+    def __init__(self, labels: Mapping[str, str], block_values: Mapping[int, Struct]) -> None:
         self._labels = labels
-        self._shown = shown
-        self._done: list[Section] = []
+        self._block_values = block_values
+        self._sections: list[Section] = []
         self._begin("", "", 0)
 
     def _begin(self, anchor: str, heading: str, level: int) -> None:
         self._head = anchor, heading, level
         self._pieces: list[SectionPiece] = []
-        self._also: dict[str, None] = {}
+        self._names: dict[str, None] = {}
 
-    def ended(self) -> tuple[Section, ...]:
-        """All sections; one with nothing in it only where it has a heading."""
-        if self._head[0] or self._pieces or not self._done:
-            self._done.append(Section(*self._head, tuple(self._pieces), tuple(self._also)))
-        return tuple(self._done)
+    def end(self) -> tuple[Section, ...]:
+        """End the section, unless it has neither heading nor content, and return all sections."""
+        if self._head[0] or self._pieces or not self._sections:
+            section = Section(*self._head, tuple(self._pieces), tuple(self._names))
+            self._sections.append(section)
+        return tuple(self._sections)
 
     def add(self, kind: Literal["text", "code", "formula", "output"], text: str) -> None:
-        """A piece of the section, unless there is nothing in it."""
+        """Add a piece to the section, unless it is empty."""
         text = text.strip("\n").rstrip() if kind in ("code", "output") else _line(text)
         if text:
             self._pieces.append(SectionPiece(kind, text))
 
     def add_name(self, name: str) -> None:
-        """A name by which the section is found as well."""
-        self._also[name] = None
+        """Add a name by which the section is found too."""
+        self._names[name] = None
 
     def values(self, block: model.FeatureBlock) -> Struct | None:
-        """What its page shows of the course beside a block."""
-        return self._shown.get(block.span.start)
+        """Return the result of `FenceKind.values` for a block."""
+        return self._block_values.get(block.span.start)
 
     def blocks(self, blocks: Iterable[model.Block]) -> None:
-        """Blocks in order."""
+        """Read blocks in order."""
         for block in blocks:
             self._block(block)
 
@@ -114,7 +115,7 @@ class SectionReader:
                 self.add("text", self.text(block.children))
             case model.Heading():
                 heading = _line(self.text(block.children))
-                self.ended()
+                self.end()
                 self._begin(block.anchor, heading, block.level)
             case model.ListBlock():
                 for item in block.items:
@@ -137,7 +138,7 @@ class SectionReader:
             case model.CodeBlock() | model.PlainCode() | model.Mjcf():
                 self.add("code", block.code.text)
             case model.Script():
-                self._also[block.path] = None
+                self._names[block.path] = None
                 self.add("code", block.code.text)
             case model.Recording():
                 if isinstance(block.body, model.Table):
@@ -151,11 +152,11 @@ class SectionReader:
 
     def _formula(self, tex: str) -> str:
         text, names = plain_formula(tex)
-        self._also |= dict.fromkeys(names)
+        self._names |= dict.fromkeys(names)
         return text
 
     def text(self, inlines: Iterable[model.Inline]) -> str:
-        """The text of inlines, as the search has it."""
+        """Return the text of inlines, as the search has it."""
         return "".join(map(self._inline, model.walk_inlines(inlines)))
 
     def _inline(self, inline: model.Inline) -> str:
@@ -164,7 +165,7 @@ class SectionReader:
                 return inline.text
             case model.Math():
                 if inline.meaning is not None:
-                    self._also[inline.meaning.text] = None
+                    self._names[inline.meaning.text] = None
                 return self._formula(inline.tex.text)
             case model.SoftBreak() | model.HardBreak():
                 return " "
@@ -182,30 +183,30 @@ def _line(text: str) -> str:
 
 _HEADINGS = {f"h{level}": level for level in range(1, 7)}
 _HIDDEN = frozenset(("script", "style", "nav", "svg", "pre", "template", "button", "select"))
-"""Elements that say nothing to a search; code is known from the page's inputs."""
+"""Elements that are not searched; code comes from the page's inputs."""
 _LINES = frozenset(
     "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
 )
 
 
-def drawn_sections(body: str) -> tuple[Section, ...]:
-    """The sections of a page's body."""
-    reader = _DrawnReader()
+def html_sections(body: str) -> tuple[Section, ...]:
+    """Return the sections of a page's body."""
+    reader = _HtmlReader()
     reader.read(parse_html(body))
     reader.end_line()
     reader.end_section()
-    return tuple(reader.done)
+    return tuple(reader.sections)
 
 
-class _DrawnReader:
+class _HtmlReader:
     def __init__(self) -> None:
-        self.done: list[Section] = []
+        self.sections: list[Section] = []
         self._head: tuple[str, str, int] = ("", "", 0)
         self._pieces: list[SectionPiece] = []
         self._text = ""
 
     def read(self, content: Iterable[HtmlContent]) -> None:
-        """Headings begin sections, other blocks lines."""
+        """Read elements: headings begin sections, other blocks begin lines."""
         for child in content:
             if isinstance(child, str):
                 self._text += child
@@ -215,7 +216,7 @@ class _DrawnReader:
                 self.end_line()
                 self.read(child.children)
                 heading, self._text = _line(self._text), ""
-                if child.name != "h1":  # which is the page's title
+                if child.name != "h1":  # the page's title
                     self.end_section()
                     self._head = child.attributes.get("id", ""), heading, _HEADINGS[child.name]
             elif child.name in _LINES:
@@ -226,13 +227,13 @@ class _DrawnReader:
                 self.read(child.children)
 
     def end_line(self) -> None:
-        """What was said since the last line is one."""
+        """Add the text since the last line as a piece."""
         text, self._text = _line(self._text), ""
         if text:
             self._pieces.append(SectionPiece("text", text))
 
     def end_section(self) -> None:
-        """What stands between two headings is a section, unless there is nothing."""
+        """Add what was read since the last heading as a section, unless it is empty."""
         if self._head[1] or self._pieces:
-            self.done.append(Section(*self._head, tuple(self._pieces)))
+            self.sections.append(Section(*self._head, tuple(self._pieces)))
         self._pieces = []

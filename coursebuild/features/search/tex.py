@@ -1,9 +1,9 @@
-"""TeX as a line of plain text: what a formula is found by, and how a search result shows it.
+"""Writes TeX as a line of plain text, by which a formula is found and shown in search results.
 
-Entry point: `plain_formula(tex)`, such as `τ = I_xx dω/dt` and the names of the commands in it.
+Entry point: `plain_formula(tex)`: a text such as `τ = I_xx dω/dt`, and the names of the commands.
 
-It never fails: what it does not know it leaves out of the text, and what does not balance ends
-where the TeX ends. That a formula parses is checked elsewhere.
+It never fails: unknown commands are left out of the text, and unbalanced groups end where the TeX
+ends. Whether a formula is valid is checked elsewhere.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ _SIGNS = {
     **{"forall": "∀", "exists": "∃", "dagger": "†", "top": "⊤", "prime": "′", "mid": "|"},
     **{"quad": "", "qquad": ""},
 }
-_NAMED = (
+_FUNCTIONS = (
     "sin cos tan cot sec csc arcsin arccos arctan sinh cosh tanh exp log ln lim max min sup inf det"
     " dim ker arg deg gcd Pr tr"
 ).split()
-"""Functions, which are written as they are called."""
-_SAID = _SIGNS | {name: name for name in _NAMED}
-"""What commands say that have no argument."""
+"""Functions that are written with their names."""
+_TEXTS = _SIGNS | {name: name for name in _FUNCTIONS}
+"""The texts of commands without arguments."""
 _STYLE = frozenset(
     "left right big Big bigg Bigg bigl bigr Bigl Bigr middle displaystyle textstyle scriptstyle"
     " limits nolimits quad qquad text textrm textit textbf mathrm mathbf mathit mathsf mathcal"
     " mathbb mathfrak mathtt boldsymbol bm symbf operatorname begin end nonumber notag label tag"
     " mathstrut strut phantom hphantom vphantom color textcolor mathop mathrel mathbin".split()
 )
-"""How things look: by these nobody searches."""
+"""Commands for the look of a formula: nobody searches by their names."""
 _SKIPPED = frozenset("begin end label tag color hspace vspace phantom hphantom vphantom".split())
-"""Commands whose argument is no part of the formula."""
+"""Commands whose argument is not part of the formula's text."""
 _LETTERS = {
     **{name: letter for letter, name in reversed(GREEK.items())},
     **{name.capitalize(): letter.upper() for letter, name in reversed(GREEK.items())},
@@ -51,17 +51,17 @@ _LETTERS = {
     "varsigma": "ς",
 }
 _MATHEMATICAL = re.compile("[\U0001d400-\U0001d7ff]")
-# A blank is looked for first, what stands around it then: the other way about takes far longer.
+# The blank is matched first and its neighbours then: the other order is far slower.
 _TIGHT = re.compile(r" (?:(?<=[_^(\[|⟨] )|(?=[_^)\]⟩,;]))")
 _OPERATOR = re.compile(r" (?<=[Δδ∂∇] )(?=[^\W\d])")
-"""Between a difference or derivative and what it is of: they are one word, as `Δt`."""
+"""The blank after a sign such as Δ or ∂: with its operand it is one word, as `Δt`."""
 
 
 @functools.lru_cache(maxsize=1024)
 def plain_formula(tex: str) -> tuple[str, tuple[str, ...]]:
-    """The formula as text, and the names of its commands, each once, in order."""
+    """Return a formula as text, and the names of its commands, each once, in order."""
     reader = _Reader(tex)
-    text = _TIGHT.sub("", " ".join(reader.whole().split()))
+    text = _TIGHT.sub("", " ".join(reader.read().split()))
     if not text.isascii():
         text = _OPERATOR.sub("", text)
         text = _MATHEMATICAL.sub(lambda m: unicodedata.normalize("NFKC", m[0]), text)
@@ -77,8 +77,8 @@ class _Reader:
         self._depth = 0
         self.names: list[str] = []
 
-    def whole(self) -> str:
-        """All of it, whatever closes in it."""
+    def read(self) -> str:
+        """Return the text of the formula, past braces that close nothing."""
         parts: list[str] = []
         while self._at < len(self._pieces):
             parts.append(self._group())
@@ -86,18 +86,18 @@ class _Reader:
         return " ".join(parts)
 
     def _next(self) -> str:
-        """The piece that comes next; empty at the end."""
+        """Return the next piece; empty at the end."""
         return self._pieces[self._at][0] if self._at < len(self._pieces) else ""
 
     def _group(self) -> str:
-        """Up to the brace that closes, which is left."""
+        """Read up to the closing brace, which is left."""
         parts: list[str] = []
         while self._next() not in ("", "}"):
-            parts.append(self._said())
+            parts.append(self._item())
         return "".join(parts)
 
-    def _said(self) -> str:
-        """What the next piece says, with what belongs to it."""
+    def _item(self) -> str:
+        """Read the next piece with its arguments."""
         match = self._pieces[self._at]
         self._at += 1
         piece = match[0]
@@ -106,14 +106,14 @@ class _Reader:
         if piece[0] == "\\" and len(piece) > 1:
             return " " if piece[1].isspace() or piece[1] in ",;:!\\" else piece[1]
         if piece == "{":
-            return self._closed()
+            return self._rest_of_group()
         if piece in ("^", "_"):
-            return piece + _bracketed(self._argument())
+            return piece + _add_brackets(self._argument())
         return {"&": " ", "~": " ", "'": "′", "\\": ""}.get(piece, piece)
 
-    def _closed(self) -> str:
+    def _rest_of_group(self) -> str:
         self._depth += 1
-        # Beyond any depth that a formula has, the rest is read flat: TeX may be made to be deep.
+        # Beyond the depth of any real formula groups are read flat, against stack overflows.
         inner = self._group() if self._depth < 64 else ""
         self._depth -= 1
         if self._next() == "}":
@@ -121,30 +121,30 @@ class _Reader:
         return inner
 
     def _argument(self) -> str:
-        """The next group or item."""
+        """Read the next group or item."""
         while self._next().isspace():
             self._at += 1
-        return "" if self._next() in ("", "}") else self._said().strip()
+        return "" if self._next() in ("", "}") else self._item().strip()
 
     def _command(self, name: str) -> str:
         if name in _LETTERS:
             return f" {_LETTERS[name]} "
         if name not in _STYLE:
             self.names.append(name)
-        if name in _SAID:
-            return f" {_SAID[name]} "
+        if name in _TEXTS:
+            return f" {_TEXTS[name]} "
         if name in ("frac", "dfrac", "tfrac", "cfrac"):
-            top = _bracketed(self._argument())
-            return f" {top}/{_bracketed(self._argument())} "
+            top = _add_brackets(self._argument())
+            return f" {top}/{_add_brackets(self._argument())} "
         if name == "sqrt":
-            return f"√{_bracketed(self._argument())}"
+            return f"√{_add_brackets(self._argument())}"
         if name in _SKIPPED:
             self._argument()
             return " "
         return ""
 
 
-def _bracketed(text: str) -> str:
-    """In brackets, unless it is one word or sign."""
+def _add_brackets(text: str) -> str:
+    """Put a text in brackets, unless it is one word or sign."""
     text = text.strip()
     return f"({text})" if len(text) > 1 and not text.isalnum() else text

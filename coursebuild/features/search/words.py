@@ -1,15 +1,15 @@
-"""The terms that a text is found by; what a reader types goes through the same rules.
+"""The terms that a text is found by; queries are split into terms by the same rules.
 
 Entry points: `count_terms(text)`; `terms_of(text)`, the terms of a text in order; `shelf_of(term)`,
 which decides what file of the index has a term.
 
 1. Characters are brought to their compatible form, without marks (NFKD, so that `Iₓₓ` is `Ixx` and
    `é` is `e`).
-2. The text is cut into words, numbers, names of code (`data.qpos`, `mj_step`) and symbols.
-3. A name gives itself and its parts, a Greek letter or a symbol its name, a run of a script without
-   spaces its pairs of characters.
+2. The text is split into words, numbers, names in code (`data.qpos`, `mj_step`) and symbols.
+3. The terms of a name are the name and its parts, of a Greek letter or a symbol its name, of a text
+   in a script without spaces its pairs of characters.
 
-`site/js/search/words.js` does the same; `site/tests/search-words.json` holds both to it.
+`site/js/search/words.js` does the same; tests of both read `site/tests/search-words.json`.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Literal
 
-LONGEST = 48
-"""Characters; longer runs are data, which nobody types."""
-_LONGEST_NUMBER = 12
-BEGINNING = 4
-"""Characters by which words are found that begin with them."""
+MAX_LENGTH = 48
+"""The limit for terms, in characters; longer ones are data, which nobody types."""
+_MAX_NUMBER_LENGTH = 12
+PREFIX = 4
+"""Characters at the beginning of a word that suffice to find it."""
 
 _SYMBOLS = {
     **{"∂": ("partial",), "∇": ("nabla", "gradient"), "∫": ("integral", "int")},
@@ -66,26 +66,26 @@ _GENITIVE = re.compile("['’]s\\b")
 
 
 def terms_of(text: str) -> list[str]:
-    """The terms of a text, in order, with repeats."""
+    """Return the terms of a text, in order, with repeats."""
     if not text.isascii():
         text = _FOREIGN.sub(_without_marks, text)
-    return [term for token in _TOKEN.findall(_GENITIVE.sub("", text)) for term in _expanded(token)]
+    return [term for token in _TOKEN.findall(_GENITIVE.sub("", text)) for term in _expand(token)]
 
 
 def shelf_of(term: str) -> str:
-    """Terms with the same shelf stand in the same file: those that begin alike.
+    """Return the beginning of a term that decides its file, so that similar terms share one.
 
-    Of a number it is the whole; of a name with dots the beginning of its last part, since very many
-    may begin with the same one.
+    For a number it is the whole; for a name with dots the beginning of the last part, since very
+    many names can have the same first part.
     """
     first = term[:1]
     if first.isascii():
-        return term if first.isdecimal() else term.rpartition(".")[2][:BEGINNING]
-    return first if _script(first) == "unspaced" else term[:BEGINNING]
+        return term if first.isdecimal() else term.rpartition(".")[2][:PREFIX]
+    return first if _script(first) == "unspaced" else term[:PREFIX]
 
 
 def is_fuzzy(term: str) -> bool:
-    """Whether a misspelt word may mean the term."""
+    """Whether the term can be proposed for a misspelt word."""
     if not 3 <= len(term) <= 24 or "." in term:
         return False
     first = term[0]
@@ -99,25 +99,25 @@ def _script(character: str) -> Literal["greek", "unspaced", "other"]:
 
 
 def _without_marks(run: re.Match[str]) -> str:
-    """Characters that are not ASCII in their compatible form, without marks."""
+    """Return characters that are not ASCII in their compatible form, without marks."""
     text = unicodedata.normalize("NFKD", run[0])
     return "".join(c for c in text if unicodedata.category(c)[0] != "M")
 
 
-def _expanded(token: str) -> tuple[str, ...]:
-    """The terms of a word, a name, a number or a symbol, each once."""
+def _expand(token: str) -> tuple[str, ...]:
+    """Return the terms of a word, a name, a number or a symbol, each once."""
     if token in _SYMBOLS:
         return _SYMBOLS[token]
     token = token.strip("_")
-    if len(token) > LONGEST or not token:
+    if len(token) > MAX_LENGTH or not token:
         return ()
     if _NUMBER.match(token):
-        return (token.lower(),) if len(token) <= _LONGEST_NUMBER else ()
-    return tuple(dict.fromkeys(_name(token) if token.isascii() else _mixed(token)))
+        return (token.lower(),) if len(token) <= _MAX_NUMBER_LENGTH else ()
+    return tuple(dict.fromkeys(_split_name(token) if token.isascii() else _split_mixed(token)))
 
 
-def _name(token: str) -> Iterator[str]:
-    """A name, and what it is put together from."""
+def _split_name(token: str) -> Iterator[str]:
+    """Yield a name and its parts."""
     yield token.lower()
     for name in filter(None, (name.strip("_") for name in token.split("."))):
         if len(name) > 1:
@@ -129,47 +129,47 @@ def _name(token: str) -> Iterator[str]:
             yield from (part for part in parts if len(part) > 1)
 
 
-def _mixed(token: str) -> Iterator[str]:
-    """A word with letters of other scripts."""
+def _split_mixed(token: str) -> Iterator[str]:
+    """Yield the terms of a word with letters of other scripts."""
     runs = [(script, "".join(letters)) for script, letters in groupby(list(token), _script)]
-    said: list[str] = []
+    words: list[str] = []
     for script, run in runs:
         text = unicodedata.normalize("NFC", run.lower())
         if script == "unspaced":  # each character with its next one, and the last alone
             yield from (text[at : at + 2] for at in range(len(text)))
         elif script == "greek" and text in GREEK:
-            said.append(GREEK[text])
+            words.append(GREEK[text])
             yield GREEK[text]
         else:
             word = text.replace("ς", "σ").strip("._")
-            said.append(word)
+            words.append(word)
             if len(word) > 1 or (word and len(runs) == 1):
-                yield from _name(run.strip("._")) if word.isascii() else (word,)
-    joined = "".join(said).replace("_", "")
-    if len(said) > 1 and len(joined) <= LONGEST:
-        yield joined
+                yield from _split_name(run.strip("._")) if word.isascii() else (word,)
+    whole = "".join(words).replace("_", "")
+    if len(words) > 1 and len(whole) <= MAX_LENGTH:
+        yield whole
 
 
-_CUT = bytes(
+_TO_BLANKS = bytes(
     code if code > 0x7F or bytes((code,)).isalnum() or code in b"_.+-'" else 0x20
     for code in range(256)
 )
-"""Makes blanks of what stands in no token; what is not ASCII has no byte below 128."""
+"""Turns bytes that are in no token into blanks; characters beyond ASCII have no byte below 128."""
 
 
 def count_terms(text: str) -> dict[str, int]:
-    """How often each term occurs."""
-    found: dict[str, int] = {}
-    runs = Counter(text.encode("utf-8", "surrogatepass").translate(_CUT).split())
+    """Return how often each term occurs."""
+    counts: dict[str, int] = {}
+    runs = Counter(text.encode("utf-8", "surrogatepass").translate(_TO_BLANKS).split())
     for run, times in runs.items():
         for term in _terms_of_run(run):
-            found[term] = found.get(term, 0) + times
-    return found
+            counts[term] = counts.get(term, 0) + times
+    return counts
 
 
 @functools.lru_cache(maxsize=1 << 15)
 def _terms_of_run(run: bytes) -> tuple[str, ...]:
-    """Most runs come again and again, and most are words of small letters."""
-    if run.isalpha() and run.islower() and len(run) <= LONGEST:  # of ASCII
+    """Cached and with a fast path, since most runs are frequent words in lower case."""
+    if run.isalpha() and run.islower() and len(run) <= MAX_LENGTH:  # ASCII
         return (run.decode(),)
     return tuple(terms_of(run.decode("utf-8", "surrogatepass")))

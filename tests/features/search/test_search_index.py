@@ -23,12 +23,12 @@ DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
 
 @pytest.fixture(scope="module")
 def library(make: Make) -> Library:
-    made = make("Text.")
-    return Library.of(made.course, made.results, made.assets)
+    rendered_course = make("Text.")
+    return Library.of(rendered_course.course, rendered_course.results, rendered_course.assets)
 
 
-class Shelf(dict[str, bytes]):
-    """Keeps what is made."""
+class Cache(dict[str, bytes]):
+    """A cache in memory."""
 
     def get_or_create(self, key: str, make: Callable[[], bytes]) -> bytes:
         if key not in self:
@@ -46,18 +46,19 @@ def course(pages: int, words: int = 40) -> dict[str, dict[str, int]]:
     }
 
 
-def made(
-    library: Library, terms: dict[str, dict[str, int]], shelf: Shelf | None = None
+def search_site(
+    library: Library, terms: dict[str, dict[str, int]], cache: Cache | None = None
 ) -> dict[str, CachedFile]:
     notes = {
-        path: b"text of " + path.encode() + b"\0" + lines(found) for path, found in terms.items()
+        path: b"text of " + path.encode() + b"\0" + lines(weights)
+        for path, weights in terms.items()
     }
     pages = tuple(
         NotedPage(path, "lesson", path[8:-5], f"Title {path}", hashlib.sha256(note).hexdigest())
         for path, note in notes.items()
     )
-    shelf = Shelf() if shelf is None else shelf
-    keep = shelf.get_or_create
+    cache = Cache() if cache is None else cache
+    keep = cache.get_or_create
     site = SiteContext(library, None, None, pages, notes.__getitem__, keep, {}, None)  # type: ignore[arg-type]
     return {file.path: file for file in search_files(site)}
 
@@ -66,10 +67,10 @@ def lines(terms: dict[str, int]) -> bytes:
     return "\n".join(f"{weight:x}{term}" for term, weight in sorted(terms.items())).encode()
 
 
-def decoded(data: bytes) -> dict[str, list[tuple[int, int]]]:
+def decode_shard(data: bytes) -> dict[str, list[tuple[int, int]]]:
     """A shard by its terms, as the browser reads it."""
     text = json.loads(data.decode().partition(",")[2].partition(",")[2].rstrip()[:-1])
-    found: dict[str, list[tuple[int, int]]] = {}
+    pages_by_term: dict[str, list[tuple[int, int]]] = {}
     for line in text.split("\n") if text else ():
         term, _, digits = line.partition(" ")
         page = value = shift = 0
@@ -81,13 +82,13 @@ def decoded(data: bytes) -> dict[str, list[tuple[int, int]]]:
                 page += value >> 4
                 pages.append((page, value & 15))
                 value = shift = 0
-        found[term] = pages
-    return found
+        pages_by_term[term] = pages
+    return pages_by_term
 
 
 def shards(files: dict[str, CachedFile]) -> dict[int, dict[str, list[tuple[int, int]]]]:
     return {
-        int(path.split("/")[-1].split(".")[0], 16): decoded(file.make())
+        int(path.split("/")[-1].split(".")[0], 16): decode_shard(file.make())
         for path, file in files.items()
         if path.count(".") == 2 and path.startswith("assets/search/")
     }
@@ -97,34 +98,34 @@ def shards(files: dict[str, CachedFile]) -> dict[int, dict[str, list[tuple[int, 
 def test_every_term_stands_once_where_the_browser_looks(library: Library, pages: int) -> None:
     terms = course(pages)
     plan = IndexPlan.of(pages)
-    found = shards(made(library, terms))
-    assert sorted(found) == list(range(plan.terms + plan.words))
+    terms_by_shard = shards(search_site(library, terms))
+    assert sorted(terms_by_shard) == list(range(plan.terms + plan.words))
     expected: dict[str, list[tuple[int, int]]] = {}
     for number, weights in enumerate(terms.values()):
         for term, weight in weights.items():
             expected.setdefault(term, []).append((number, weight))
-    seen: dict[str, list[tuple[int, int]]] = {}
+    pages_by_term: dict[str, list[tuple[int, int]]] = {}
     for shard in range(plan.terms):
-        for term, said in found[shard].items():
+        for term, term_pages in terms_by_shard[shard].items():
             assert plan.places(term)[0] == shard
-            assert term not in seen
-            seen[term] = said
-    assert seen == expected
-    alone = {term for n in range(plan.terms, plan.terms + plan.words) for term in found[n]}
-    assert alone == {term for term in expected if is_fuzzy(term)}
+            assert term not in pages_by_term
+            pages_by_term[term] = term_pages
+    assert pages_by_term == expected
+    words = {term for n in range(plan.terms, plan.terms + plan.words) for term in terms_by_shard[n]}
+    assert words == {term for term in expected if is_fuzzy(term)}
 
 
 def test_an_edit_sorts_few_pages_and_makes_few_shards(library: Library) -> None:
-    terms, shelf = course(400), Shelf()
-    before = made(library, terms, shelf)
-    kept = len(shelf)
+    terms, cache = course(400), Cache()
+    before = search_site(library, terms, cache)
+    old_size = len(cache)
     terms["lessons/7.html"]["brandnew"] = 4
-    after = made(library, terms, shelf)
-    assert len(shelf) == kept + 1
+    after = search_site(library, terms, cache)
+    assert len(cache) == old_size + 1
     assert len(after.keys() - before.keys()) == 3, "the term's shard, that of spellings, the text"
-    changed = {p for p, f in after.items() if p in before and before[p].key != f.key}
-    assert changed == {"search/index.js"}
-    clean = made(library, terms)
+    changed_paths = {p for p, f in after.items() if p in before and before[p].key != f.key}
+    assert changed_paths == {"search/index.js"}
+    clean = search_site(library, terms)
     assert {p: (f.key, f.make()) for p, f in after.items()} == {
         p: (f.key, f.make()) for p, f in clean.items()
     }
@@ -143,15 +144,15 @@ def test_an_edit_sorts_few_pages_and_makes_few_shards(library: Library) -> None:
 def test_the_files_follow_from_the_pages_alone(
     library: Library, terms: dict[str, dict[str, int]]
 ) -> None:
-    files = made(library, terms)
+    files = search_site(library, terms)
     first = {path: (file.key, file.make()) for path, file in files.items()}
-    assert first == {path: (f.key, f.make()) for path, f in made(library, terms).items()}
-    counted = sum(len(said) for shard in shards(files).values() for said in shard.values())
-    assert counted == sum(map(len, terms.values()))
+    assert first == {path: (f.key, f.make()) for path, f in search_site(library, terms).items()}
+    count = sum(len(pages) for shard in shards(files).values() for pages in shard.values())
+    assert count == sum(map(len, terms.values()))
 
 
 def test_the_list_of_pages_says_where_everything_is(library: Library) -> None:
-    files = made(library, course(5))
+    files = search_site(library, course(5))
     text = files[index.LIST].make().decode()
     assert text.startswith('coursebuildSearch.take("index","",')
     listing = json.loads(text.partition(',"",')[2].rstrip()[:-1])
@@ -160,8 +161,8 @@ def test_the_list_of_pages_says_where_everything_is(library: Library) -> None:
     for number in range(2):
         name = listing["files"][8 * number : 8 * number + 8]
         assert f"assets/search/{number:04x}.{name}.js" in files
-    for number, (path, *said, file) in enumerate(listing["pages"]):
-        assert said == [0, f"Title {path}", str(number)]
+    for number, (path, *values, file) in enumerate(listing["pages"]):
+        assert values == [0, f"Title {path}", str(number)]
         assert files[f"assets/search/{file}.js"].make() == b"text of " + path.encode()
     # Keys stand in lines whose fields are parted by blanks.
     assert not [file.key for file in files.values() if len(file.key.split()) != 1]
@@ -169,5 +170,5 @@ def test_the_list_of_pages_says_where_everything_is(library: Library) -> None:
 
 def test_pages_that_are_alike_have_files_of_their_own(library: Library) -> None:
     page = {"same": 4}
-    files = made(library, {"lessons/a.html": page, "lessons/b.html": page})
+    files = search_site(library, {"lessons/a.html": page, "lessons/b.html": page})
     assert len([path for path in files if path.count(".") == 1 and "assets" in path]) == 2

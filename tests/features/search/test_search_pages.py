@@ -9,13 +9,8 @@ import pytest
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.features.search.page import (
-    note_page,
-    page_sections,
-    terms,
-    text_and_terms,
-)
-from coursebuild.features.search.sections import Section, SectionPiece, drawn_sections
+from coursebuild.features.search.page import note_page, page_sections, text_and_terms, weigh_terms
+from coursebuild.features.search.sections import Section, SectionPiece, html_sections
 from support.rendered_course import Make
 
 LESSON = """Before any *heading*, at $I_{xx}$.[^n]
@@ -59,8 +54,8 @@ import mujoco
 
 
 def sections_of(make: Make, text: str) -> tuple[Section, ...]:
-    made = make(text)
-    library = Library.of(made.course, made.results, made.assets)
+    rendered_course = make(text)
+    library = Library.of(rendered_course.course, rendered_course.results, rendered_course.assets)
     document = library.lessons["0.1"].document
     return page_sections(inputs_of(library, "lesson", "0.1"), document, "")
 
@@ -71,7 +66,7 @@ def inputs_of(library: Library, kind: str, id: str = "") -> PageInputs:
     return next(pages).inputs(library)
 
 
-def said(section: Section) -> list[tuple[str, str]]:
+def pieces(section: Section) -> list[tuple[str, str]]:
     return [(piece.kind, piece.text) for piece in section.pieces]
 
 
@@ -85,39 +80,39 @@ def test_a_lesson_by_its_sections(make: Make) -> None:
         ("empty", "Empty", 2),
     ]
     start, outer, inner, empty = sections
-    assert said(start) == [
+    assert pieces(start) == [
         ("text", "A body falls."),
         ("text", "free fall, drop"),
         ("text", "Say what falls"),
         ("text", "Measure it"),
         ("text", "Before any heading, at I_xx."),
     ]
-    assert said(outer) == [
+    assert pieces(outer) == [
         ("text", "One mj_step item"),
         ("text", "Two"),
         ("text", "Warning: Mind"),
         ("text", "In a callout."),
     ]
-    assert said(inner)[:4] == [
+    assert pieces(inner)[:4] == [
         ("formula", "τ = L"),
         ("text", "h | k"),
         ("text", "a | b"),
         ("code", "import mujoco"),
     ]
-    assert inner.also == ("dot", "examples/a.py")
-    assert said(empty) == [("text", "raw text & more"), ("text", "A note.")]
+    assert inner.names == ("dot", "examples/a.py")
+    assert pieces(empty) == [("text", "raw text & more"), ("text", "A note.")]
 
 
 def test_a_quiz_gives_no_answer_away(make: Make) -> None:
-    texts = [text for section in sections_of(make, LESSON) for _, text in said(section)]
+    texts = [text for section in sections_of(make, LESSON) for _, text in pieces(section)]
     at = texts.index("Check")
     assert texts[at + 1 : at + 7] == ["Which one?", "This", "That", "Sort", "alpha", "zeta"]
     assert not any("secret" in text for text in texts)
 
 
 def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
-    made = make("Text.")
-    library = Library.of(made.course, made.results, made.assets)
+    rendered_course = make("Text.")
+    library = Library.of(rendered_course.course, rendered_course.results, rendered_course.assets)
     for kind in ("home", "notfound", "search", "offline", "progress"):
         assert note_page(inputs_of(library, kind), None, "<p>Text</p>") == b"", kind
     planned = inputs_of(library, "lesson", "1.2")
@@ -134,7 +129,7 @@ def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
     piece = SectionPiece("text", "body body body body; inertia")
     code = SectionPiece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
     sections = (Section("a", "Inertia", 2, (piece, code), ("frac",)),)
-    lines = terms(["4.2", "Body"], sections).decode().split("\n")
+    lines = weigh_terms(["4.2", "Body"], sections).decode().split("\n")
     assert lines == sorted(lines, key=lambda line: line[1:])
     assert {line[1:]: line[0] for line in lines} == {
         "4.2": "c",
@@ -153,9 +148,9 @@ def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
 
 
 def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make) -> None:
-    made = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 \x07.\n')
-    library = Library.of(made.course, made.results, made.assets)
-    note = note_page(inputs_of(library, "lesson", "0.1"), made.page(), "")
+    rendered_course = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 \x07.\n')
+    library = Library.of(rendered_course.course, rendered_course.results, rendered_course.assets)
+    note = note_page(inputs_of(library, "lesson", "0.1"), rendered_course.page(), "")
     text = text_and_terms(note)[0].decode()
     assert text.startswith('coursebuildSearch.take("page","",') and text.endswith(")\n")
     sections = json.loads(text.removeprefix('coursebuildSearch.take("page","",')[:-2])
@@ -183,4 +178,4 @@ def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make)
     ],
 )
 def test_a_drawn_page_by_its_headings(body: str, sections: tuple[Section, ...]) -> None:
-    assert drawn_sections(body) == sections
+    assert html_sections(body) == sections

@@ -68,9 +68,9 @@ def test_any_text_has_terms_that_lines_can_hold(text: str) -> None:
     ],
 )
 def test_a_formula_as_text(formula: str, text: str, names: tuple[str, ...]) -> None:
-    found, said = plain_formula(formula)
-    assert found == text
-    assert names is ... or said == names
+    plain_text, plain_names = plain_formula(formula)
+    assert plain_text == text
+    assert names is ... or plain_names == names
 
 
 @given(st.text(alphabet=r"\{}_^&~'% abαomegfrct1-+=()", max_size=60))
